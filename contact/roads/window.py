@@ -73,7 +73,9 @@ class Window:
             last = min(first + self._most, rows.stop)
             self._hold(first, last)
             z = self._z[first - self._begin : last - self._begin, columns]
-            low, high = np.fmin(low, np.nanmin(z)), np.fmax(high, np.nanmax(z))
+            # Without a known height both stay infinite, and nothing is warned of.
+            low = min(low, np.nanmin(z, initial=np.inf))
+            high = max(high, np.nanmax(z, initial=-np.inf))
         return float(low), float(high)
 
     def _by_pieces(self, i: NDArray[np.intp], s: Array, j: NDArray[np.intp], t: Array) -> Array:

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from tireroad.contact.roads.grid import Grid
 from tireroad.contact.roads.kind import RoadKind
 from tireroad.contact.roads.kinds.obstacle import Edges
 from tireroad.contact.roads.placement import begun_at, moved_start, shown
@@ -161,6 +162,9 @@ def _check_extent(scene: Scene, road: Road) -> None:
             f"has {shown(x0)} to {shown(x1)} m; change [road] start, shorten [time] duration, or continue it "
             'by end = "mirror"'
         )
+    if isinstance(road, Grid) and travel > AHEAD and table.drum_radius is None:
+        # Refuses holes under the middle of the tire, before anything is solved.
+        road.prepare(start + AHEAD, start + travel, table.lateral, table.lateral)
 
 
 def least_travel(scene: Scene) -> float:

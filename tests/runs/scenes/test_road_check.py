@@ -106,6 +106,23 @@ def test_a_road_without_edges_has_no_foot(scene: Path) -> None:
     assert foot(load(scene, ["road.run_in=0"]).road) is None
 
 
+@pytest.mark.parametrize("holes", ["refuse", "fill"])
+def test_heights_that_are_missing_are_said_by_check(scene: Path, holes: str) -> None:
+    """Without any, the estimate ended in a traceback; one was told of after static state and modes."""
+    x, y = np.arange(0.0, 2.0, 0.01), np.arange(-0.2, 0.2, 0.01)
+    z = np.zeros((len(x), len(y)))
+    z[80, 20] = np.nan
+    np.savez(scene.parent / "road.npz", x=x, y=y, z=z)
+    if holes == "fill":
+        explain(load(scene, ["road.holes=fill"]))
+    else:
+        with pytest.raises(InputError, match=r"1 heights are missing .* x = 0\.8 m"):
+            explain(load(scene))
+    np.savez(scene.parent / "road.npz", x=x, y=y, z=np.full_like(z, np.nan))
+    with pytest.raises(InputError, match="missing|no valid height"):
+        explain(load(scene, [f"road.holes={holes}"]))
+
+
 def test_check_opens_the_file(scene: Path) -> None:
     (scene.parent / "road.npz").write_bytes(b"PK\x03\x04 no more")
     with pytest.raises(InputError, match=r"road\.npz: cannot be read"):
