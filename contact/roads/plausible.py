@@ -9,8 +9,9 @@ from tireroad.fem.errors import InputError
 Array = NDArray[np.float64]
 
 WIDEST = 50.0  # m: a measured road across; a texture of 300 mm is 300 m wide when read as metres
-# Median of |dz|/dx or |dz|/dy between neighbours, the larger: ruts and steps have but one of them. Measured: 0.03 on Belgian block every 10 mm, about 0.2 on a
-# texture of 0.5 mm rms every 0.5 mm. Millimetres read as metres give a thousand times that.
+# Median of |dz|/dx or |dz|/dy between neighbours, the larger: ruts and steps have but one of them.
+# Measured: 0.03 on Belgian block every 10 mm, about 0.2 on a texture of 0.5 mm rms every 0.5 mm.
+# Millimetres read as metres give a thousand times that.
 STEEPEST = 5.0
 # Median over the rows of their relief over the width: a kerb of 0.15 m on 0.3 m has 0.5.
 ROUGHEST = 2.0

@@ -189,10 +189,8 @@ def build_sections(
 def short_attributes(results: Results, name: str) -> list[tuple[str, str]]:
     """Single-line text attributes of the file: versions, hash; libraries listed in full."""
     values = ((key, results.attribute(name, key)) for key in results.file(name).attrs)
-    values = (
-        (key, v) for key, v in values if key != "scene_name"
-    )  # maybe another, that shared the file
     lines = {key: v for key, v in values if isinstance(v, str) and "\n" not in v}
+    lines.pop("scene_name", None)  # maybe another's, that shared the file
     if lines.get("libraries", "").startswith("{"):
         versions = json.loads(lines["libraries"])
         lines["libraries"] = ", ".join(f"{key} {version}" for key, version in versions.items())

@@ -78,8 +78,6 @@ def _crossed(path: Path, raw: Mapping[str, Any], plan: str) -> tuple[tuple[str, 
     if not axes or not all("key" in axis for axis in axes):
         raise InputError(f'{path}: plan = "{plan}" needs [[axis]] tables, each with a key')
     keys = tuple(str(axis["key"]) for axis in axes)
-    if len(set(keys)) < len(keys):
-        raise InputError(f"{path}: two [[axis]] tables have the same key")
     _check_apart(f"{path}: [[axis]]", keys)
     for key, axis in zip(keys, axes, strict=True):
         check_keys(f"{path}: axis {key}", axis, _AXIS[plan])
