@@ -1,4 +1,4 @@
-"""The house keeps its order: imports run one way and in no circle, files and folders stay readable."""
+"""Architecture rules: layered imports without circles, modules of one subject, short functions."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 ROOMS = ("fem", "modal", "greens", "contact", "runs")  # each may use those before it
-LINES = 250  # of a file
-FILES = 16  # of a folder
+LARGEST = 800  # lines of a module: more than that is more than one subject
+SMALLEST = 60  # lines of a module that only one other imports: less is a page of its reader
+PLUGINS = {"kinds", "laws", "sections", "tables", "outputs"}  # folders of one variant a file
 FUNCTION = 30  # lines that 95 % of all functions stay within
 
 
@@ -28,7 +29,7 @@ def _for_types_only(node: ast.AST) -> bool:
     return isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
 
 
-def _imports(nodes: list[ast.stmt]) -> set[str]:
+def _imports(nodes: list[ast.stmt], types: bool = True) -> set[str]:
     """The program's modules imported at the top of a file: what is imported within a function is late."""
     found: set[str] = set()
     for node in nodes:
@@ -36,9 +37,9 @@ def _imports(nodes: list[ast.stmt]) -> set[str]:
             found |= {one.name for one in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
             found |= {f"{node.module}.{one.name}" for one in node.names} | {node.module}
-        elif isinstance(node, ast.If | ast.Try) and not _for_types_only(node):
+        elif isinstance(node, ast.If | ast.Try) and (types or not _for_types_only(node)):
             found |= _imports(
-                [one for one in ast.iter_child_nodes(node) if isinstance(one, ast.stmt)]
+                [one for one in ast.iter_child_nodes(node) if isinstance(one, ast.stmt)], types
             )
     return found & MODULES.keys()
 
@@ -53,21 +54,40 @@ def _every_import(file: Path) -> set[str]:
     return found
 
 
+EVERY_IMPORT = {name: _every_import(file) for name, file in MODULES.items()}
+
+
 @pytest.mark.parametrize("room", ROOMS)
 def test_imports_run_one_way(room: str) -> None:
     later = ROOMS[ROOMS.index(room) + 1 :]
-    for name, file in MODULES.items():
+    for name, imported in EVERY_IMPORT.items():
         if name.split(".")[1] == room:
-            wrong = {one for one in _every_import(file) if one.split(".")[1] in later}
+            wrong = {one for one in imported if one.split(".")[1] in later}
             assert not wrong, f"{name} imports {sorted(wrong)}"
 
 
-def test_no_circle_of_imports() -> None:
-    graph = {name: _imports(ast.parse(file.read_text()).body) for name, file in MODULES.items()}
+def _circle(types: bool, rooms: tuple[str, ...]) -> str:
+    graph = {
+        name: _imports(ast.parse(file.read_text()).body, types)
+        for name, file in MODULES.items()
+        if name.split(".")[1] in rooms
+    }
     try:
         TopologicalSorter(graph).prepare()
     except CycleError as circle:
-        pytest.fail(" -> ".join(circle.args[1]))
+        return " -> ".join(circle.args[1])
+    return ""
+
+
+def test_no_circle_of_imports() -> None:
+    assert _circle(types=False, rooms=ROOMS) == ""
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_no_circle_of_imports_for_types(room: str) -> None:
+    if room in TO_UNTIE:
+        pytest.xfail(f"{room} still has one: {_circle(types=True, rooms=(room,))}")
+    assert _circle(types=True, rooms=(room,)) == ""
 
 
 def test_files_of_tests_differ_in_name() -> None:
@@ -76,19 +96,29 @@ def test_files_of_tests_differ_in_name() -> None:
     assert {name for name, number in count.items() if number > 1} == set()
 
 
-def test_files_stay_short() -> None:
+def _lines(file: Path) -> int:
+    return len(file.read_text().splitlines())
+
+
+def test_a_module_is_one_subject() -> None:
     pages = [file for kind in ("*.j2", "*.css", "*.js") for file in (ROOT / "runs").rglob(kind)]
     files = [*MODULES.values(), *(ROOT / "tests").rglob("*.py"), *pages]
-    long = {str(file.relative_to(ROOT)): len(file.read_text().splitlines()) for file in files}
-    assert {name: lines for name, lines in long.items() if lines > LINES} == {}
+    large = {str(file.relative_to(ROOT)) for file in files if _lines(file) > LARGEST}
+    assert large == set()
 
 
-def test_folders_stay_small() -> None:
-    folders = {file.parent for file in MODULES.values()} | {
-        file.parent for file in (ROOT / "tests").rglob("*.py")
+def test_no_module_is_a_page_of_its_only_reader() -> None:
+    readers = Counter(one for imported in EVERY_IMPORT.values() for one in imported)
+    pages = {
+        str(file.relative_to(ROOT))
+        for name, file in MODULES.items()
+        if file.name != "__init__.py"
+        and file.parent.name not in PLUGINS
+        and _lines(file) < SMALLEST
+        and readers[name] == 1
     }
-    count = {str(one.relative_to(ROOT)): len(list(one.glob("*.py"))) for one in folders}
-    assert {name: files for name, files in count.items() if files > FILES} == {}
+    assert pages - TO_MERGE == set(), "merge these with the one module that imports them"
+    assert TO_MERGE - pages == set(), "take these out of TO_MERGE: the list only shrinks"
 
 
 def test_functions_stay_short() -> None:
@@ -99,3 +129,44 @@ def test_functions_stay_short() -> None:
         if isinstance(node, ast.FunctionDef) and node.end_lineno
     ]
     assert sum(length <= FUNCTION for length in lengths) >= 0.95 * len(lengths)
+
+
+# What is still to be mended; nothing is added here.
+TO_UNTIE = {
+    "fem",
+    "greens",
+    "contact",
+    "runs",
+}
+TO_MERGE = {
+    "contact/literature/springs.py",
+    "contact/results/relief.py",
+    "contact/roads/files/opencrg_header.py",
+    "contact/solver/krylov.py",
+    "contact/tread/shear_convolution.py",
+    "fem/decks/drawn.py",
+    "fem/decks/files/gmsh_types.py",
+    "fem/decks/named.py",
+    "fem/decks/prony.py",
+    "fem/decks/shape/mirror.py",
+    "fem/static/diagnosis.py",
+    "fem/static/path/snap.py",
+    "fem/tire/surface.py",
+    "greens/completed.py",
+    "greens/residual/alternating.py",
+    "greens/residual/parted.py",
+    "greens/spread.py",
+    "greens/vibration.py",
+    "modal/adrift.py",
+    "modal/solver/boundaries.py",
+    "runs/bench/parts/truth.py",
+    "runs/report/drawn.py",
+    "runs/report/section_picture.py",
+    "runs/report/verdicts.py",
+    "runs/scene/rules/full.py",
+    "runs/stages/build/rolling/watch.py",
+    "runs/stages/build/shared_road.py",
+    "runs/stages/parts.py",
+    "runs/stages/stored/responses.py",
+    "runs/stages/stored/static_file.py",
+}
