@@ -1,6 +1,7 @@
 """All differences between dolfinx releases, detected by feature and not by version number.
 
-Debian 12 ships dolfinx 0.5.2, Debian 13 ships 0.9. No other file of the program may ask which.
+Debian 12 ships dolfinx 0.5.2, Debian 13 ships 0.9, Ubuntu 26.04 0.10, conda and the PyPI wheel 0.11. No
+other file of the program may ask which. Importing it checks that the libraries fit together.
 """
 
 from __future__ import annotations
@@ -158,6 +159,12 @@ def evaluate(
     asks_mesh = "mesh" in inspect.signature(made.eval).parameters
     values = made.eval(mesh, own) if asks_mesh else made.eval(own)
     return np.asarray(values).reshape(len(cells), len(points))
+
+
+def force_vector(form: Any, space: fem.FunctionSpace) -> Any:
+    """Ghosted PETSc vector for the assembly of a linear form on `space`. Collective."""
+    names = inspect.signature(fem.petsc.create_vector).parameters
+    return fem.petsc.create_vector(space if "V" in names else form)  # from 0.10 on of spaces
 
 
 def cell_facets(mesh: dmesh.Mesh) -> np.ndarray:

@@ -47,7 +47,7 @@ class Forces:
         self._clamp = [body.clamp()]
         self._local_tangent = fem.petsc.create_matrix(self._tangent)
         self.matrix = self._local_tangent
-        self._work = fem.petsc.create_vector(self._residual)
+        self._work = compat.force_vector(self._residual, body.space)
         self._rim = (3 * body.rim[body.rim < body.nodes, None] + np.arange(3)).ravel()
 
     @property

@@ -89,7 +89,7 @@ class NonlinearTire(FullTire):
             work += added_stress(body, share, before)
             potential += added_energy(body, share, before)
         self._force_form, self._potential_form = compat.form(work), compat.form(potential)
-        self._assembled = fem.petsc.create_vector(self._force_form)
+        self._assembled = compat.force_vector(self._force_form, body.space)
         n = len(self._mass)
         self._rest = self._at(np.zeros(n), self._forces)
         self._rest_potential = self._at(np.zeros(n), self._stored)
