@@ -11,7 +11,7 @@ from typing import Any
 
 __path__ = [str(Path(__file__).resolve().parent)]
 
-import_module("tireroad.runs.process.kernels").choose_kernels()  # before anything loads BLAS
+import_module("tireroad.runs.process.libraries").prepare()  # before anything loads BLAS or MPI
 
 # Module of each public name. A name is imported on first use, so that `import tireroad` is cheap
 # and reading results does not load the finite elements.

@@ -8,23 +8,79 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import importlib.machinery
+import importlib.util
 import inspect
 import logging
+import os
 import platform
+import re
+import shlex
+import subprocess
+import sys
+import sysconfig
+import types
 import warnings
 from collections.abc import Callable
+from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 from typing import Any
 
 import basix
+import cffi
 import dolfinx.fem.petsc  # noqa: F401  (newer releases do not import it by themselves)
+import ffcx.codegeneration.jit
 import numpy as np
 import ufl
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
+from petsc4py import PETSc
 
 from tireroad.fem import form_cache
+from tireroad.fem.errors import InputError
+
+_FAMILIES = {
+    "MPI": (re.compile(r"/lib(mpi|mpich)(-\w+)?\.so[^/]*$"), "mpi4py, PETSc and dolfinx"),
+    "PETSc": (re.compile(r"/libpetsc\w*(-\w+)?\.so[^/]*$"), "petsc4py and dolfinx"),
+}
+OLDEST = (0, 5)
+
+
+def misfit(version: str, scalar: type, maps: str) -> str:
+    """What does not fit together in an environment, and what to do; "" if all does.
+
+    `version` of dolfinx, `scalar` type of PETSc, `maps` the text of /proc/self/maps.
+    """
+    if tuple(int(part) for part in re.findall(r"\d+", version)[:2]) < OLDEST:
+        return f"dolfinx {version} is too old: 0.5 or newer is needed"
+    if np.issubdtype(scalar, np.complexfloating):
+        return (
+            "PETSc has complex numbers here, and real ones are needed: python3-petsc4py-real on Debian,"
+            ' "petsc=*=real*" with conda, dolfinx-solver-real with pip'
+        )
+    files = {line.split()[-1] for line in maps.splitlines() if "/" in line}
+    for family, (pattern, users) in _FAMILIES.items():
+        several = sorted(file for file in files if pattern.search(file))
+        if len(several) > 1:
+            return (
+                f"two copies of {family} are loaded, {' and '.join(several)}: {users} must be built on"
+                " the same one; take all of them from Debian, all from conda, or all from one wheel"
+            )
+    return ""
+
+
+def _check_libraries() -> None:
+    """Raise InputError where libraries do not fit together: computing with them would crash or hang."""
+    try:
+        maps = Path("/proc/self/maps").read_text()
+    except OSError:
+        maps = ""  # not Linux
+    if text := misfit(dolfinx.__version__, PETSc.ScalarType, maps):
+        raise InputError(f"{sys.prefix}: {text}; TIREROAD_PYTHON names another python")
+
+
+_check_libraries()
 
 
 def _cpu() -> str:
@@ -73,6 +129,72 @@ JIT = {
 _JIT_KEY = (
     "jit_options" if "jit_options" in inspect.signature(fem.form).parameters else "jit_params"
 )
+
+
+class _PlainBuilder(cffi.FFI):
+    """Builds a form's C code into a plain shared library, for pythons without their C headers
+    (python3-dev), which FFCx's extension modules need."""
+
+    def set_source(self, module_name: str, source: str, **options: Any) -> None:
+        self._name, self._code, self._compile_options = module_name, source, options
+
+    def cdef(self, csource: str, **options: Any) -> None:
+        super().cdef(csource, **options)
+        self._declared = csource
+
+    def compile(self, tmpdir: Path, **_: Any) -> None:
+        """Compile with the compiler that cffi would take; CompileError where that fails."""
+        source, options = Path(tmpdir) / f"{self._name}.c", self._compile_options
+        text = ",".join(str(byte) for byte in self._declared.encode() + b"\0")
+        code = f"#include <ufcx.h>\n{self._code}\nconst char {_DECLARED}[] = {{{text}}};\n"
+        source.write_text(code, encoding="utf-8")
+        command = os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc"
+        include = [f"-I{folder}" for folder in options["include_dirs"]]
+        libraries = [f"-l{name}" for name in options["libraries"] or []]
+        library = source.with_name(self._name + EXTENSION_SUFFIXES[0])
+        flags = ["-shared", "-fPIC", *options["extra_compile_args"], *include]
+        done = subprocess.run(
+            [*shlex.split(command), *flags, str(source), "-o", str(library), *libraries],
+            capture_output=True,
+            text=True,
+        )
+        if done.returncode:
+            raise cffi.VerificationError(f"{command}: {done.stderr.strip()[-500:]}")
+
+
+class _PlainLoader(importlib.machinery.ExtensionFileLoader):
+    """Loads what `_PlainBuilder` built, as the module that FFCx expects: `ffi` and `lib`."""
+
+    def create_module(self, spec: Any) -> types.ModuleType:
+        return types.ModuleType(spec.name)
+
+    def exec_module(self, module: Any) -> None:
+        reader, module.ffi = cffi.FFI(), cffi.FFI()
+        reader.cdef(f"extern const char {_DECLARED}[];")
+        text = getattr(reader.dlopen(self.path), _DECLARED)
+        module.ffi.cdef(reader.string(text).decode())
+        module.lib = module.ffi.dlopen(self.path)
+        _LOADED.append(module.lib)
+
+
+_LOADED: list = []  # a library is unloaded with its last reference, and forms point into it
+_DECLARED = "tireroad_declarations"  # the C declarations of a plain library, kept inside it
+
+
+def _compile_without_headers() -> None:
+    """Let FFCx build plain libraries. Its module of compilation is changed in this process only."""
+    machinery = types.SimpleNamespace(
+        FileFinder=importlib.machinery.FileFinder,
+        ExtensionFileLoader=_PlainLoader,
+        EXTENSION_SUFFIXES=EXTENSION_SUFFIXES,
+    )
+    jit: Any = ffcx.codegeneration.jit
+    jit.cffi = types.SimpleNamespace(FFI=_PlainBuilder)
+    jit.importlib = types.SimpleNamespace(machinery=machinery, util=importlib.util)
+
+
+if not (Path(sysconfig.get_path("include")) / "Python.h").exists():
+    _compile_without_headers()
 
 
 def _options(folder: Path, **more: Any) -> dict:

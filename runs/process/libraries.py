@@ -1,16 +1,45 @@
-"""Choice of OpenBLAS kernels on processors that OpenBLAS does not recognise."""
+"""What must be settled before shared libraries are loaded: BLAS kernels, the MPI and compiler of wheels."""
 
 import _ctypes
 import ctypes
+import importlib.util
 import os
 import resource
+import shlex
+import sys
+from importlib import metadata
 from pathlib import Path
+
+from tireroad.runs.process.installation import compiler
 
 UNKNOWN = b"Prescott"  # OpenBLAS's fallback on x86-64: SSE3, two numbers at a time
 _FLAGS = (  # CPU flags required by each kernel, the widest first
     ("SkylakeX", {"avx512f", "avx512cd", "avx512bw", "avx512dq", "avx512vl", "fma"}),
     ("Haswell", {"avx2", "fma"}),
 )
+
+
+def prepare() -> None:
+    """Settle all of it. Changes OPENBLAS_CORETYPE and CC where they are needed and not set, and loads
+    the MPI library of the mpich wheel where dolfinx is a wheel. Not collective, does not start MPI."""
+    choose_kernels()
+    if importlib.util.find_spec("dolfinx_solver") is not None:
+        _load_mpi_of_wheel()
+    if compiler() is None and importlib.util.find_spec("ziglang") is not None:
+        os.environ["CC"] = f"{shlex.quote(sys.executable)} -m ziglang cc"
+
+
+def _load_mpi_of_wheel() -> None:
+    """dolfinx and PETSc of the wheel dolfinx-solver-real are linked to libmpi.so.12 without saying
+    where it is: they find the one that is loaded."""
+    try:
+        files = metadata.files("mpich") or []
+    except metadata.PackageNotFoundError:
+        return  # another MPI was chosen for them
+    for file in files:
+        if file.name == "libmpi.so.12":
+            ctypes.CDLL(str(file.locate()), mode=ctypes.RTLD_GLOBAL)
+            return
 
 
 def choose_kernels() -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from started import ROOT
 
-from tireroad.runs.process import kernels
+from tireroad.runs.process import libraries
 
 WIDE = "avx2 fma avx512f avx512cd avx512bw avx512dq avx512vl"
 ASK = "import os, tireroad, numpy; from threadpoolctl import threadpool_info; print([i.get('architecture') for i in threadpool_info()])"
@@ -30,29 +30,29 @@ start.program()
 def test_the_widest_that_the_processor_can(tmp_path: Path, flags: str, wanted: str) -> None:
     file = tmp_path / "cpuinfo"
     file.write_text(f"processor\t: 0\nflags\t\t: fpu {flags} sse3\n\nprocessor\t: 1\n")
-    assert kernels.able(file) == wanted
-    assert kernels.able(tmp_path / "none") == ""
+    assert libraries.able(file) == wanted
+    assert libraries.able(tmp_path / "none") == ""
 
 
 def test_only_where_openblas_knows_nothing_better(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kernels, "able", lambda processors: "Haswell")
+    monkeypatch.setattr(libraries, "able", lambda processors: "Haswell")
     for chosen, before, after in (
-        (kernels.UNKNOWN, None, "Haswell"),
+        (libraries.UNKNOWN, None, "Haswell"),
         (b"Zen", None, None),
         (b"", None, None),
-        (kernels.UNKNOWN, "Core2", "Core2"),
+        (libraries.UNKNOWN, "Core2", "Core2"),
     ):
-        monkeypatch.setattr(kernels, "_kernels", lambda chosen=chosen: chosen)
+        monkeypatch.setattr(libraries, "_kernels", lambda chosen=chosen: chosen)
         monkeypatch.delenv("OPENBLAS_CORETYPE", raising=False)
         if before:
             monkeypatch.setenv("OPENBLAS_CORETYPE", before)
-        kernels.choose_kernels()
+        libraries.choose_kernels()
         assert os.environ.get("OPENBLAS_CORETYPE") == after
 
 
 def test_numpy_gets_them() -> None:
     """OpenBLAS chooses anew when it is loaded again; this fails where it is merely left open."""
-    if not kernels.able(Path("/proc/cpuinfo")):
+    if not libraries.able(Path("/proc/cpuinfo")):
         pytest.skip("a processor without AVX2")
     environment = {k: v for k, v in os.environ.items() if k != "OPENBLAS_CORETYPE"}
     environment["PYTHONPATH"] = str(ROOT)
