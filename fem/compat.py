@@ -193,7 +193,8 @@ def _compile_without_headers() -> None:
     jit.importlib = types.SimpleNamespace(machinery=machinery, util=importlib.util)
 
 
-if not (Path(sysconfig.get_path("include")) / "Python.h").exists():
+HAS_HEADERS = (Path(sysconfig.get_path("include")) / "Python.h").exists()
+if not HAS_HEADERS:
     _compile_without_headers()
 
 

@@ -101,7 +101,9 @@ def _processes(command: argparse.ArgumentParser) -> None:
 
 
 def _file(info: argparse.ArgumentParser) -> None:
-    info.add_argument("file", type=Path, metavar="FILE")
+    info.add_argument(
+        "file", type=Path, nargs="?", metavar="FILE", help="none: the installation, with all versions"
+    )
     info.add_argument("--json", action="store_true", help="machine-readable output")
 
 
@@ -164,6 +166,10 @@ def _test(test: argparse.ArgumentParser) -> None:
     test.add_argument("arguments", nargs="*", metavar="PYTEST ARGUMENTS")
 
 
+def _script(python: argparse.ArgumentParser) -> None:
+    python.add_argument("script", nargs="*", metavar="SCRIPT …", help="as of python3")
+
+
 def _count(text: str) -> int:
     if not text.isdecimal() or not 1 <= int(text) <= 9999:
         raise argparse.ArgumentTypeError(f"{text}: must be a whole number, 1 to 9999")
@@ -201,7 +207,12 @@ COMMANDS = {
     "sweep": Command("run a family of scenes that share stages, in one table", _sweep),
     "compare": Command("compare two to twelve runs in one page and one table", _compare),
     "info": Command(
-        "list the contents of a result file: datasets, shapes, units, provenance", _file
+        "list the contents of a result file: datasets, shapes, units, provenance; without one the"
+        " versions and places of everything that is installed",
+        _file,
+    ),
+    "python": Command(
+        "run a script, or a prompt, with the python and the path of this program", _script
     ),
     "cache": Command(
         "list or clear the finished stages that runs share (TIREROAD_CACHE or the user's cache)",

@@ -144,9 +144,14 @@ def _export(args: argparse.Namespace) -> None:
 
 
 def _info(args: argparse.Namespace) -> None:
+    if args.file is None:
+        from tireroad.runs.process.packages import described
+
+        mpi.start_petsc([])
+        return print(described(args.json))
     from tireroad.runs.files.info import describe
 
-    print(describe(args.file, args.json))
+    return print(describe(args.file, args.json))
 
 
 def _bench(args: argparse.Namespace) -> None:

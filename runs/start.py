@@ -13,6 +13,8 @@ from tireroad.runs.process.statuses import DONE, INPUT, STOPPED, handed_over
 
 def program() -> None:
     """The command `tireroad`: takes the process's arguments and sets its exit status."""
+    if sys.argv[1:2] == ["python"] and sys.argv[2:] not in (["-h"], ["--help"]):
+        os.execv(sys.executable, [sys.executable, *sys.argv[2:]])  # the launcher does it by itself
     signal.pthread_sigmask(signal.SIG_BLOCK, signals.STOP_SIGNALS)
     streams.mend()
     _need_home()
