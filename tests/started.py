@@ -11,6 +11,7 @@ MPIRUN = {
     "OMPI_MCA_rmaps_base_oversubscribe": "1",
     "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
     "OMPI_MCA_orte_execute_quiet": "1",
+    "PMIX_MCA_mca_base_suppress_deprecated_warning": "1",
     "OMPI_MCA_btl": "self,vader",
     "OMPI_MCA_odls_base_sigkill_timeout": "0",
     "TIREROAD_CACHE": "off",

@@ -199,6 +199,10 @@ def _file(name: str, path: tuple[str, ...], source: Source) -> Any:
         candidates = [(folder / given).resolve() for folder in folders]
         file = next((one for one in candidates if one.is_file()), candidates[0])
         found, why = file.is_file(), ""
+        if not found:
+            file.stat()  # from Python 3.14 on is_file() does not raise for a name that is too long
+    except (FileNotFoundError, NotADirectoryError):
+        found, why = False, ""
     except (OSError, RuntimeError) as error:  # not a valid file name, or no such user
         cut = name if len(name) <= 60 else f"{name[:60]}…"
         found, file, why = False, Path(cut), f" ({getattr(error, 'strerror', error)})"
