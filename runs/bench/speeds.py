@@ -14,7 +14,7 @@ from tireroad.runs.process import observe
 
 ABOUT = "20 speeds over one static state and its modes, against 20 separate runs: processor time"
 ROOT = Path(__file__).resolve().parents[2]
-SCENES = ("quickstart", "passenger")
+SCENES = ("torus", "passenger")
 MEMBERS, ALONE = 20, 2
 LOWEST, STEP = 40.0, 1.0  # rad/s
 SHAPE = "static.steady_rolling=false"  # otherwise each speed has its own static state

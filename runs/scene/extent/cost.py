@@ -9,7 +9,7 @@ from tireroad.runs.scene.extent.static_state import (
 )
 from tireroad.runs.scene.tables.scene import Scene
 
-# Error bars, of the time of all else: 0.49 in quickstart.toml and 0.35 in passenger.toml
+# Error bars, of the time of all else: 0.49 in torus.toml and 0.35 in passenger.toml
 # (2026-11-24); the stage bounds its window to keep them below a half.
 _BARS = 0.42
 # The load's error by finer meshes, of the time of the static state: 1.8 of 9,828 and of 29,700
@@ -57,7 +57,7 @@ def operations(
 ) -> dict[str, float]:
     """Operations by stage, in seconds on one core of 2020.
 
-    Those of the quickstart (27,900 unknowns, 9 per column of nodes, 200 modes, 277 nodes), scaled
+    Those of torus.toml (27,900 unknowns, 9 per column of nodes, 200 modes, 277 nodes), scaled
     by the fastest-growing operations: each unknown is coupled to all those of the neighbouring
     columns. `dense`: the contact points have a full matrix.
     """

@@ -22,7 +22,7 @@ PROGRAM = 2.1e8
 """Bytes of one process with all libraries loaded and the mesh made (measured)."""
 MATRICES = 5
 """Sparse matrices held at peak: K, its scaled copy and parts, those of rotation (measured,
-including the rest: 0.6 to 0.83 GB for the quickstart, 1.1 to 1.4 GB for passenger.toml, 2.3 to 2.8
+including the rest: 0.6 to 0.83 GB for torus.toml, 1.1 to 1.4 GB for passenger.toml, 2.3 to 2.8
 GB for a passenger tire of 102,060 unknowns on one process, 1.6 to 1.8 GB on each of two)."""
 BASES = 3
 """Copies of all modes held at peak: slices, the sorted vectors, their products."""

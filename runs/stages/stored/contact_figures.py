@@ -12,7 +12,7 @@ from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.build.rolling.stepping import Integration
 
 # Fewest point spacings per footprint width. Measured on cobblestones on two tires: deviation 23 %
-# too large at 1.8, 2 % at 2.4 (quickstart.toml), 5 % too small at 2.5, 3 % at 3.6. Only on a mesh
+# too large at 1.8, 2 % at 2.4 (torus.toml), 5 % too small at 2.5, 3 % at 3.6. Only on a mesh
 # whose nodes are as far apart as the footprint is wide was it 35 % at 2.4: its error bars tell.
 FEW = 2.2
 # Share of the static deflection: motion of the contact up to which a linear tire is trusted.

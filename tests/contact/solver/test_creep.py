@@ -70,7 +70,7 @@ def test_standing_it_creeps_to_its_relaxed_modulus() -> None:
 def test_relaxation_as_creep() -> None:
     """One term by hand; of three E(s) J(s) = 1 at any s."""
     size, lag = creep_of([0.5], [1.0])
-    assert (size, lag) == pytest.approx(([1.0], [2.0]))
+    assert [*size, *lag] == pytest.approx([1.0, 2.0])
     share, time = np.array([0.2, 0.3, 0.1]), np.array([1e-3, 1e-2, 1.0])
     size, lag = creep_of(share, time)
     for s in (0.1, 3.0, 1e3):

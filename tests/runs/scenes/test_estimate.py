@@ -31,19 +31,19 @@ print(factor._factor.getMumpsIcntl(22), factor_files, right, Shifted(matrix, 0.1
 
 
 @pytest.fixture
-def quickstart(root: Path) -> Path:
-    return root / "runs" / "scenes" / "quickstart.toml"
+def torus(root: Path) -> Path:
+    return root / "runs" / "scenes" / "torus.toml"
 
 
-def test_quickstart_is_as_measured(quickstart: Path) -> None:
+def test_torus_is_as_measured(torus: Path) -> None:
     """Measured on one process: 1.17 GB, 603 points on 277 nodes, 2122 steps, modes to 513 Hz, and a
     contact.h5 of 7.3 MB, twice that with its checkpoint."""
-    wanted = estimate(load(quickstart))
+    wanted = estimate(load(torus))
     assert 1.17 / 1.5 < sum(wanted.memory.values()) / 1e9 < 1.17 * 1.5
     assert wanted.sizes.points == pytest.approx(603, rel=0.3)
     assert wanted.sizes.nodes == pytest.approx(277, rel=0.4)
     assert wanted.sizes.steps == pytest.approx(2122, rel=0.3)
-    assert highest_frequency(load(quickstart), 200) == pytest.approx(513, rel=0.3)
+    assert highest_frequency(load(torus), 200) == pytest.approx(513, rel=0.3)
     assert 14.6 / 2 < wanted.disk["contact.h5"] / 1e6 < 14.6 * 2
 
 
@@ -73,14 +73,14 @@ def test_the_estimate_of_the_load_is_in_it(
     assert taken / 1.25 < sum(wanted.memory.values()) / 1e9 < taken * 1.25
 
 
-def test_modes_below_a_frequency_count(quickstart: Path) -> None:
-    """A wall like the quickstart's with c10 = 1.2 MPa was measured to have 523 modes below 500 Hz."""
+def test_modes_below_a_frequency_count(torus: Path) -> None:
+    """A wall like the torus's with c10 = 1.2 MPa was measured to have 523 modes below 500 Hz."""
     soft = ["tire.material.model=yeoh", "tire.material.youngs_modulus=", "tire.material.c10=1.2e6"]
     soft += ["tire.material.poisson_ratio=", "modal.count=", "modal.up_to=500"]
-    scene = load(quickstart, [*soft, "tire.outer_radius=0.316", "tire.minor_radius=0.105"])
+    scene = load(torus, [*soft, "tire.outer_radius=0.316", "tire.minor_radius=0.105"])
     assert sizes(scene).modes == pytest.approx(523, rel=0.3)
     taken = [
-        sum(memory(load(quickstart, [f"modal.up_to={f}"])).values()) for f in (500, 1000, 2000)
+        sum(memory(load(torus, [f"modal.up_to={f}"])).values()) for f in (500, 1000, 2000)
     ]
     assert taken[0] < taken[1] - 1e8 < taken[2] - 3e8
 
@@ -98,19 +98,19 @@ def test_modes_below_a_frequency_count(quickstart: Path) -> None:
     ],
 )
 def test_what_cannot_succeed_is_refused_by_its_key(
-    quickstart, overrides, words, monkeypatch
+    torus, overrides, words, monkeypatch
 ) -> None:
     free = "tireroad.runs.scene.extent.demand.available_memory"
     monkeypatch.setattr(free, lambda: 64e9)  # whatever runs beside
     with pytest.raises(InputError) as caught:
-        explain(load(quickstart, overrides))
+        explain(load(torus, overrides))
     for word in words:
         assert word in str(caught.value)
 
 
-def test_check_tells_what_each_process_takes(quickstart: Path, monkeypatch) -> None:
+def test_check_tells_what_each_process_takes(torus: Path, monkeypatch) -> None:
     """Two have more than one together, and each less; factors that do not fit are on disk."""
-    scene, told = load(quickstart), []
+    scene, told = load(torus), []
     for count, free in ((1, 1e12), (2, 1e12), (2, 1.2e9)):
         monkeypatch.setattr(demand, "available_memory", lambda free=free: free)
         line = next(x for x in explain(scene, count).splitlines() if "estimated memory" in x)
@@ -120,15 +120,15 @@ def test_check_tells_what_each_process_takes(quickstart: Path, monkeypatch) -> N
 
 
 @pytest.mark.slow
-def test_run_refuses_what_check_refuses(quickstart: Path, launch, tmp_path: Path) -> None:
+def test_run_refuses_what_check_refuses(torus: Path, launch, tmp_path: Path) -> None:
     out = ("--out", tmp_path / "out", "--set", "modal.count=27000")
-    done = launch("-m", "runs", "run", quickstart, *out)
+    done = launch("-m", "runs", "run", torus, *out)
     assert done.returncode == 2 and "rotating pencil (modal.count" in done.stderr
     assert not list((tmp_path / "out").glob("*.h5"))
 
 
-def test_doubt_is_a_warning_and_certainty_an_error(quickstart, monkeypatch, tmp_path) -> None:
-    wanted = estimate(load(quickstart))
+def test_doubt_is_a_warning_and_certainty_an_error(torus, monkeypatch, tmp_path) -> None:
+    wanted = estimate(load(torus))
     needed = sum(wanted.memory.values())
     for share, outcome in ((0.5, "refused"), (1.0, "warned"), (2.0, "silent")):
         monkeypatch.setattr(demand, "available_memory", lambda share=share: share * needed)
@@ -144,10 +144,10 @@ def test_doubt_is_a_warning_and_certainty_an_error(quickstart, monkeypatch, tmp_
     assert together["program"] == 4 * wanted.memory["program"]
 
 
-def test_factors_go_to_disk_where_memory_is_short(quickstart, monkeypatch, tmp_path) -> None:
+def test_factors_go_to_disk_where_memory_is_short(torus, monkeypatch, tmp_path) -> None:
     """Twelve times the mesh: its factor, and with it the run, fits only so; said, and not refused."""
     larger = ["tire.segments=300", "tire.elements_arc=32", "modal.count=20"]
-    wanted = estimate(load(quickstart, larger), until="static")
+    wanted = estimate(load(torus, larger), until="static")
     needed, factor = sum(wanted.memory.values()), wanted.memory[demand.FACTOR]
     assert factor > needed / 4
     room = (needed - demand.ON_DISK * factor) / demand.DOUBTFUL * 1.01
@@ -168,20 +168,20 @@ def test_a_factor_on_disk_is_a_factor(tmp_path: Path, launch) -> None:
     assert done.stdout.split() == ["1", "True", "True", "0"]
 
 
-def test_the_disk_is_that_of_the_result_folder(quickstart, monkeypatch, tmp_path) -> None:
+def test_the_disk_is_that_of_the_result_folder(torus, monkeypatch, tmp_path) -> None:
     asked = []
     usage = shutil.disk_usage(tmp_path)
     monkeypatch.setattr(
         demand.shutil, "disk_usage", lambda p: (asked.append(p), usage._replace(free=1000))[1]
     )
     with pytest.raises(InputError, match=r"disk in .*not/yet"):
-        demand.check_demand(estimate(load(quickstart)), tmp_path / "not" / "yet")
+        demand.check_demand(estimate(load(torus)), tmp_path / "not" / "yet")
     assert asked == [tmp_path]
 
 
-def test_hours_are_said(quickstart: Path, monkeypatch, tmp_path: Path) -> None:
+def test_hours_are_said(torus: Path, monkeypatch, tmp_path: Path) -> None:
     usage = shutil.disk_usage(tmp_path)
     monkeypatch.setattr(demand.shutil, "disk_usage", lambda _: usage._replace(free=10**13))
-    wanted = estimate(load(quickstart, ["time.duration=100", "time.step=1e-5"]))
+    wanted = estimate(load(torus, ["time.duration=100", "time.step=1e-5"]))
     (warning,) = demand.check_demand(wanted, tmp_path)
     assert "3 hours of one core" in warning and "contact loop (time.duration" in warning

@@ -15,9 +15,9 @@ FINE = ["tire.segments=30", "tire.elements_arc=26", "modal.up_to=547.3"]
 # Processor time (s) by stage of one core of a shared server (Intel Xeon) beside other work, one BLAS thread, 2026-11-23,
 # without error bars.
 MEASURED = [
-    ("quickstart", SMALL, {"static": 1.4, "modes": 1.73, "contact loop": 1.48}),
-    ("quickstart", [], {"static": 6.2, "modes": 9.21, "greens": 2.57, "contact loop": 1.81}),
-    ("quickstart", LARGE, {"static": 105.0}),
+    ("torus", SMALL, {"static": 1.4, "modes": 1.73, "contact loop": 1.48}),
+    ("torus", [], {"static": 6.2, "modes": 9.21, "greens": 2.57, "contact loop": 1.81}),
+    ("torus", LARGE, {"static": 105.0}),
     ("passenger", [], {"static": 9.12, "modes": 12.7, "greens": 9.44, "contact loop": 8.84}),
     ("passenger", FINE, {"static": 39.3, "modes": 69.7}),
 ]
@@ -67,11 +67,11 @@ def test_horizontal_forces_cost_ten_times_the_normal_ones(
     root: Path, friction: list[str], each: float
 ) -> None:
     """Measured 7 to 10 and 4.4 ms a step (1,000 steps); told was 0.7 ms."""
-    found = told(root, "quickstart", ["time.step=1e-4", "time.duration=0.1", *friction])
+    found = told(root, "torus", ["time.step=1e-4", "time.duration=0.1", *friction])
     assert each / 1.6 < found.seconds["contact loop"] / 1000 < 1.6 * each
 
 
-@pytest.mark.parametrize(("scene", "share"), [("quickstart", 0.49), ("passenger", 0.35)])
+@pytest.mark.parametrize(("scene", "share"), [("torus", 0.49), ("passenger", 0.35)])
 def test_error_bars_count(root: Path, scene: str, share: float) -> None:
     """Their time over that of all other stages as measured, one BLAS thread, 2026-11-24."""
     seconds = told(root, scene, []).seconds
@@ -83,7 +83,7 @@ def test_error_bars_count(root: Path, scene: str, share: float) -> None:
 def test_the_error_of_the_load_counts(root: Path) -> None:
     """12 s beside 6.6 s of the state (2026-11-25), of which nothing was told."""
     bare, given = (
-        told(root, "quickstart", [f"static.error_estimate={one}"]) for one in ("false", "true")
+        told(root, "torus", [f"static.error_estimate={one}"]) for one in ("false", "true")
     )
     assert 12 / 1.6 < given.seconds[LOAD_ERROR] < 1.6 * 12
     assert given.seconds == bare.seconds | {LOAD_ERROR: given.seconds[LOAD_ERROR]}
@@ -100,7 +100,7 @@ def test_the_error_of_the_load_counts(root: Path) -> None:
     ],
 )
 def test_more_takes_longer(root: Path, settings: str, stages: tuple[str, ...]) -> None:
-    growing = [told(root, "quickstart", [settings.format(k)]) for k in (40, 80, 160, 320)]
+    growing = [told(root, "torus", [settings.format(k)]) for k in (40, 80, 160, 320)]
     for stage in stages:
         for kind in ("seconds", "work"):
             times = [getattr(one, kind)[stage] for one in growing]

@@ -210,7 +210,7 @@ def test_a_windows_file_is_read(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["quickstart", "point_force", "flat_rest", "measured_road", "corner"]
+    "name", ["quickstart", "torus", "point_force", "flat_rest", "measured_road", "corner"]
 )
 def test_shipped_scenes_are_valid(root: Path, name: str) -> None:
     scene = load(root / "runs" / "scenes" / f"{name}.toml")
