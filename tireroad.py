@@ -17,6 +17,7 @@ import_module("tireroad.runs.process.libraries").prepare()  # before anything lo
 # and reading results does not load the finite elements.
 _HOMES = {
     "torus": "tireroad.runs.library",
+    "radial": "tireroad.runs.library",
     "press": "tireroad.runs.library",
     "modes": "tireroad.runs.library",
     "roll": "tireroad.runs.library",
@@ -25,6 +26,7 @@ _HOMES = {
     "Material": "tireroad.fem.tire.material",
     "compound": "tireroad.fem.tire.material",
     "Turning": "tireroad.fem.turning",
+    "StrainEnergy": "tireroad.fem.turning",
     "load": "tireroad.runs.files.reader",
     "RunResults": "tireroad.runs.files.reader",
     "InputError": "tireroad.fem.errors",

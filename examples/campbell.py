@@ -1,4 +1,7 @@
-"""What the modes of a tire become as it turns faster: frequencies over speed, from one set of modes."""
+"""What the modes of a tire become as it turns faster: frequencies over speed, from one set of modes.
+
+Run it with `./tireroad python examples/campbell.py`.
+"""
 
 from __future__ import annotations
 

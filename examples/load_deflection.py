@@ -1,4 +1,7 @@
-"""Press a tire on the road: load over deflection, and the footprint."""
+"""Press a tire on the road: load over deflection, and the footprint.
+
+Run it with `./tireroad python examples/load_deflection.py`.
+"""
 
 from __future__ import annotations
 

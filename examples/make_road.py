@@ -1,6 +1,6 @@
 """Write a road of your own as a grid file: here a coarse asphalt, drawn from a texture spectrum.
 
-    python3 examples/make_road.py [road.npz]
+    ./tireroad python examples/make_road.py [road.npz]
 
 A grid file holds x (nx,), y (ny,) and heights z (nx, ny), all in m; scenes read it by
 `[road] kind = "grid", file = "road.npz"`. The spectrum falls with the square of the wave number, is cut

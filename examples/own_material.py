@@ -1,4 +1,7 @@
-"""A material of your own: a class with its parameters, its strain energy, and its moduli at zero strain."""
+"""A material of your own: a class with its parameters, its strain energy, and its moduli at zero strain.
+
+Run it with `./tireroad python examples/own_material.py`.
+"""
 
 from __future__ import annotations
 

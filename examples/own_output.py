@@ -1,6 +1,6 @@
 """An output of one's own in a scene: how long the footprint is from step to step.
 
-Run it with `PYTHONPATH=<checkout> python3 examples/own_output.py`. A class with a decorator is all it takes: its
+Run it with `./tireroad python examples/own_output.py`. A class with a decorator is all it takes: its
 parameters become the table `[output.footprint_length]`, checked like any other, and its curves stand in response.h5.
 """
 

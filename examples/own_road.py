@@ -1,6 +1,6 @@
 """A road and a tread law of one's own, in a scene.
 
-Run it with `PYTHONPATH=<checkout> python3 examples/own_road.py`. A class with a decorator is all it
+Run it with `./tireroad python examples/own_road.py`. A class with a decorator is all it
 takes: its parameters become keys of `[road]` and `[contact]` with unit, range and meaning, checked like
 any other. Scenes hold no code, so the classes are made known by the script that loads the scene.
 """

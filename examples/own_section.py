@@ -1,6 +1,6 @@
 """A section of one's own in a scene: an ellipse, wider than it is high.
 
-Run it with `PYTHONPATH=<checkout> python3 examples/own_section.py`. A class with a decorator is all it
+Run it with `./tireroad python examples/own_section.py`. A class with a decorator is all it
 takes: its parameters become keys of `[tire]` with unit, range and meaning, checked like any other.
 """
 

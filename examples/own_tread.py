@@ -2,6 +2,8 @@
 
 A law is a dataclass with the influence of a force on one point upon another; the contact solver needs no
 more. Registered by a decorator it is also known by name.
+
+Run it with `./tireroad python examples/own_tread.py`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Read a result folder: arrays with units, figures, spectra.
 
-Run it with `PYTHONPATH=<checkout> python3 examples/read_results.py results/quickstart`.
+Run it with `./tireroad python examples/read_results.py results/quickstart`.
 """
 
 from __future__ import annotations

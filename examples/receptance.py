@@ -1,4 +1,7 @@
-"""The receptance of the tread: displacement of the crown per newton, standing and rolling."""
+"""The receptance of the tread: displacement of the crown per newton, standing and rolling.
+
+Run it with `./tireroad python examples/receptance.py`.
+"""
 
 from __future__ import annotations
 

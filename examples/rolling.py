@@ -1,4 +1,7 @@
-"""Roll over a wavy road: contact force, axle force, third octaves."""
+"""Roll over a wavy road: contact force, axle force, third octaves.
+
+Run it with `./tireroad python examples/rolling.py`.
+"""
 
 from __future__ import annotations
 

@@ -102,7 +102,11 @@ def _processes(command: argparse.ArgumentParser) -> None:
 
 def _file(info: argparse.ArgumentParser) -> None:
     info.add_argument(
-        "file", type=Path, nargs="?", metavar="FILE", help="none: the installation, with all versions"
+        "file",
+        type=Path,
+        nargs="?",
+        metavar="FILE",
+        help="none: the installation, with all versions",
     )
     info.add_argument("--json", action="store_true", help="machine-readable output")
 

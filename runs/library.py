@@ -39,8 +39,10 @@ from tireroad.greens.small_motions import wheel_of
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes, rolling_modes
 from tireroad.modal.standing import standing_modes
+from tireroad.runs.scene.sections.kinds.radial import RadialSection, built
 from tireroad.runs.scene.sections.kinds.torus import TorusSection
-from tireroad.runs.scene.tables.tire import Tire
+from tireroad.runs.scene.tables.tire import NEAR_ROAD, Tire
+from tireroad.runs.stages.build.tire import make_tire
 from tireroad.runs.stages.build.turning import rolling_shape
 from tireroad.runs.typed import typed
 
@@ -91,6 +93,32 @@ def torus(
         "neo-hookean", density, youngs_modulus=youngs_modulus, poisson_ratio=poisson_ratio
     )
     return TireModel(section, lambda: Body(comm, section, {"wall": rubber}))
+
+
+def radial(
+    size: str = "205/60 R15",
+    *,
+    segments: int = 40,
+    elements_arc: int = 26,
+    footprint_size: float = NEAR_ROAD,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+) -> TireModel:
+    """The built-in radial passenger tire of a size, without loads (docs/radial-tire.md).
+
+    `segments` elements around and `elements_arc` from bead to bead, quadratic; those near the road
+    are `footprint_size` of the others. Its rubbers have loss factors: with damping =
+    tireroad.StrainEnergy() the rotating tire loses by them. Raises InputError for a size that is
+    none, or a value out of the range that it has in a scene.
+    """
+    shape = RadialSection(size=size, elements_arc=elements_arc)
+    tire = Tire(
+        section="radial", shape=shape, segments=segments, order=2, footprint_size=footprint_size
+    )
+    try:
+        built(size)
+    except InputError as problem:
+        raise InputError(f"radial: {str(problem).removeprefix('tire.')}") from None
+    return make_tire(comm, tire)
 
 
 def _check_ranges(torus: Torus) -> None:

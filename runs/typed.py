@@ -14,7 +14,7 @@ T = TypeVar("T")
 
 # What makes each kind of argument, by the name of its class.
 _MADE_BY = {
-    "TireModel": "tireroad.torus(…)",
+    "TireModel": "tireroad.torus(…) or tireroad.radial(…)",
     "StaticState": "tireroad.press(…)",
     "Standing": "tireroad.modes(…)",
     "RollingTire": "tireroad.roll(…)",

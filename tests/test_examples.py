@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from started import environment
 
 from tireroad.fem.tire.law import MATERIALS
 from tireroad.runs.scene.outputs import OUTPUTS
@@ -155,3 +157,22 @@ def test_own_road_and_tread(capsys: pytest.CaptureFixture[str]) -> None:
     finally:
         ROADS.forget("humps")
         TREADS.forget("brush-blocks")
+
+
+@pytest.mark.parametrize("file", sorted(EXAMPLES.glob("*.py")), ids=lambda file: file.stem)
+def test_an_example_says_how_it_is_run(file: Path) -> None:
+    text = file.read_text()
+    assert '__name__ == "__main__"' not in text or f"./tireroad python examples/{file.name}" in text
+
+
+def test_an_example_runs_as_it_says(tmp_path: Path) -> None:
+    """With the launcher's python, from any folder, the neighbour of a script found beside it."""
+    done = subprocess.run(
+        [EXAMPLES.parent / "tireroad", "python", EXAMPLES / "load_deflection.py"],
+        cwd=tmp_path,
+        env=environment(),
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("footprint") == 3

@@ -185,10 +185,47 @@ def test_the_example_is_the_same_on_both_pages() -> None:
 
 
 @pytest.mark.long
-def test_the_example_shows_levels_of_what_the_road_does(capfd) -> None:
-    """Of the road's passing frequency, 80 Hz, which lies in a band of its own."""
+def test_the_example_says_what_each_figure_is(capfd) -> None:
+    """A load near that of the static state, and levels of the axle with the tire's vertical mode on top."""
     exec(_example("README.md"), {})
     printed = capfd.readouterr().out
-    assert printed.startswith("500 N, deviation ")
-    levels = {int(hz): float(db) for hz, db in re.findall(r"(\d+) Hz: (-?[\d.]+) dB", printed)}
-    assert len(levels) >= 2 and max(levels, key=levels.__getitem__) == 79
+    mean, deviation = map(
+        float, re.match(r"road on tire: mean (\d+) N, deviation (\d+) N", printed).groups()
+    )
+    assert 3900 < mean < 4200 and 20 < deviation < 400
+    found = re.findall(r"tire on axle, vertical: (\d+) Hz (-?[\d.]+) dB re 1 N", printed)
+    levels = {int(hz): float(db) for hz, db in found}
+    assert len(levels) >= 3 and max(levels, key=levels.__getitem__) == 79
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"size": "205"}, 'radial: size = "205": must be like'),
+        ({"segments": 3}, "segments must be"),
+        ({"elements_arc": 1}, "elements_arc must be"),
+    ],
+)
+def test_a_radial_tire_has_the_ranges_of_a_scene(given: dict, message: str) -> None:
+    with pytest.raises(tr.InputError, match=message):
+        tr.radial(**given)
+
+
+def test_the_radial_tire_is_that_of_a_scene(tmp_path: Path) -> None:
+    """The same mesh and mass as of `section = "radial"`."""
+    from mpi4py import MPI
+
+    from tireroad.runs.scene.load import load
+    from tireroad.runs.stages.build.tire import make_tire
+
+    scene = tmp_path / "scene.toml"
+    scene.write_text(
+        '[tire]\nsection = "radial"\nsegments = 16\nelements_arc = 8\n[static]\nload = 1\n'
+    )
+    ours, theirs = (
+        tr.radial(segments=16, elements_arc=8),
+        make_tire(MPI.COMM_WORLD, load(scene).tire),
+    )
+    assert ours.lattice.size == theirs.lattice.size
+    at = [tire.lattice.points(tire.lattice.face) for tire in (ours, theirs)]
+    assert np.allclose(*at, rtol=0, atol=1e-12)

@@ -79,9 +79,7 @@ def test_modes_below_a_frequency_count(torus: Path) -> None:
     soft += ["tire.material.poisson_ratio=", "modal.count=", "modal.up_to=500"]
     scene = load(torus, [*soft, "tire.outer_radius=0.316", "tire.minor_radius=0.105"])
     assert sizes(scene).modes == pytest.approx(523, rel=0.3)
-    taken = [
-        sum(memory(load(torus, [f"modal.up_to={f}"])).values()) for f in (500, 1000, 2000)
-    ]
+    taken = [sum(memory(load(torus, [f"modal.up_to={f}"])).values()) for f in (500, 1000, 2000)]
     assert taken[0] < taken[1] - 1e8 < taken[2] - 3e8
 
 
@@ -97,9 +95,7 @@ def test_modes_below_a_frequency_count(torus: Path) -> None:
         (["contact.points={dx=1e-5,dy=1e-5}"], ["contact.points"]),
     ],
 )
-def test_what_cannot_succeed_is_refused_by_its_key(
-    torus, overrides, words, monkeypatch
-) -> None:
+def test_what_cannot_succeed_is_refused_by_its_key(torus, overrides, words, monkeypatch) -> None:
     free = "tireroad.runs.scene.extent.demand.available_memory"
     monkeypatch.setattr(free, lambda: 64e9)  # whatever runs beside
     with pytest.raises(InputError) as caught:
