@@ -62,9 +62,7 @@ def _run(run: argparse.ArgumentParser) -> None:
     run.add_argument(
         "--out", type=_folder, metavar="DIR", help="result folder; results/<scene name> by default"
     )
-    run.add_argument(
-        "--until", choices=STAGES, metavar="STAGE", help=f"last stage: {', '.join(STAGES)}"
-    )
+    _until(run)
     run.add_argument("--fresh", action="store_true", help="compute every stage anew")
 
 
@@ -78,8 +76,15 @@ def _scene(command: argparse.ArgumentParser) -> None:
     command.add_argument("--set", action="append", default=[], metavar="a.b=value", help=SET_HELP)
 
 
+def _until(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--until", choices=STAGES, metavar="STAGE", help=f"last stage: {', '.join(STAGES)}"
+    )
+
+
 def _check(command: argparse.ArgumentParser) -> None:
     _scene(command)
+    _until(command)
     command.add_argument(
         "-n",
         type=_count,

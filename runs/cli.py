@@ -123,8 +123,8 @@ def _check(args: argparse.Namespace) -> None:
     from tireroad.runs.scene.check import explain
     from tireroad.runs.scene.load import load
 
-    scene = load(args.scene, args.set, lambda remark: print(f"note: {remark}"))
-    print(explain(scene, args.processes))
+    scene = load(args.scene, args.set, lambda remark: print(f"note: {remark}"), args.until)
+    print(explain(scene, args.processes, args.until))
     print(write_section(scene, Path("results") / scene.name))
 
 

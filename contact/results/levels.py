@@ -73,6 +73,18 @@ def too_narrow(spacing: float, up_to: float, lowest: float = 20.0) -> np.ndarray
     return centre[(high - low <= FEWEST * spacing) & (centre > 0.95 * lowest)]
 
 
+def lowest_wanted(up_to: float, lowest: float = 63.0) -> float:
+    """Exact centre, Hz, of the lowest band that a record should resolve: `lowest`, or the highest one
+    below `up_to` Hz where that is lower; 0 if there is none."""
+    centre, _, _ = _bands(up_to, 0.0)
+    return float(centre[centre < 1.05 * lowest].max(initial=0.0))
+
+
+def least_duration(centre: float) -> float:
+    """Duration, s, of a record with so many lines across the band of `centre` Hz that it has a level."""
+    return FEWEST / (centre * (10**0.05 - 10**-0.05))
+
+
 def lines(centre: np.ndarray, spacing: float) -> np.ndarray:
     """Number of lines, `spacing` Hz apart, across each band (b,)."""
     return centre * (10**0.05 - 10**-0.05) / spacing

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from functools import partial
+from io import BytesIO
 from pathlib import Path
 
 import h5py
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.contact.results.levels import nominal
+from tireroad.contact.results.spectra import SILENT
 from tireroad.fem.errors import InputError
 from tireroad.runs.files import xdmf
 from tireroad.runs.files.disk import replacing
@@ -74,10 +76,11 @@ def _read(path: Path, reader: Callable[[h5py.File], dict]) -> dict:
 
 
 def write_csv(path: Path, columns: Columns) -> None:
-    """One row of headings, then the numbers to 10 digits, separated by commas."""
-    header = ",".join(f'"{heading}"' for heading in columns)
-    values = np.column_stack(list(columns.values()))
-    np.savetxt(path, values, fmt="%.10g", delimiter=",", header=header, comments="")
+    """One row of headings, then the numbers to 10 digits, separated by commas; empty where NaN."""
+    values, rows = np.column_stack(list(columns.values())), BytesIO()
+    np.savetxt(rows, values, fmt="%.10g", delimiter=",")
+    header = ",".join(f'"{heading}"' for heading in columns) + "\n"
+    path.write_bytes(header.encode() + rows.getvalue().replace(b"nan", b""))
 
 
 def _table(name: str, columns: Columns) -> dict[str, Callable[[Path], object]]:
@@ -165,7 +168,11 @@ def _spread(group: h5py.Group, over: h5py.Dataset) -> Columns:
         label, values = NAMES.get(name, name.replace("_", " ")), held[()].reshape(-1, points, 3)
         for point in range(points):
             place = f" {point + 1}" if held.ndim > 2 else ""
-            columns |= _components(label + place, values[:, point], held.attrs["unit"])
+            unit = held.attrs["unit"]
+            column = values[:, point]
+            if unit.startswith("dB"):  # of what does not vary: no level, an empty cell
+                column = np.where(column > SILENT, column, np.nan)
+            columns |= _components(label + place, column, unit)
     return columns
 
 

@@ -46,7 +46,8 @@ RANGE_DB = 100.0  # dB: lines further below the highest one of a spectrum are no
 LEAST_RANGE_DB = 20.0  # dB: on a smaller range, tiny differences between bars look large
 
 
-LEAST_BANDS = 8  # least number of bands that get space
+LEAST_BANDS = 5  # least number of bands that get space
+FEWEST_BANDS = 3  # of a chart: fewer are said in numbers
 
 
 def canvas(width: float, height: float, rows: int = 1, columns: int = 1, **more: Any) -> tuple:

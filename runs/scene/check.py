@@ -6,7 +6,7 @@ from typing import Any
 from tireroad.runs.process.surroundings import crowded
 from tireroad.runs.scene.extent.demand import check_demand, duration, memory_of, out_of_core
 from tireroad.runs.scene.extent.estimate import estimate
-from tireroad.runs.scene.plan import STAGES, skipped
+from tireroad.runs.scene.plan import STAGES, meets_road, skipped
 from tireroad.runs.scene.resolved import literal
 from tireroad.runs.scene.rules.road import check_road, remarks
 from tireroad.runs.scene.schema import key_of, table_of
@@ -49,43 +49,47 @@ def _aligned(rows: list[Row], widths: list[int]) -> list[str]:
     ]
 
 
-def explain(scene: Scene, processes: int = 1) -> str:
-    """What `check` prints for so many processes. Raises InputError for an unusable road."""
-    check_road(scene)
+def explain(scene: Scene, processes: int = 1, until: str | None = None) -> str:
+    """What `check` prints for so many processes, and a run that ends with stage `until`.
+
+    Raises InputError for an unusable road, if the run meets it."""
+    on_road = meets_road(until)
+    if on_road:
+        check_road(scene)
     groups = _rows(scene, "", "scene")
     everything = [HEAD, *(row for _, rows in groups for row in rows)]
     widths = [min(max(len(row[column]) for row in everything), 44) for column in range(len(HEAD))]
     lines = _aligned([HEAD], widths)
     for title, rows in groups:
         lines += ["", title, *_aligned(rows, widths)]
-    reasons = skipped(scene)
+    reasons = skipped(scene, until)
     lines += ["", "stages"]
     for stage in STAGES:
         lines.append(
             f"  {stage:10}" + (f"skipped: {reasons[stage]}" if stage in reasons else "runs")
         )
-    described = [*scene.tire.shape.described(scene.tire), *remarks(scene)]
+    described = [*scene.tire.shape.described(scene.tire), *(remarks(scene) if on_road else [])]
     lines += ["", *described] if described else []
     if scene.accuracy.searches:
         lines += ["", *bounds(scene)]
         scene = applied(scene, Ladders.of(scene).first())
-    return "\n".join([*lines, *_demand(scene, processes)])
+    return "\n".join([*lines, *_demand(scene, processes, until)])
 
 
-def _demand(scene: Scene, processes: int) -> list[str]:
+def _demand(scene: Scene, processes: int, until: str | None) -> list[str]:
     """Memory, disk and time, with warnings where the machine falls short.
 
     Raises InputError if it has far too little.
     """
-    wanted = estimate(scene)
+    wanted = estimate(scene, until)
     on_disk = out_of_core(wanted, processes)
     size, parts = wanted.sizes, memory_of(wanted, processes, on_disk)
     counts = [f"{size.free} unknowns not held by the rim"]
     if scene.modal is not None:
         counts.append(f"{size.modes} modes")
-    if scene.in_contact:
+    if scene.in_contact and meets_road(until):
         counts.append(f"about {size.points} contact points")
-    if scene.time is not None:
+    if scene.time is not None and meets_road(until):
         about = "about " if scene.time.step == "auto" else ""
         counts.append(f"{about}{size.steps} time steps")
     if size.frequencies:

@@ -17,6 +17,7 @@ from tireroad.fem.keys import Key, described
 from tireroad.fem.parameters import ParameterError
 from tireroad.runs.scene import derived
 from tireroad.runs.scene.chosen import drop_unused
+from tireroad.runs.scene.plan import meets_road
 from tireroad.runs.scene.raw import override, read_text
 from tireroad.runs.scene.rules import scene as rules
 from tireroad.runs.scene.schema import Table, fields_of, gathered, key_of, table_of, variant_of
@@ -49,7 +50,8 @@ def load(
     except RecursionError:
         raise InputError(f"{path}: not a scene: tables nested too deep") from None
     changed = frozenset(override(raw, item) for item in overrides)
-    source = Source(path, text, changed)
+    unread = frozenset() if meets_road(until) else frozenset({("road", "file")})
+    source = Source(path, text, changed, unread=unread)
     raw.setdefault("name", re.sub(r"[^A-Za-z0-9._-]", "-", path.stem).lstrip(".-") or "scene")
     drop_unused(Scene, raw, changed, say)
     derived.by_section(raw)
@@ -206,7 +208,7 @@ def _file(name: str, path: tuple[str, ...], source: Source) -> Any:
     except (OSError, RuntimeError) as error:  # not a valid file name, or no such user
         cut = name if len(name) <= 60 else f"{name[:60]}…"
         found, file, why = False, Path(cut), f" ({getattr(error, 'strerror', error)})"
-    if not found:
+    if not found and path not in source.unread:
         source.add(path, f"names no file: {file}{why}")
         return _WRONG
     return str(file)

@@ -52,6 +52,14 @@ def skipped(scene: Scene, until: str | None = None) -> dict[str, str]:
     return reasons
 
 
+def meets_road(until: str | None) -> bool:
+    """Whether a stage that reads the road's heights is within a run that ends with stage `until`.
+
+    The contact points, which are chosen with the Green's functions, reach as high as the road.
+    """
+    return until is None or STAGES.index(until) >= STAGES.index("greens")
+
+
 def _no_contact(scene: Scene) -> str:
     """Why the contact is not followed in time."""
     if scene.contact is None:

@@ -11,12 +11,15 @@ Path_ = tuple[str, ...]
 
 @dataclass(frozen=True)
 class Source:
-    """The file, its text and the paths set by --set; `problems`: (path of the key, message)."""
+    """The file, its text and the paths set by --set; `problems`: (path of the key, message).
+
+    `unread`: the keys of files that the run will not read."""
 
     path: Path
     text: str
     overridden: frozenset[Path_] = frozenset()
     problems: list[tuple[Path_, str]] = field(default_factory=list)
+    unread: frozenset[Path_] = frozenset()
 
     def where(self, path: Path_) -> str:
         """The file and line of a key, or the --set that gave it."""

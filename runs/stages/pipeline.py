@@ -26,7 +26,7 @@ from tireroad.runs.process.mpi import on_root
 from tireroad.runs.scene.derived import with_modal
 from tireroad.runs.scene.extent.demand import check_demand, duration, memory_of, out_of_core
 from tireroad.runs.scene.extent.estimate import Estimate, estimate
-from tireroad.runs.scene.plan import skipped
+from tireroad.runs.scene.plan import meets_road, skipped
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.rules.road import check_road
 from tireroad.runs.scene.tables.scene import Scene
@@ -102,7 +102,7 @@ def run_scene(
     job = Job(scene, directory, comm, fresh, cache)
     on_root(comm, lambda: make_folder(directory))
     summary = on_root(comm, lambda: Summary(directory, scene.name, comm.size, dumps(scene)))
-    if scene.road is not None:
+    if scene.road is not None and meets_road(until):
         # Report an unusable road file before hours of solving, not after.
         share(scene.road.surface, comm)
         on_root(comm, lambda: check_road(scene))

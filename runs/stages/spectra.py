@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
 
+from tireroad.contact.results.levels import least_duration, lowest_wanted, nominal
 from tireroad.contact.results.limits import Limit, lowest
 from tireroad.contact.results.spectra import amplitudes
 from tireroad.contact.setup import ContactSetup
@@ -90,6 +92,7 @@ class SpectraStage(Computed[Spectra]):
         below = frequency <= limit.frequency
         found = levels.levels_of(history, start, limit.frequency)
         levels.describe(record, found, history, start, limit.frequency)
+        _warn_of_short_record(record, found["third_octave/centre"], limit.frequency, start * step)
         axle = {}
         if history.axle_force is not None:
             force = history.axle_force[start:]
@@ -171,6 +174,21 @@ class SpectraStage(Computed[Spectra]):
         return Spectra(
             left_out=left_out, limit=limit, levels=levels.read(file), wheel=wheel, **kept
         )
+
+
+def _warn_of_short_record(
+    record: Record, centre: np.ndarray, up_to: float, left_out: float
+) -> None:
+    """Say from which duration on a run that is too short has its low third octaves (b,) Hz."""
+    wanted = lowest_wanted(up_to)
+    if not wanted or centre.min(initial=np.inf) < 1.05 * wanted:
+        return
+    needed = left_out + 1.01 * least_duration(wanted)
+    has = f"none below {nominal(centre.min()):g} Hz" if len(centre) else "none"
+    record.warnings.append(
+        f"the run is too short for third octaves from {nominal(np.array(wanted)):g} Hz on, and has {has}: "
+        f"take time.duration = {math.ceil(100 * needed) / 100:g} s"
+    )
 
 
 def _largest(record: Record, frequency: np.ndarray, axle: np.ndarray) -> None:

@@ -31,7 +31,7 @@ def spectra(results: Results) -> Section:
     spacing = quantity(float(frequency[1] - frequency[0]), "Hz")
     section.facts.append(("spacing of lines", spacing))
     for name, key, unit in (
-        ("the model answers up to", "limit", "Hz"),
+        ("valid up to", "limit", "Hz"),
         ("which is", "limit_cause", ""),
         ("the axle force is the", "axle_force_is", ""),
         ("left out as run-in", "left_out", "s"),
@@ -72,10 +72,10 @@ def octaves(results: Results, section: Section, of: str) -> None:
     narrow = results.optional(_FILE, "third_octave/too_narrow")
     if narrow is not None and len(narrow):
         first, last = nominal(narrow[[0, -1]])
-        bands = f"The bands from {first:g} to {last:g} Hz hold"
-        bands = f"The band of {first:g} Hz holds" if first == last else bands
+        bands = f"The bands from {first:g} to {last:g} Hz contain"
+        bands = f"The band of {first:g} Hz contains" if first == last else bands
         section.notes.append(
-            f"{bands} fewer than three lines and no level: a longer run (time.duration) has closer lines."
+            f"{bands} fewer than three spectral lines, so they have no level: lengthen time.duration."
         )
     if centre is None or level is None or not len(centre):
         section.notes.append("No third-octave bands in spectra.h5.")
@@ -103,6 +103,9 @@ def _show_bands(
     few: NDArray,
 ) -> None:
     """Add levels (b, 3) dB over band centres (b,) Hz, with their errors (b, 3) dB."""
+    if len(centre) < figures.FEWEST_BANDS:
+        section.facts += _in_numbers(centre, level, error, of, reference)
+        return
     label = f"{of}, rms, in {reference}"
     heard = np.where(level > SILENT, level, np.nan)
     series = {
@@ -122,6 +125,21 @@ def _show_bands(
     section.show(picture, _caption(of, error, few), drawn)
 
 
+def _in_numbers(
+    centre: NDArray, level: NDArray, error: NDArray | None, of: str, reference: str
+) -> list[tuple[str, str]]:
+    """Facts of bands too few for a chart: their vertical levels, and errors where they are known."""
+    found = []
+    for band, (name, value) in enumerate(zip(nominal(centre), level[:, 2], strict=True)):
+        if value > SILENT:
+            known = error is not None and np.isfinite(error[band, 2])
+            about = f" ± {error[band, 2]:.1f}" if known else ""
+            found.append(
+                (f"{of}, vertical, third octave {name:g} Hz", f"{value:.1f}{about} {reference}")
+            )
+    return found
+
+
 def few_lines(results: Results, count: int) -> NDArray:
     """Mask (b,) of bands with too few lines for a reliable level."""
     held = results.optional(_FILE, "third_octave/lines")
@@ -135,7 +153,7 @@ def _caption(of: str, error: NDArray | None, few: NDArray) -> str:
     elif error is not None:
         caption += " The companions of this run were too short to tell the error of a band."
     if few.any():
-        caption += f" Pale: fewer than {FEW} lines in the band, a level of chance."
+        caption += f" Pale: fewer than {FEW} lines in the band, so its level may be off by more than 3 dB by chance."
     return caption
 
 

@@ -1,6 +1,6 @@
 """Estimates of a scene's memory, disk and time before anything is computed."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from tireroad.runs.scene.extent.cost import operations, seconds
 from tireroad.runs.scene.extent.files import disk
@@ -15,7 +15,7 @@ from tireroad.runs.scene.extent.static_state import (
     beside_tangents,
     turning,
 )
-from tireroad.runs.scene.plan import skipped
+from tireroad.runs.scene.plan import meets_road, skipped
 from tireroad.runs.scene.tables.scene import Scene
 
 PROGRAM = 2.1e8
@@ -92,7 +92,8 @@ class Estimate:
 
 def estimate(scene: Scene, until: str | None = None) -> Estimate:
     """Demand of the stages up to `until`; memory within 1.5 where measured, the rest rougher."""
-    size, left_out = sizes(scene), skipped(scene, until)
+    left_out = skipped(scene, until)
+    size = sizes(scene if meets_road(until) else replace(scene, contact=None))
     column = unknowns_through(scene.tire.proportions().through, scene.tire.order)
     dense = "contact" not in left_out and bool(_matrices_of_points(scene, size))
     work = operations(scene, size, left_out, column, dense)

@@ -194,3 +194,15 @@ def test_bands_have_the_names_of_the_standard(results: Path) -> None:
     assert {31.5, 315.0, 1000.0} <= set(bands["band [Hz]"])
     exact = bands["exact centre of the band [Hz]"]
     assert exact[bands["band [Hz]"] == 315.0] == pytest.approx([316.227766])
+
+
+def test_a_force_that_does_not_vary_has_an_empty_level(tmp_path: Path) -> None:
+    """It was -3076.5 dB."""
+    directory = write_results(tmp_path / "run")
+    with sealed(directory / "spectra.h5", "a") as file:
+        file["third_octave/level"][:, 0] = -3076.5
+    export(directory)
+    rows = (directory / "export" / "third_octave.csv").read_text().splitlines()
+    column = rows[0].replace('"', "").split(",").index("axle force level x [dB re 1 N]")
+    assert {row.split(",")[column] for row in rows[1:]} == {""}
+    assert "-3076" not in "".join(rows)

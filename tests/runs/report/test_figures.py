@@ -115,7 +115,7 @@ def test_bands_have_their_bars_at_their_names(count: int) -> None:
         assert tops == pytest.approx(level[:, column]) and floor < min(tops)
         assert [bar.get_alpha() for bar in patches] == [0.45] + [None] * (count - 1)
     low, high = axes.get_xlim()
-    assert low < -0.5 and high >= max(count, 8) - 0.5
+    assert low < -0.5 and high >= max(count, figures.LEAST_BANDS) - 0.5
 
 
 @pytest.mark.parametrize("levels", [[20.36], [20.1, 20.4, 23.0], [-3.0, -12.0]])

@@ -15,6 +15,7 @@ import pytest
 from synthetic_results import sealed, write_results, write_rotating
 from written_page import page
 
+from tireroad.contact.results.levels import nominal
 from tireroad.fem.errors import InputError
 from tireroad.runs.report import figures, surface_figures
 from tireroad.runs.report.page import write_report
@@ -217,3 +218,18 @@ def test_stages_come_in_the_order_they_ran(results: Path) -> None:
     text = page(results)
     order = [text.index(f"<tr><td>{name}</td><td>") for name in ("static", "modes", "contact")]
     assert order == sorted(order)
+
+
+def test_few_bands_are_numbers_and_no_chart(results: Path) -> None:
+    """One bar in a chart of blank axes tells less than its number."""
+    with sealed(results / "spectra.h5", "a") as file:
+        group = file["third_octave"]
+        for name in list(group):
+            values = group[name][()]
+            unit = group[name].attrs["unit"]
+            del group[name]
+            group.create_dataset(name, data=values[:2]).attrs["unit"] = unit
+        first, level = nominal(group["centre"][:1])[0], group["level"][0, 2]
+    text = page(results)
+    assert f"third octave {first:g} Hz" in text and f"{level:.1f}" in text
+    assert "Third-octave bands of the axle force" not in text

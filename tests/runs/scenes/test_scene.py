@@ -223,3 +223,20 @@ def test_measured_road_scene_takes_a_road(root: Path, roads: Path) -> None:
         root / "runs" / "scenes" / "measured_road.toml", ["road.kind=crg", f"road.file={road}"]
     )
     assert scene.road.file == str(road.resolve()) and scene.contact is not None
+
+
+def test_a_road_that_the_run_does_not_meet_may_be_missing_or_short(
+    tmp_path: Path, launch, root: Path
+) -> None:
+    """Up to the states of the rotating tire no stage reads the road's heights."""
+    scene, road = tmp_path / "scene.toml", root / "runs" / "scenes" / "measured_road.npz"
+    text = (
+        "[static]\nload = 300\n[rotation]\nspeed = 50\n[contact]\n[time]\nduration = 20\n"
+        '[road]\nkind = "grid"\nfile = "{}"\n'
+    )
+    for file, why in (("none.npz", "names no file"), (str(road), "the run needs the road")):
+        scene.write_text(text.format(file))
+        for until, stops in (("rotating", False), ("contact", True)):
+            done = launch("-m", "runs", "check", scene, "--until", until, cwd=root)
+            assert done.returncode == 2 * stops, done.stderr
+            assert (why in done.stderr) == stops

@@ -9,8 +9,9 @@ import h5py
 import numpy as np
 import pytest
 
-from tireroad.contact.results.spectra import SILENT
+from tireroad.contact.results.spectra import SILENT, third_octaves
 from tireroad.runs.stages.base.record import Record
+from tireroad.runs.stages.spectra import _warn_of_short_record
 from tireroad.runs.stages.stored import levels
 from tireroad.runs.stages.stored.contact_file import ContactHistory
 
@@ -138,3 +139,26 @@ def test_an_impact_warns_that_its_level_depends_on_when(
     levels.describe(record, levels.levels_of(hit, 0, 400.0), hit, 0, 400.0)
     assert len(record.warnings) == 1
     assert words in record.warnings[0] and "road.position" in record.warnings[0]
+
+
+@pytest.mark.parametrize(
+    ("duration", "up_to", "says"),
+    [
+        (0.25, 400.0, ""),
+        (0.1, 400.0, "from 63 Hz on, and has none below 160 Hz: take time.duration = 0.24 s"),
+        (0.01, 400.0, "from 63 Hz on, and has none: take time.duration = 0.24 s"),
+        (0.25, 60.0, "from 50 Hz on, and has none: take time.duration = 0.3 s"),
+        (0.25, 1.0, ""),
+    ],
+)
+def test_a_record_too_short_is_told_what_would_do(duration: float, up_to: float, says: str) -> None:
+    """0.03 s of run-in, and 3 lines across 63 Hz, which is 14.5 Hz wide: 0.03 + 3 / 14.5 = 0.24 s."""
+    count, record = round(duration / STEP), Record()
+    centre, _ = third_octaves(np.random.default_rng(1).standard_normal((count, 3)), STEP, up_to)
+    _warn_of_short_record(record, centre, up_to, 0.03)
+    assert len(record.warnings) == (says != "")
+    assert says in "".join(record.warnings)
+    if says:
+        told = float(record.warnings[0].split("=")[1].split()[0])
+        enough = np.zeros((round((told - 0.03) / STEP), 3))
+        assert third_octaves(enough, STEP, up_to)[0].min() < 65.0
