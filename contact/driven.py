@@ -9,8 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from tireroad.contact.rolling import Tire, looking_ahead
-from tireroad.greens.one_step import ahead_of_mean
-from tireroad.greens.residual.sparse_columns import LoadedColumns
+from tireroad.greens.recursion import LoadedColumns, ahead_of_mean
 
 
 class Driven:

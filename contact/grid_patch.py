@@ -26,7 +26,7 @@ from tireroad.contact.rolling import looking_ahead
 from tireroad.contact.solver.conditions import ContactSolver
 from tireroad.contact.tread.kernel import GridPlaces
 from tireroad.fem.errors import ConvergenceError, UnsuitedSettings
-from tireroad.greens.residual.sparse_columns import LoadedColumns
+from tireroad.greens.recursion import LoadedColumns
 
 # Points of the largest grid that is laid out before the patch is known.
 MOST_POINTS = 1_000_000

@@ -23,7 +23,7 @@ from tireroad.contact.solver.conditions import ContactSolver
 from tireroad.contact.solver.friction import Friction
 from tireroad.contact.solver.together import Ahead, Solved, Together
 from tireroad.contact.tread.creep import TreadMemory
-from tireroad.greens.residual.sparse_columns import LoadedColumns
+from tireroad.greens.recursion import LoadedColumns
 
 # Road heights are computed at once for as many steps as make this many points, to share the
 # overhead of a call; and for at most so many steps.

@@ -10,7 +10,7 @@ _HOMES = {
     "Wheel": "coupling",
     "couple": "response",
     "make_response": "responses",
-    "wheel_of": "small_motions",
+    "wheel_of": "coupling",
 }
 __all__ = sorted(_HOMES)
 __getattr__, __dir__ = exported(__name__, _HOMES)

@@ -1,4 +1,23 @@
-"""Responses between chosen probes of a rolling tire, with the requested residual flexibility."""
+"""The wheel's full matrices, and the responses between probes that come from them and the modes.
+
+Attachment modes: the static shapes under the probes' loads join the basis, with their inertia.
+
+    R = K_Omega^-1 B,  joined to the modes as in modal.basis
+
+(MacNeal 1971; Rubin, AIAA J. 13 (1975) 995). Exact at 0 Hz: the exact static response lies in the
+basis or is added as a residual.
+
+Many neighbouring points yield many shapes, most of which respond only statically. Those whose
+static share is negligible at every point (`foremost`) and pseudo-modes far above the highest mode
+(`dynamic`) are left out. The residual is then the exact flexibility less that of the states, so
+what is left out keeps its static response and loses its inertia.
+
+The states of a basis, completed by the static response of all that they lack.
+
+Responses between chosen probes of a rolling tire, with the requested residual flexibility.
+
+The full matrices of a tire's small motions about its static state, for a rolling wheel.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +30,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import sparse
 
+from tireroad.fem.axle import Axle
 from tireroad.fem.cavity.column import Column
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.compliance import (
@@ -25,18 +45,121 @@ from tireroad.fem.matrices.inertia_relief import statics
 from tireroad.fem.matrices.operators import Operators, Rotation
 from tireroad.fem.matrices.receptance import receptance
 from tireroad.fem.matrices.rim_motion import RimMotion
+from tireroad.fem.model import SmallMotions
 from tireroad.fem.turning import Turning
-from tireroad.greens.basis import Array, Basis, Pencil, Probes, regained
-from tireroad.greens.completed import completed, with_left_out
-from tireroad.greens.residual.attachment import dynamic, fewest, foremost
-from tireroad.greens.residual.second_order import Moments, second_order
+from tireroad.greens.basis import (
+    Array,
+    Basis,
+    Moments,
+    Pencil,
+    Probes,
+    modal_moments,
+    regained,
+    second_order,
+)
 from tireroad.greens.response import Response
-from tireroad.modal.basis import Projection, project, same_fields
-from tireroad.modal.damping import Damping, StrainEnergy, tail_loss
-from tireroad.modal.joined import joined, with_air
+from tireroad.modal.basis import Projection, joined, project, same_fields, with_air, with_corner
+from tireroad.modal.damping import Damping, StrainEnergy, beyond, tail_loss
 from tireroad.modal.rolling import decouple
 from tireroad.modal.rotating import StateModes, held_matrices
-from tireroad.modal.solver.modes import Modes
+from tireroad.modal.solver.slicing import Modes
+
+# Of each point's own static flexibility: the most that the shapes left out may add up to. At
+# 90 rad/s the receptance up to half the highest mode changes by 1.2e-3, with 1e-3 by 5e-3.
+TOLERANCE = 1e-4
+# Pseudo-modes this many times faster than the highest mode are static (`dynamic`). At 50 rad/s the
+# receptance between 187 points up to half the highest mode changes by 4e-4, at 3 by 1e-3, at 2 by
+# 4e-3.
+FASTEST = 4.0
+FEW = 100  # pseudo-modes that are kept in any case, since they cost next to nothing
+
+
+def fewest(probes: sparse.csr_matrix) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
+    """(weights (p, t), loads (t, s)) with probes = weights loads and as few loads as possible.
+
+    Unit loads on the unknowns that the probes (p, s) touch if these are fewer, as for points closer
+    than nodes; otherwise the probes themselves.
+    """
+    touched = np.unique(probes.tocoo().col)
+    if len(touched) >= probes.shape[0]:
+        return sparse.identity(probes.shape[0], format="csr"), probes
+    unit = sparse.identity(probes.shape[1], format="csr")[touched]
+    return probes[:, touched].tocsr(), unit
+
+
+def foremost(missing: np.ndarray, flexibility: np.ndarray) -> np.ndarray:
+    """Combinations of the loads, columns (p, k), whose static shapes join the basis.
+
+    `missing` (p, p) m/N is what the modes lack of the `flexibility` (p,) m/N of each point. The
+    smallest eigenvectors of its symmetric part are left out as long as at no point they add up to
+    more than `TOLERANCE` of its own flexibility; by Cauchy-Schwarz the same then holds between any
+    two.
+    """
+    sizes, vectors = np.linalg.eigh((missing + missing.T) / 2)
+    order = np.argsort(np.abs(sizes), kind="stable")
+    gone = np.cumsum(np.abs(sizes[order]) * vectors[:, order] ** 2, axis=1)
+    fits = (gone <= TOLERANCE * flexibility[:, None]).all(axis=0)
+    return vectors[:, order[np.argmin(fits) if not fits.all() else len(order) :]]
+
+
+def dynamic(projection: Projection, speed: float, known: int) -> np.ndarray:
+    """Mask (m,) of coordinates that stay: the first `known`, `FEW` pseudo-modes, dynamic ones.
+
+    Relative to its static response, a coordinate's response at w has the dynamic part
+    (w^2 + 2 w Omega n) / (omega_k^2 - Omega^2 n^2),  n = |S_kk|^1/2: inertia and convection. It
+    counts as static if at half the highest mode this is no more than for a standing wheel at
+    `FASTEST` times the highest mode.
+    """
+    squares = projection.squares
+    highest = np.sqrt(squares[projection.modes - 1])
+    turning = np.zeros(len(squares))
+    if projection.convective is not None:
+        turning = abs(speed) * np.sqrt(np.maximum(-np.diag(projection.convective), 0.0))
+    moving = highest**2 + 4 * highest * turning
+    stays = squares - turning**2 <= FASTEST**2 * moving
+    stays[: known + FEW] = True
+    return stays
+
+
+def with_left_out(response: Response, whole: Array) -> Response:
+    """The response with what its states lack of the `whole` static rows (Basis.felt)."""
+    return replace(response, left_out=whole - response.static_moment())
+
+
+def completed(
+    basis: Basis,
+    turning: Turning,
+    outputs: Probes,
+    loads: Probes,
+    flexibility: Array,
+    beside: Array,
+) -> Response:
+    """The response (r, k) whose static limit is that of the full matrices with the rim held.
+
+    `flexibility` (r, k) m/N is their static response and `beside` what it carries (Basis.beside):
+    the momentum (3, k), or with hub moments (12, k). For a wheel that moves, the states respond as
+    they are, and are completed by what the states of the held rim lack.
+    """
+    hub = basis.of_hub(outputs)
+    if hub.nnz:
+        flexibility = flexibility - hub @ beside[3:6]
+    if not basis.projection.moves:
+        if hub.nnz:
+            flexibility = flexibility + hub @ basis.loaded(loads)
+        response = basis.couple(outputs, loads, flexibility)
+        return with_left_out(response, basis.felt(beside[:3]))
+    held = basis.held
+    pencil = held_matrices(basis.projection, turning.speed, turning.damping, turning.inertia)
+    known = modal_moments(*pencil, held.seen(outputs), held.seen(loads), held.beside(hub))
+    missing = flexibility - known.compliance
+    if hub.nnz:
+        missing += hub @ known.momentum[3:6]
+    response = basis.couple(outputs, loads)
+    return replace(
+        response,
+        residual=response.residual + missing,
+        left_out=beside[:3] - known.momentum[:3],
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,7 +261,7 @@ class Wheel:
         return whole if self.air is not None else with_left_out(whole, moment)
 
     def _beside(self, hub: Probes) -> Array:
-        """Own rows (3, n) of momentum; with A_0 to A_2 of greens.hub (12, n) if `hub` is read."""
+        """Own rows (3, n) of momentum; with A_0 to A_2 of greens.response (12, n) if `hub` is read."""
         carried = self.operators.carried
         if not hub.nnz:
             return carried
@@ -159,7 +282,7 @@ class Wheel:
     def _completed(
         self, basis: Basis, outputs: Probes, loads: Probes, flexibility: Array, beside: Array
     ) -> Response:
-        """The states completed by what they lack (greens.completed)."""
+        """The states completed by what they lack."""
         made = completed(basis, self.turning, outputs, loads, flexibility, beside)
         return made if self.air is None else replace(made, left_out=None)
 
@@ -247,3 +370,49 @@ class Wheel:
         """H (f, r, k) m/N of the full matrices, at the frequencies in Hz. Collective."""
         full = self.rotating_stiffness, self.rotating_damping
         return receptance(self.operators, *full, outputs, loads, frequency, air=self.air)
+
+
+def wheel_of(
+    motions: SmallMotions,
+    turning: Turning,
+    air: Column | None = None,
+    projection: Projection | None = None,
+    axle: Axle | None = None,
+) -> Wheel:
+    """The full matrices of a tire at its static state as the wheel rotates, with the `air` in it.
+
+    `projection` on the modes: only for damping by strain energy, which has no full matrices.
+    `axle`: the suspension of a wheel that moves; the full matrices are always those of a held rim.
+    InputError if the static state was found for another speed or inertia, or the projection is
+    missing. Collective.
+    """
+    shape, tail = motions.static.rolling, None
+    if shape.speed and (shape.speed, shape.inertia) != (turning.speed, turning.inertia):
+        raise InputError(
+            f"the static state rolls at {shape.speed:g} rad/s with {shape.inertia} inertia, its small motions at "
+            f"{turning.speed:g} rad/s with {turning.inertia}: take the same for both, or a static state at rest"
+        )
+    if isinstance(turning.damping, StrainEnergy):
+        if projection is None:
+            raise InputError("damping by strain energy needs the modes: give their projection")
+        tail = beyond(turning.damping, projection)
+    rotation = motions.rotation if turning.speed else None
+
+    def rim() -> RimMotion | None:
+        return motions.rim_motion(turning.speed != 0)
+
+    def corner(projection: Projection, modes: Modes) -> Projection:
+        comm, places = motions.body.comm, motions.static.positions
+        return with_corner(projection, modes, axle, rim(), places, comm)
+
+    return Wheel(
+        operators=motions.operators,
+        rotation=rotation,
+        speed=turning.speed,
+        damping=turning.damping,
+        inertia=turning.inertia,
+        air=air,
+        beyond=tail,
+        corner=corner,
+        rim=rim,
+    )

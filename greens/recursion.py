@@ -1,4 +1,35 @@
-"""State-space recursion: the exact convolution of Green's functions and forces, without history.
+"""The time loop's recursion of states: exact convolution of Green's functions without history.
+
+One time step of the states: decay, and the force during it (greens.recursion).
+
+The schemes differ in the force within a step, from the forces f_n at its end, f_{n-1} and f_{n-2}:
+
+    linear     from f_{n-1} to f_n: second order; a contact that the step does not resolve chatters
+    damped     (9 f_n + 6 f_{n-1} + f_{n-2}) / 16 throughout: second order; damps such a contact
+    constant   f_n throughout: first order, as forces half a step early; never gains energy from
+               contact
+
+Of the means a f_n + b f_{n-1} + c f_{n-2} that are of second order, a = 1/2 + c, b = 1/2 - 2 c, the
+error is (1/8 + c) h^2 f'' and the work that springs lose on an oscillation of angle t a step is as
+2 c (1 - cos t)^2 >= 0, whatever the tire. With c = 1/16 a mass bouncing on a spring of stiffness k
+loses at least 2.5 % of its amplitude a step from k h^2 / m = 2 to 10^3.
+
+Distribution of the states of a shared loop over the processes.
+
+Which processes share a time loop.
+
+The response to forces that alternate in sign from step to step, as in a chattering contact.
+
+With f_n = (-1)^n F, linear in between, every state settles at z_n = (-1)^n Z,
+
+    -Z = e^{sh} Z + b0 P F - b1 P F   =>   Z = (b1 - b0) P F / (1 + e^{sh})
+
+(greens.recursion). The mass of a mode alone gives -h^2 / (12 m): the tire moves towards a force
+that pushes it, as if it were a negative spring. Forces constant over the step give zero.
+
+Products of a matrix with mostly zero forces, which read only the columns of nonzero ones.
+
+State-space recursion: the exact convolution of Green's functions and forces, without history.
 
 With a force linear over one step h (first-order hold), f(tau) = f_n + (f_{n+1} - f_n) tau / h, each
 state advances by
@@ -6,18 +37,336 @@ state advances by
     z_{n+1} = e^{sh} z_n + b0 P f_n + b1 P f_{n+1},   b1 = h phi2(sh),  b0 = h (phi1 - phi2)(sh),
 
 phi1(x) = (e^x - 1)/x, phi2(x) = (e^x - 1 - x)/x^2. With the force constant at its new value b0 = 0
-and b1 = h phi1; other forces within a step: greens.one_step. Cost: one pass over output and input,
-4 q (r + k) flops and 16 q (r + k) bytes."""
+and b1 = h phi1. Cost: one pass over output and input,
+4 q (r + k) flops and 16 q (r + k) bytes.
+"""
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
+
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
+from scipy import linalg, sparse
+from scipy.sparse.linalg import LinearOperator
+from threadpoolctl import threadpool_info
 
-from tireroad.greens.one_step import EARLIER, NO_BLOCK, Block, late_answers, mixed, weights
-from tireroad.greens.residual.sparse_columns import LoadedColumns
+from tireroad.fem.collective import alike, joined
 from tireroad.greens.response import Response
-from tireroad.greens.spread import Spread
+
+DAMPED = 1 / 16
+# Parts of f_{n-1} and f_{n-2} in the earlier force l of a step, z_n = e^{sh} z_{n-1} + b0 P l + b1 P f_n.
+EARLIER = {
+    "linear": (1.0, 0.0),
+    "damped": (0.5 - 2 * DAMPED, DAMPED),
+    "constant": (1.0, 0.0),
+}
+
+
+class Block:
+    """Recursion of the block of nearly defective states, on the first process with states.
+
+    Its last three outputs are the rate of change of momentum, without its jump due to the force.
+    """
+
+    def __init__(self, response: Response, step: float, scheme: str) -> None:
+        block, push = response.block, response.block_input
+        self._output = np.vstack([response.block_output, response.inertia[1]])
+        self._decay, self._old, self._new = block_steps(block, push, step, scheme)
+        self._parts = EARLIER[scheme]
+        size, forces = push.shape
+        self.state = np.zeros(size)
+        self._force = self._before = np.zeros(forces)
+
+    def direct(self) -> np.ndarray:
+        return self._output @ self._new
+
+    def start(self, force: np.ndarray) -> None:
+        self._force = self._before = force
+
+    def direct_next(self) -> np.ndarray:
+        return self._output @ (self._decay @ self._new + self._parts[0] * self._old)
+
+    def move(self) -> None:
+        self._free = self._decay @ self.state + self._old @ mixed(
+            self._parts, self._force, self._before
+        )
+
+    def seen(self) -> np.ndarray:
+        return self._output @ self._free
+
+    def seen_next(self) -> np.ndarray:
+        moved = self._decay @ self._free
+        if self._parts[1]:
+            moved += self._old @ (self._parts[1] * self._force)
+        return self._output @ moved
+
+    def advance(self, force: np.ndarray) -> None:
+        self._before, self._force = self._force, force
+        self.state = self._free + self._new @ force
+
+    def snapshot(self) -> dict[str, np.ndarray]:
+        return {
+            "block_state": self.state,
+            "block_force": self._force,
+            "block_before": self._before,
+        }
+
+    def restore(self, kept: dict[str, np.ndarray]) -> None:
+        self.state, self._force = kept["block_state"], kept["block_force"]
+        self._before = kept["block_before"]
+
+
+def block_steps(
+    block: np.ndarray, push: np.ndarray, step: float, scheme: str
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """e^{Th} (b, b), and b0 P and b1 P (b, k), of the block T with its input P."""
+    size, forces = push.shape
+    # expm of [[T, P, 0], [0, 0, I/h], [0, 0, 0]] h carries e^{Th}, h phi1 P and h phi2 P at once.
+    wide = np.zeros((size + 2 * forces, size + 2 * forces))
+    wide[:size, :size] = block * step
+    wide[:size, size : size + forces] = push * step
+    wide[size : size + forces, size + forces :] = np.eye(forces)
+    moved = linalg.expm(wide)[:size]
+    first, second = moved[:, size : size + forces], moved[:, size + forces :]
+    return moved[:, :size], *_shares(first, second, scheme)
+
+
+NO_BLOCK = {name: np.zeros(0) for name in ("block_state", "block_force", "block_before")}
+
+
+def weights(x: np.ndarray, step: float, scheme: str) -> tuple[np.ndarray, np.ndarray]:
+    """b0 and b1 for x = s h."""
+    phi1, phi2 = _phi(x)
+    return _shares(step * phi1, step * phi2, scheme)
+
+
+def _shares(first: np.ndarray, second: np.ndarray, scheme: str) -> tuple[np.ndarray, np.ndarray]:
+    """b0 and b1 from h phi1 and h phi2."""
+    if scheme == "linear":
+        return first - second, second
+    if scheme == "damped":
+        return first, (0.5 + DAMPED) * first
+    return 0 * first, first
+
+
+def mixed(parts: tuple[float, float], last: np.ndarray, before: np.ndarray) -> np.ndarray:
+    """The earlier force of a step, by the `parts` of the two before it; also of their pushes."""
+    return parts[0] * last + parts[1] * before if parts[1] else last
+
+
+def _phi(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """phi1 and phi2; by their series below 0.3, where the closed forms cancel."""
+    small = np.abs(x) < 0.3
+    safe = np.where(small, 1.0, x)
+    phi1 = np.where(small, _series(x, 1), np.expm1(safe) / safe)
+    phi2 = np.where(small, _series(x, 2), (phi1 - 1) / safe)
+    return phi1, phi2
+
+
+def _series(x: np.ndarray, order: int) -> np.ndarray:
+    """phi_order(x) = sum_k x^k / (k + order)!, for |x| < 0.3 to full precision."""
+    out = np.zeros_like(x)
+    for k in range(14, -1, -1):
+        out = out * x + 1 / math.factorial(k + order)
+    return out
+
+
+def ahead_of_mean(scheme: str, forces: np.ndarray) -> np.ndarray:
+    """The mean force that acts during each step, less (f_n + f_{n-1}) / 2: (n, k) N.
+
+    `forces` (n + 2, k) N: at the ends of n steps, with the two before them.
+    """
+    if scheme == "constant":
+        return 0.5 * np.diff(forces[1:], axis=0)
+    return (DAMPED if scheme == "damped" else 0.0) * np.diff(forces, 2, axis=0)
+
+
+def late_answers(response: Response, step: float, scheme: str) -> sparse.csr_matrix | None:
+    """What the outputs and the rate of momentum (r + 3, k) still answer to the step's first force.
+
+    It is missing in the answer to its last force: a pulse one step long responds to the mean of both,
+    as of a linear force, and a slope (Response.slope) to the difference of both.
+    """
+    late = np.zeros((len(response.residual) + 3, response.residual.shape[1]))
+    if response.pulse and scheme != "constant":
+        late[: response.pulse] = response.residual[: response.pulse] / 2
+    if response.slope is not None:
+        late -= response.slope / step
+    return sparse.csr_matrix(late) if late.any() else None
+
+
+@dataclass(frozen=True)
+class Spread:
+    """States dealt in turn to the processes of `comm`, except the first `idle` ones."""
+
+    comm: MPI.Comm
+    idle: int
+
+    def mine(self, every: np.ndarray) -> np.ndarray:
+        """This process's share of all states (q, ...), a view."""
+        return self._of(self.comm.rank, every)
+
+    def everywhere(self, own: np.ndarray) -> np.ndarray:
+        """All states (q, ...) from those of each process. Collective."""
+        if self.comm.size == 1:
+            return own
+        every = joined(self.comm, np.ascontiguousarray(own))
+        out, first = np.empty_like(every), 0
+        for rank in range(self.comm.size):
+            share = self._of(rank, out)
+            share[:] = every[first : first + len(share)]
+            first += len(share)
+        return out
+
+    def _of(self, rank: int, every: np.ndarray) -> np.ndarray:
+        owners = self.comm.size - self.idle
+        return every[rank - self.idle :: owners] if rank >= self.idle else every[:0]
+
+
+# Bytes of both matrices; smaller ones fit the caches, and processes would only wait.
+SHARED_FROM = 20e6
+_LIBRARY = "user_api", "internal_api", "version", "architecture"
+
+
+def sharers(response: Response, comm: MPI.Comm) -> MPI.Comm:
+    """The processes worth distributing a loop over: all of `comm`, or each one by itself.
+    Collective.
+
+    The root solves the contact problem while the others look ahead (greens.recursion). 625 points
+    and 410 states have 8 MB, 1,296 and 1,010 have 42 MB. Each process decides from the results of
+    the loop whether to continue. Processes whose BLAS rounds differently, on nodes of another kind,
+    could decide differently and wait for ever, so they do not share.
+    """
+    size = response.output.nbytes + response.input.nbytes
+    return comm if size >= SHARED_FROM and alike(comm, _kernels()) else MPI.COMM_SELF
+
+
+def _kernels() -> str:
+    """The libraries of this process's products, with the kernels chosen for its processor."""
+    found = [[str(lib.get(name)) for name in _LIBRARY] for lib in threadpool_info()]
+    return str(sorted(found))
+
+
+def alternating(response: Response, step: float) -> np.ndarray:
+    """Displacement (r, k) m/N under unit forces of alternating sign, without the residual.
+
+    `response` as the loop uses it (Response.resolved), `step` s; forces linear over the step.
+    """
+    x = response.eigenvalue * step
+    old, new = weights(x, step, "linear")
+    out = ((response.output * ((new - old) / (1 + np.exp(x)))) @ response.input).real
+    if len(response.block):
+        decay, old, new = block_steps(response.block, response.block_input, step, "linear")
+        out += response.block_output @ np.linalg.solve(np.eye(len(decay)) + decay, new - old)
+    return out
+
+
+def at_once(response: Response) -> np.ndarray:
+    """The residual's contribution (r, k) m/N; that of a pulse, half of it a step late, cancels."""
+    return np.zeros_like(response.residual) if response.pulse else response.residual
+
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+# Numbers in a run of columns, on average, above which each run is multiplied on its own instead of
+# first copying all columns side by side: 16 columns of 430 numbers, 7 of 1,000, 3 of 2,000; at
+# least two columns.
+LONG, FEWEST = 7000, 2
+
+
+class SharedRows:
+    """This process's share `mine` of `count` rows, and their collection by `gathered`."""
+
+    def __init__(self, count: int, comm: MPI.Comm) -> None:
+        ends = count * np.arange(comm.size + 1) // comm.size
+        self.comm = comm
+        self.mine = slice(int(ends[comm.rank]), int(ends[comm.rank + 1]))
+        self._count, self._shares = count, (np.diff(ends), ends[:-1])
+
+    def gathered(self, own: Array) -> Array:
+        """The numbers (count,) of all processes, bitwise equal on each, from this one's.
+        Collective.
+        """
+        if self.comm.size == 1:
+            return own
+        every = np.empty(self._count)
+        self.comm.Allgatherv(np.ascontiguousarray(own), [every, self._shares, MPI.DOUBLE])
+        return every
+
+
+class LoadedColumns:
+    """A (n, k), stored by `columns` (k, n); products read only columns of nonzero forces.
+
+    Runs of adjacent nonzero entries, such as the touching points of a line, are read in place:
+    copying them side by side first takes twice as long. The order of summation depends on the
+    nonzero entries alone, so that a run restarted from a checkpoint yields the same bits. With a
+    `comm` of several processes, each computes its share of the n rows.
+    """
+
+    def __init__(self, matrix: Array, comm: MPI.Comm = MPI.COMM_SELF) -> None:
+        self.columns = np.ascontiguousarray(matrix.T)
+        self.rows = SharedRows(len(matrix), comm)
+        self._own = self.columns[:, self.rows.mine]
+
+    @staticmethod
+    def of(matrix: Array | LinearOperator, comm: MPI.Comm) -> LoadedColumns | LinearOperator:
+        """A matrix wrapped for such products; a linear operator is returned as it is."""
+        return LoadedColumns(matrix, comm) if isinstance(matrix, np.ndarray) else matrix
+
+    def __matmul__(self, force: Array) -> Array:
+        """A f (n,) for f (k,). Collective where the rows are shared."""
+        return self.rows.gathered(self.product(force))
+
+    def product(self, force: Array) -> Array:
+        """This process's rows of A f for f (k,)."""
+        index = force.nonzero()[0]
+        breaks = np.flatnonzero(index[1:] - index[:-1] > 1)
+        loaded, runs = len(index), len(breaks) + 1
+        if loaded < FEWEST * runs or loaded * self._own.shape[1] < LONG * runs:
+            return force[index] @ self._own[index]
+        begins = [index[0], *index[breaks + 1].tolist()]
+        ends = [*(index[breaks] + 1).tolist(), index[-1] + 1]
+        out = np.zeros(self._own.shape[1])
+        for begin, end in zip(begins, ends, strict=True):
+            out += force[begin:end] @ self._own[begin:end]
+        return out
+
+    def between(self, rows: Index, columns: Index) -> Array:
+        """A (a, b) between `rows` (a,) and `columns` (b,), column-major."""
+        # Whole columns first: a third of the time of picking entry by entry.
+        return self.columns.take(columns, axis=0).take(rows, axis=1).T
+
+    def around(self, index: Index) -> ColumnsAround:
+        """The columns (a,) of `index`, for forces that are nonzero there and at few others."""
+        return ColumnsAround(self, index)
+
+
+class ColumnsAround:
+    """Columns of A (n, n), rows not shared, at `index` (a,), copied once for many products.
+
+    Finding and copying them is half the cost of a product.
+    """
+
+    def __init__(self, whole: LoadedColumns, index: Index) -> None:
+        self._whole, self._index = whole, index
+        self._columns = whole.columns.take(index, axis=0)
+
+    def block(self) -> Array:
+        """A (a, a) between them, column-major."""
+        return self._columns.take(self._index, axis=1).T
+
+    def spread(self, force: Array) -> Array:
+        """A f (n,) for f (n,), fastest if f is nonzero at `index` and few others."""
+        moved = force[self._index] @ self._columns
+        rest = force.copy()
+        rest[self._index] = 0.0
+        if rest.any():
+            moved += self._whole.product(rest)
+        return moved
 
 
 class Recursion:

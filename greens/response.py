@@ -1,9 +1,43 @@
-"""Semi-analytical response of the tire between chosen forces and displacements.
+"""The response between forces and displacements by states, which of them are dynamic, hub moments.
+
+A real block of states split into those that stay dynamic and those that follow statically.
+
+Semi-analytical response of the tire between chosen forces and displacements.
 
     u(t) = Re[C z(t)] + C_b y(t) + G_res f(t),   z' = s z + P f,   y' = T y + P_b f
     g(t) = Re[C e^{st} P] + C_b e^{Tt} P_b  (+ G_res delta(t)),   g(0) = 0 without truncation
 
-thesis (4.14), whose sum over eigenpairs is kept as a product, C = Phi_out R and P = L Phi_in^T."""
+thesis (4.14), whose sum over eigenpairs is kept as a product, C = Phi_out R and P = L Phi_in^T.
+
+Hub moments as outputs of a response: those of the loads less those of the tire's motion,
+
+    m = R^T f - (A_2 u'' + A_1 u' + A_0 u),
+
+with A as in modal.corner.Corner.moments, and u the motion of the states and of what follows a force
+statically. States z' = s z + P f with coordinates q = C z (real part) have the rates
+q' = C s z + C P f  and  q'' = C s^2 z + C s P f + C P f'.  C P vanishes for a complete set of states; what it
+is where some are made static is the response's slope (static condensation).
+
+States that follow statically, and what hub moments and the axle force lose by it.
+
+A state z' = s z + P f, seen by C, answers a slow force by
+
+    C P / (D - s) f = -C P / s f - C P / s^2 f' - ...,   D = d/dt.
+
+The first term joins the residual. The second is small in a displacement, and would feed a rate of
+the force back into a contact. But the rate of momentum and hub moments weight a state with s^2
+(greens.response), so that however fast it is it answers a rate of force with C P / s^2: by as much as
+the states that stay now lack of completeness, Re(C P / s^2) = 0 over all of them. That part is the
+response's `slope`.
+
+Selection of dynamic states: those that respond within the band, not just the slowest.
+
+A state A = C P that is made static loses  (A e(s) + A* e(s*)) / 2,  e(s) = i w / (s (i w - s)). Its
+participation is the largest magnitude of that over the band. Fast modes lose (w/s)^2, since the two
+halves of a pair almost cancel. For the axle force, the contact forces less the rate of momentum, C
+is replaced by s^2 times the state's momentum: the few modes with a net momentum matter there long
+after the displacements no longer need them.
+"""
 
 from __future__ import annotations
 
@@ -11,11 +45,51 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import linalg
+from scipy import linalg, sparse
 
-from tireroad.greens.hub import at_once, rates
-from tireroad.greens.residual.made_static import added, block_made_static, poles_made_static
-from tireroad.modal.states import StateModes, growing
+from tireroad.modal.rotating import StateModes, growing
+
+
+@dataclass(frozen=True)
+class Parted:
+    """y' = A y + b f as two decoupled blocks: y = right z + lagging r.
+
+    z' = block z + left b f and r' = faster r + lagging_left b f. Shapes: `block` (p, p), `right`
+    (n, p), `left` (p, n); `faster` (n - p, n - p), `lagging` (n, n - p), `lagging_left` (n - p, n).
+    """
+
+    block: np.ndarray
+    right: np.ndarray
+    left: np.ndarray
+    faster: np.ndarray
+    lagging: np.ndarray
+    lagging_left: np.ndarray
+
+    def following(self, push: np.ndarray) -> np.ndarray:
+        """lagging faster^-1 lagging_left b (n, k) for the inputs b = `push` (n, k).
+
+        Its negative is the static response y, per constant force, of the states that do not stay.
+        """
+        return self.lagging @ np.linalg.solve(self.faster, self.lagging_left @ push)
+
+
+def parted(block: np.ndarray, values: np.ndarray, stays: np.ndarray) -> Parted:
+    """Split the block (n, n) by its eigenvalues (n,), those that stay first; pairs together.
+
+    Its real Schur form is divided between the two, and the coupling C removed by the solution of
+    Sylvester's equation A X - X B = -C. Not collective.
+    """
+
+    def first(re: float, im: float) -> bool:
+        return bool(stays[np.abs(values - complex(re, im)).argmin()])
+
+    schur, turn, p = linalg.schur(block, output="real", sort=first)
+    X = linalg.solve_sylvester(schur[:p, :p], -schur[p:, p:], -schur[:p, p:])
+    right, left = turn.copy(), turn.T.copy()
+    right[:, p:] += turn[:, :p] @ X
+    left[:p] -= X @ turn.T[p:]
+    return Parted(schur[:p, :p], right[:, :p], left[:p], schur[p:, p:], right[:, p:], left[p:])
+
 
 # Radians a state may rotate in a step and stay dynamic. Undamped, bouncing on a stiff tread, up to
 # 3 gained no energy and 5 diverged: rotation beyond pi is not resolved. Rolling on a rough road in
@@ -229,3 +303,155 @@ def couple(
     if compliance is None:
         return response
     return replace(response, residual=compliance - response.static())
+
+
+def rates(response: Response) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Rows of its momentum per state (3, q) and per state of the block (3, b), two pairs.
+
+    First A_2 s + A_1, by which a force changes the axle force at once, then A_2 s^2 + A_1 s + A_0.
+    """
+    s, block = response.eigenvalue, response.block
+    poles = _horner(response.momentum, lambda rows: rows * s)
+    return list(
+        zip(poles, _horner(response.block_momentum, lambda rows: rows @ block), strict=True)
+    )
+
+
+def _horner(rows: np.ndarray, rate: Callable[[np.ndarray], np.ndarray]) -> list[np.ndarray]:
+    """Both of `rates`; `rows` (3, n) are A_2 alone, (9, n) are A_2, A_1 and A_0 (Basis.felt)."""
+    inertia, *rest = np.split(rows, len(rows) // 3)
+    first, still = rest or (0.0, 0.0)
+    direct = rate(inertia) + first
+    return [direct, rate(direct) + still]
+
+
+def at_once(response: Response) -> np.ndarray:
+    """Rate of momentum (3, k) due to each force at the same instant, A_0 u of what follows it too."""
+    poles, block = rates(response)[0]
+    direct = (poles @ response.input).real + block @ response.block_input
+    follows = response.left_out
+    return direct if follows is None or len(follows) == 3 else direct + follows[6:]
+
+
+def reading(
+    response: Response, states: StateModes, wanted: sparse.csr_matrix, rows: np.ndarray
+) -> Response:
+    """The `response` with -(A_2 q'' + A_1 q' + A_0 q) of its own `states` added to its outputs.
+
+    `wanted` (r, 3): the weights of the moments in the outputs; `rows` (9, m): A_0, A_1 and A_2 on
+    the m coordinates.
+    """
+    if not wanted.nnz:
+        return response
+    s, block = states.eigenvalue, states.block
+    by_state, by_block = np.zeros((3, len(s)), complex), np.zeros((3, len(block)))
+    # Horner's rule: each further rate has the jump of the one before.
+    for part in np.split(rows, 3)[::-1]:
+        direct = (by_state @ response.input).real + by_block @ response.block_input
+        by_state = by_state * s - part @ states.right
+        by_block = by_block @ block - part @ states.block_right
+    return replace(
+        response,
+        output=response.output + wanted @ by_state,
+        block_output=response.block_output + wanted @ by_block,
+        residual=response.residual + wanted @ direct,
+        moments=np.diff(wanted.tocsr().indptr) > 0,
+    )
+
+
+def poles_made_static(response: Response, keep: np.ndarray) -> Response:
+    """The poles where `keep` (q,) is true stay dynamic; the others follow statically."""
+    s = response.eigenvalue[~keep, None]
+    following = response.input[~keep] / s
+    gone, left_out = response.output[:, ~keep] @ following, response.left_out
+    if left_out is not None:
+        left_out = left_out - (response.momentum[:, ~keep] @ following).real
+    slope = _rates(response, response.output, response.inertia[0])[:, ~keep] @ (following / s)
+    return replace(
+        response,
+        left_out=left_out,
+        eigenvalue=response.eigenvalue[keep],
+        output=response.output[:, keep],
+        input=response.input[keep],
+        momentum=response.momentum[:, keep],
+        residual=response.residual - gone.real,
+        slope=added(response.slope, -slope.real),
+    )
+
+
+def block_made_static(response: Response, values: np.ndarray, stays: np.ndarray) -> Response:
+    """The same for the block, by its eigenvalues, `values` (b - rigid,) 1/s."""
+    held, output, push = response.held_block()
+    k = len(held)
+    momentum, rates = response.block_momentum[:, :k], response.inertia[1][:, :k]
+    kept = parted(held, values, stays)
+    following = kept.following(push)
+    left_out = response.left_out
+    if left_out is not None:
+        left_out = left_out - momentum @ following
+    slope = _rates(response, output, rates) @ kept.following(following)
+    return replace(
+        response,
+        block=linalg.block_diag(kept.block, response.block[k:, k:]),
+        block_output=np.hstack([output @ kept.right, response.block_output[:, k:]]),
+        block_input=np.vstack([kept.left @ push, response.block_input[k:]]),
+        block_momentum=np.hstack([momentum @ kept.right, response.block_momentum[:, k:]]),
+        residual=response.residual - output @ following,
+        left_out=left_out,
+        slope=added(response.slope, -slope),
+    )
+
+
+def _rates(response: Response, output: np.ndarray, inertia: np.ndarray) -> np.ndarray:
+    """Rows (r + 3, n) of what is weighted with s^2: hub moments, zeros for other outputs, and the
+    rate of momentum."""
+    moments = response.moments
+    own = np.zeros_like(output) if moments is None else output * moments[:, None]
+    return np.vstack([own, inertia])
+
+
+def added(one: np.ndarray | None, other: np.ndarray | None) -> np.ndarray | None:
+    """The sum of two slopes, where None is none."""
+    return other if one is None else one if other is None else one + other
+
+
+def participation(response: Response, band: float) -> np.ndarray:
+    """Loss (q,) if a state is made static, from 0 to `band` Hz.
+
+    The larger of its shares in the static displacements and in the axle force, in Frobenius norms
+    over all outputs and forces.
+    """
+    still = np.linalg.norm(response.static() + response.residual)
+    displacement = _lost(response, response.output, band) / still
+    # Of each unit force one unit reaches the axle.
+    axle = _lost(response, response.inertia[0], band)
+    return np.maximum(displacement, axle / np.sqrt(response.input.shape[1]))
+
+
+def _lost(response: Response, output: np.ndarray, band: float) -> np.ndarray:
+    """Largest magnitude (q,) over the band of what each state loses at the outputs (r, q)."""
+    s, push = response.eigenvalue, response.input.T
+    # The maximum is at the state's resonance if that is within the band, else at the end of the
+    # band.
+    omega = 1j * np.clip(np.abs(s), 0, 2 * np.pi * band)
+    half = omega / (s * (omega - s))
+    mirror = omega / (s.conj() * (omega - s.conj()))
+    square = (np.abs(output) ** 2).sum(axis=0) * (np.abs(push) ** 2).sum(axis=0)
+    plain = (output**2).sum(axis=0) * (push**2).sum(axis=0)  # of A with A*
+    cross = 2 * (half * mirror.conj() * plain).real
+    loss = square * (np.abs(half) ** 2 + np.abs(mirror) ** 2) + cross
+    return np.sqrt(np.maximum(loss, 0.0)) / 2
+
+
+def keep(
+    response: Response, count: int, band: float, by: str, counted: slice = slice(None)
+) -> Response:
+    """The response with its `count` foremost states dynamic; the others follow statically.
+
+    `by` "participation" within the band, or "frequency": the slowest. A state is a pair of complex
+    eigenvalues or one real eigenvalue; `counted` are the outputs and forces that decide.
+    """
+    seen = response.between(counted, counted)
+    merit = participation(seen, band) if by == "participation" else -np.abs(response.eigenvalue)
+    foremost = np.argsort(-merit, kind="stable")[:count]
+    return response.keeping(np.isin(np.arange(len(merit)), foremost))

@@ -7,7 +7,7 @@ _HOMES = {
     "Projection": "basis",
     "Proportional": "damping",
     "RollingModes": "rolling",
-    "StateModes": "states",
+    "StateModes": "rotating",
     "StrainEnergy": "damping",
     "critical_speed": "campbell",
     "onset": "campbell",

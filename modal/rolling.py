@@ -1,27 +1,181 @@
-"""The states of a rolling tire, and the wheel's motion that they were computed for."""
+"""The states of a rolling tire and the wheel's motion that they were computed for: by projection, or in full.
+
+The full method solves the quadratic problem on the finite elements by SLEPc for a few states, and measures
+how far the projected ones are from them.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from mpi4py import MPI
+from petsc4py import PETSc
+from scipy import optimize
 
+from tireroad.fem.axle import Axle
+from tireroad.fem.collective import summed
 from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.matrices.rim_motion import RimMotion
 from tireroad.fem.parallel import on_root
 from tireroad.fem.turning import Turning
-from tireroad.modal.adrift import beside
 from tireroad.modal.basis import ModalBasis, Projection
 from tireroad.modal.campbell import Campbell
+from tireroad.modal.corner import meeting
+from tireroad.modal.damping import beyond
 from tireroad.modal.rotating import (
     DEFECTIVE,
     StateModes,
+    beside,
     checks,
     matrices,
     rotating,
     standing,
 )
+from tireroad.modal.solver import quadratic
+from tireroad.modal.solver.fields import gram
+from tireroad.modal.solver.quadratic import FullModes
+
+_BORDER = 0.02  # relative: truncation may move a state across a limit by as much
+
+
+def truncation(full: np.ndarray, projected: np.ndarray) -> np.ndarray:
+    """Relative error (q,) of the projected eigenvalue matched to each full eigenvalue."""
+    distance = np.abs(full[:, None] - projected)
+    rows, columns = optimize.linear_sum_assignment(distance)
+    error = np.full(len(full), np.inf)  # inf: no projected state left to match
+    error[rows] = distance[rows, columns]
+    return error / np.abs(full)
+
+
+def missing(full: np.ndarray, projected: np.ndarray, low: float, high: float) -> int:
+    """Number of states missing from the full problem between two limits (1/s).
+
+    `full`, `projected` are magnitudes (Im s or |s|). Projected states within 2 % of a limit are not
+    counted, since truncation may have moved them across it.
+    """
+    inside = (projected > low * (1 + _BORDER)) & (projected < high * (1 - _BORDER))
+    found = (full >= low) & (full <= high)
+    return max(int(inside.sum()) - int(found.sum()), 0)
+
+
+_ROUNDING = 1e-14  # of the largest squared length: smaller directions are rounding of the fields
+
+Figures = dict[str, tuple[float, str]]
+
+
+def full_states(
+    operators: Operators,
+    pencil: tuple[PETSc.Mat, PETSc.Mat],
+    projected: RollingModes,
+    rim: RimMotion | None = None,
+    *,
+    count: int,
+    window: tuple[float, float] = (0.0, 0.0),
+) -> tuple[RollingModes, Figures, list[str]]:
+    """`count` pairs nearest to zero, or all in the `window` (Hz), with figures and warnings.
+
+    The figures tell how far the projected states are from them. `pencil`: D + 2 Omega G and K_Omega
+    as in fem.matrices.compliance; `rim`: the reactions to motions of a held rim, for the moments on
+    its hub. Collective.
+    """
+    found, figures, lacking = _solve(operators, pencil, projected, count, window)
+    fields, coordinates = _orthonormal(operators, found)
+    comm, old = operators.body.comm, projected.basis
+    momenta = summed(comm, operators.carried @ fields)
+    projection, corner = old.projection, None
+    if rim is not None:
+        corner = meeting(Axle.held(), rim, fields, projection.wheel.places, comm)
+    basis = replace(
+        old,
+        shape=operators.trace(fields),
+        projection=replace(projection, momentum=momenta, corner=corner),
+        modes=None,
+    )
+    states = _states(found, coordinates)
+    full = RollingModes(basis=basis, states=states, turning=projected.turning, full=True)
+    warnings = (
+        []
+        if not lacking
+        else [
+            f'rotation.method = "full" found {lacking} state(s) fewer than the projected problem has in the same '
+            "range: some may be missing. Ask for more by rotation.count or a wider rotation.window."
+        ]
+    )
+    return full, figures | _compared(found, projected.states), warnings
+
+
+def _solve(
+    operators: Operators,
+    pencil: tuple[PETSc.Mat, PETSc.Mat],
+    projected: RollingModes,
+    count: int,
+    window: tuple[float, float],
+) -> tuple:
+    """The requested pairs or all in the window, figures, and the number missing. Collective."""
+    drag, full_stiffness = pencil
+    whole, s = (operators.mass, drag, full_stiffness), projected.states.eigenvalue
+    if not any(window):
+        found = quadratic.solve(*whole, count)
+        sizes = np.abs(found.eigenvalue), np.abs(s)
+        return found, {}, missing(*sizes, 0.0, float(sizes[0].max()))
+    mass, stiffness = beyond(projected.turning.damping, projected.basis.projection)
+    low, high = (2 * np.pi * f for f in window)
+    rate = mass + stiffness * high**2
+    below = int((np.abs(s) <= np.hypot(high, rate / 2)).sum())
+    found = quadratic.window(*whole, (low, high), rate, below)
+    inside = int(((s.imag >= low) & (s.imag <= high)).sum())
+    figures = {
+        "states in the window": (len(found.eigenvalue), "-"),
+        "projected states in the window": (inside, "-"),
+    }
+    return found, figures, missing(found.eigenvalue.imag, s.imag, low, high)
+
+
+def _orthonormal(operators: Operators, found: FullModes) -> tuple[np.ndarray, np.ndarray]:
+    """An M-orthonormal basis (own rows n, p) of all fields, and their coordinates (p, 4 q).
+    Collective.
+    """
+    comm, mass = operators.body.comm, operators.mass[:, None]
+    fields = np.hstack([found.right.real, found.right.imag, found.left.real, found.left.imag])
+    lengths = np.sqrt(comm.allreduce((mass * fields**2).sum(axis=0)))
+    lengths[lengths == 0] = 1.0  # the imaginary part of a real state
+    products = gram(comm, fields / lengths, mass * fields / lengths)
+    sizes, directions = np.linalg.eigh(products)
+    kept = sizes > _ROUNDING * sizes.max()
+    turn = directions[:, kept] / np.sqrt(sizes[kept])
+    coordinates = (directions[:, kept] * np.sqrt(sizes[kept])).T * lengths
+    return fields / lengths @ turn, coordinates
+
+
+def _states(found: FullModes, coordinates: np.ndarray) -> StateModes:
+    s, size = found.eigenvalue, len(coordinates)
+    real, imaginary, left_real, left_imaginary = np.split(coordinates, 4, axis=1)
+    weight = np.where(s.imag > 0, 2.0, 1.0)
+    return StateModes(
+        eigenvalue=s,
+        right=(real + 1j * imaginary) * weight,
+        left=(left_real + 1j * left_imaginary).T,
+        block=np.zeros((0, 0)),
+        block_right=np.zeros((size, 0)),
+        block_left=np.zeros((0, size)),
+        residual=found.residual,
+        left_residual=found.left_residual,
+        condition=found.condition,
+    )
+
+
+def _compared(found: FullModes, projected: StateModes) -> Figures:
+    """Truncation error of the projected eigenvalues, which tells whether there are enough modes."""
+    error = truncation(found.eigenvalue, projected.eigenvalue)
+    half = error[: max(len(error) // 2, 1)]
+    return {
+        "truncation error of the projected eigenvalues, lower half": (float(half.max()), "-"),
+        "truncation error of the projected eigenvalues": (float(error.max()), "-"),
+    }
+
 
 # Conditions above which vectors count as defective. Where the checks fail, a lower limit moves more
 # states into the block (observed beside the rigid motions of a free rim with air, on two processes

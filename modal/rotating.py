@@ -1,13 +1,32 @@
-"""The second eigenproblem on the modal basis: the rotating tire in the non-rotating frame.
+"""States of the rotating tire on its modes: eigenproblem, refinement, unrestrained motions.
+
+The decoupled equations of motion, and which of their eigenvalues grow.
+
+Refinement of inaccurate states of the companion matrix on the quadratic problem itself.
+
+The companion matrix of a wide spectrum determines its slow states only to rounding of the fast
+ones; the states of a free rim, close to rest, suffer most. Such a state gets one step of inverse
+iteration on the quadratic problem,
+
+    Q(s) u+ = u,   Q(s)^T w+ = w,   Q(s) = s^2 + s D + K,
+
+is normalised again, w^T (2 s + D) u = 1, and its eigenvalue follows from Lancaster's two-sided
+quotient,  s+ = s - w^T Q(s) u,  whose error is of second order in those of the vectors.
+
+The second eigenproblem on the modal basis: the rotating tire in the non-rotating frame.
 
     s^2 I + s (D_mod + 2 Omega G) + (Lambda + Omega^2 S + Omega D_mod B),  D_mod as in modal.damping
 
 (thesis (2.1)-(2.5), corrected; the doppler form takes B for G and S_B for S). Its response to modal
 forces is  eta = Re[R z] + R_b y,  z' = s z + L f,  y' = T y + L_b f:  a complex state per conjugate
 pair or real eigenvalue, and a real block for those that are nearly defective.
+
+Unrestrained motions, decoupled from all others: a wheel that drifts together with its car.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import linalg
@@ -15,10 +34,169 @@ from scipy import linalg
 from tireroad.fem.errors import ConvergenceError
 from tireroad.modal.basis import Projection
 from tireroad.modal.damping import Damping, rates
-from tireroad.modal.refined import AT_REST, at_rest, cleared, refined, residual
-from tireroad.modal.states import StateModes
+
+# Of the largest |s|. A smaller growth rate is rounding: an undamped state has 0 with either sign.
+GROWS = 1e-9
+# Of the largest |s|^2: what rounding of the pencil may add to an s^2.
+ROUNDING = 1e3 * np.finfo(float).eps
+
+
+def growing(eigenvalue: np.ndarray) -> np.ndarray:
+    """Mask (q,) of the eigenvalues (q,) 1/s of one problem that grow: Re s > 0 beyond rounding.
+
+    Rounding perturbs s^2 by a fraction of the largest s^2, hence s by that over 2 |s|, which is
+    large where s is near zero. A rigid motion, s^2 = 0, is computed with an s^2 of about
+    1e-10 1/s^2 of either sign; it drifts but does not grow.
+    """
+    size = np.abs(eigenvalue)
+    largest = size.max(initial=1.0)
+    rate = eigenvalue.real
+    return (rate > GROWS * largest) & (rate * size > ROUNDING * largest**2)
+
+
+@dataclass(frozen=True, kw_only=True)
+class StateModes:
+    """The decoupled equations of motion of m modal coordinates.
+
+    `eigenvalue` (q,) 1/s, Im >= 0; `right` (m, q), with the factor 2 of a conjugate pair included;
+    `left` (q, m), transposed, not conjugated, and divided by a_q. Nearly defective states are kept
+    as a real block: `block` (k, k), `block_right` (m, k), `block_left` (k, m). `residual`,
+    `left_residual` (q,) are relative to the terms of the quadratic problem; `condition` is the
+    worst condition of the eigenvectors that are kept. The last `rigid` states of the block belong
+    to rigid modes: they drift and have no static response.
+    """
+
+    eigenvalue: np.ndarray
+    right: np.ndarray
+    left: np.ndarray
+    block: np.ndarray
+    block_right: np.ndarray
+    block_left: np.ndarray
+    residual: np.ndarray
+    left_residual: np.ndarray
+    condition: float
+    rigid: int = 0
+
+    @property
+    def every(self) -> np.ndarray:
+        """All eigenvalues (q + k,) 1/s, those of the block last and with their conjugates."""
+        return np.concatenate([self.eigenvalue, np.linalg.eigvals(self.block)])
+
+    @property
+    def unstable(self) -> int:
+        """Number of eigenvalues that grow beyond rounding."""
+        return int(growing(self.every).sum())
+
+    @property
+    def fastest_growth(self) -> float:
+        """Largest Re s, 1/s."""
+        return float(self.every.real.max(initial=-np.inf))
+
 
 Array = np.ndarray
+
+# States slower than this fraction of the fastest have terms of rounding alone; a residual is
+# relative to at least this fraction of the fastest |s|^2.
+AT_REST = 1e-5
+_ROUGH = 1e-11  # residual above which a state is refined
+_MOST = 20  # refinements, a factorisation each; only a few slow states ever need one
+_SAME = 1e-4  # relative change beyond which inverse iteration has moved on to a neighbouring state
+
+
+def residual(drag: Array, stiffness: Array, values: Array, vectors: Array) -> Array:
+    """||(s^2 + s D + K) u|| over the sum of the norms of its terms, column by column."""
+
+    # Real by complex, without a complex copy of the matrix.
+    def times(matrix: Array) -> Array:
+        return matrix @ vectors.real + 1j * (matrix @ vectors.imag)
+
+    terms = (vectors * values**2, times(drag) * values, times(stiffness))
+    size = sum(np.linalg.norm(term, axis=0) for term in terms)
+    least = AT_REST * np.abs(values).max(initial=0.0) ** 2 * np.linalg.norm(vectors, axis=0)
+    return np.linalg.norm(sum(terms), axis=0) / np.maximum(size, least)
+
+
+def refined(
+    drag: Array,
+    stiffness: Array,
+    values: Array,
+    right: Array,
+    left: Array,
+) -> tuple[Array, Array, Array]:
+    """Values (q,), right (m, q) and left vectors (q, m), w^T (2 s + D) u = 1, the worst refined.
+
+    A state too close to another for one step to separate them is left unchanged.
+    """
+    rough = np.maximum(
+        residual(drag, stiffness, values, right), residual(drag.T, stiffness.T, values, left.T)
+    )
+    chosen = [k for k in np.argsort(-rough)[:_MOST] if rough[k] > _ROUGH]
+    values, right, left = values.copy(), right.copy(), left.copy()
+    for k in chosen:
+        better = _better(drag, stiffness, values[k], right[:, k], left[k])
+        if better is not None:
+            values[k], right[:, k], left[k] = better
+    return values, right, left
+
+
+def _better(
+    drag: Array, stiffness: Array, s: complex, u: Array, w: Array
+) -> tuple[complex, Array, Array] | None:
+    """One state after a refinement step, real if it was real; None if it turned into another."""
+    if s.imag == 0:
+        s, u, w = s.real, u.real, w.real
+    unit = np.eye(len(u))
+    matrix = s * (s * unit + drag) + stiffness
+    try:
+        u, before, w, also = np.linalg.solve(matrix, u), u, np.linalg.solve(matrix.T, w), w
+    except np.linalg.LinAlgError:  # the state is exact
+        return None
+    u, w = (x / np.abs(x).max() for x in (u, w))  # a nearly singular solve can return any length
+    u = u * (np.vdot(u, before) / np.vdot(u, u))  # the original length and phase
+    w = w / (w @ (2 * s * u + drag @ u))
+    same = np.linalg.norm(u - before) < _SAME * np.linalg.norm(before)
+    if not (same and np.linalg.norm(w - also) < _SAME * np.linalg.norm(also)):
+        return None
+    return s - w @ (s * (s * u + drag @ u) + stiffness @ u), u, w
+
+
+def cleared(
+    matrix: Array,
+    values: Array,
+    vectors: Array,
+    block: Array,
+    span: Array,
+    inverse: Array,
+) -> Array:
+    """Eigenvectors (n, q) of a real matrix (n, n), cleared of an invariant subspace.
+
+    The subspace, which contains none of them, is spanned by `span` (n, b), on which the matrix is
+    T = `block` (b, b); `inverse` (b, n) is its left basis. One first-order step: with
+    r = A v - s v,  v+ = v + span (s - T)^-1 inverse r. The left vectors of drifting motions are so
+    long that the rounding of fast vectors is amplified a million times along them.
+    """
+    if not len(block):
+        return vectors
+    rest = matrix @ vectors.real + 1j * (matrix @ vectors.imag) - vectors * values
+    shifted = values[:, None, None] * np.eye(len(block)) - block
+    share = np.linalg.solve(shifted, (inverse @ rest).T[:, :, None])[:, :, 0]
+    return vectors + span @ share.T
+
+
+def at_rest(matrix: Array, span: Array, shift: float) -> tuple[Array, Array]:
+    """(T, V) of a real matrix (n, n) on its invariant subspace of nearly zero eigenvalues.
+
+    `span` (n, b), orthonormal, is improved by inverse iteration at the `shift`, far below all other
+    eigenvalues. T = shift + (V^T (A - shift)^-1 V)^-1, so entries that are small beside the matrix
+    are not lost in A V.
+    """
+    factor = linalg.lu_factor(matrix - shift * np.eye(len(matrix)))
+    for _ in range(2):
+        span = np.linalg.qr(linalg.lu_solve(factor, span))[0]
+    inverse = span.T @ linalg.lu_solve(factor, span)
+    return shift * np.eye(len(inverse)) + np.linalg.inv(inverse), span
+
+
 DEFECTIVE = 1e6  # above, an eigenvector has lost six of sixteen digits, and goes to the block
 SINGULAR = 1e13  # condition of K~ above which it counts as singular
 # States at rest go to the block, as rigid modes do, unless there is one, of at most this condition.
@@ -243,4 +421,29 @@ def _invariant(companion: Array, values: Array, good: Array) -> tuple[Array, Arr
         f"rotating: {len(chosen)} eigenvalues next to defective ones ({np.abs(chosen).min():.4g} to "
         f"{np.abs(chosen).max():.4g} 1/s) cannot be distinguished from others. Change the damping or the speed a "
         "little."
+    )
+
+
+# Conditions above which vectors count as defective. Where the checks fail, a lower limit moves more
+# states into the block (observed beside the rigid motions of a free rim with air, on two processes
+# of three).
+
+
+def beside(drag: np.ndarray, stiffness: np.ndarray, adrift: np.ndarray) -> StateModes:
+    """`rotating` where the orthonormal motions `adrift` (m, r) meet no stiffness or damping.
+
+    They are split off exactly and drift in a block of their own.
+    """
+    m, r = adrift.shape
+    others = linalg.qr(adrift)[0][:, r:]
+    found = rotating(others.T @ drag @ others, others.T @ stiffness @ others)
+    block, right, left = companion_blocks(np.arange(r), np.zeros(r), np.zeros(r), r)
+    return replace(
+        found,
+        right=others @ found.right,
+        left=found.left @ others.T,
+        block=linalg.block_diag(found.block, block),
+        block_right=np.hstack([others @ found.block_right, adrift @ right]),
+        block_left=np.vstack([found.block_left @ others.T, left @ adrift.T]),
+        rigid=2 * r,
     )

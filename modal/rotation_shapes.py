@@ -32,10 +32,9 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.compliance import LoadedShapes
 from tireroad.fem.matrices.operators import Operators, Rotation
 from tireroad.fem.turning import Turning
-from tireroad.modal.basis import Projection
-from tireroad.modal.joined import combined, joined, take_off
+from tireroad.modal.basis import Projection, combined, joined, take_off
 from tireroad.modal.solver.fields import gram, multiply
-from tireroad.modal.solver.modes import Modes
+from tireroad.modal.solver.slicing import Modes
 
 Array = np.ndarray
 

@@ -12,11 +12,10 @@ from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.static.path.journal import Journal
 from tireroad.fem.turning import Turning
-from tireroad.modal.basis import ModalBasis, project
-from tireroad.modal.joined import with_air, with_corner
+from tireroad.modal.basis import ModalBasis, project, with_air, with_corner
 from tireroad.modal.rotation_shapes import with_rotation_shapes
 from tireroad.modal.solver import undamped
-from tireroad.modal.solver.modes import Modes
+from tireroad.modal.solver.slicing import Modes
 from tireroad.modal.solver.symmetry import Sites
 
 _COUNT, _UP_TO = Limits(least=1), Limits(least=1e-3)  # -, Hz

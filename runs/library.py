@@ -32,10 +32,9 @@ from tireroad.fem.static.virtual_work import AT_REST
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import Material, compound
 from tireroad.fem.turning import Turning
-from tireroad.greens.coupling import Wheel
+from tireroad.greens.coupling import Wheel, wheel_of
 from tireroad.greens.response import Response
 from tireroad.greens.responses import make_response
-from tireroad.greens.small_motions import wheel_of
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes, rolling_modes
 from tireroad.modal.standing import standing_modes

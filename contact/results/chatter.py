@@ -25,7 +25,7 @@ from scipy import linalg
 from tireroad.contact.model import Spec, touching_compliance, tread_shear
 from tireroad.contact.patch import Patch
 from tireroad.fem.errors import ConvergenceError
-from tireroad.greens.residual.alternating import alternating, at_once
+from tireroad.greens.recursion import alternating, at_once
 from tireroad.greens.response import Response
 
 Stiffness = float | np.ndarray

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tireroad.greens.one_step import ahead_of_mean
+from tireroad.greens.recursion import ahead_of_mean
 
 AT_ONCE = 64  # steps of which the work is computed at a time: it takes nine arrays of their size
 

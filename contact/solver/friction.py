@@ -21,7 +21,7 @@ from tireroad.contact.solver.tangential import Stiffness, stick_slip
 from tireroad.contact.tread.brush import Brush
 from tireroad.contact.tread.shear import Between, Shear
 from tireroad.fem.errors import ConvergenceError
-from tireroad.greens.residual.sparse_columns import LoadedColumns
+from tireroad.greens.recursion import LoadedColumns
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from tireroad.contact.tread.kernel import KernelTread
-from tireroad.greens.residual.sparse_columns import LoadedColumns
+from tireroad.greens.recursion import LoadedColumns
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]

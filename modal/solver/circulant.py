@@ -23,9 +23,9 @@ from petsc4py import PETSc
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from tireroad.modal.solver.distributed import congruent, largest_entry, less, row_sum, rows_of
+from tireroad.modal.solver.fields import congruent, largest_entry, less, row_sum, rows_of
+from tireroad.modal.solver.slicing import ALONE, Team
 from tireroad.modal.solver.symmetry import TOLERANCE, Sites
-from tireroad.modal.solver.team import ALONE, Team
 
 _NEAR = 1e-6  # of the body's size: distance within which nodes are images of each other
 _LONGEST = 4  # most nodes of a segment along the ring

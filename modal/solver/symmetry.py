@@ -21,9 +21,8 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from tireroad.fem.collective import joined
-from tireroad.modal.solver.distributed import largest_entry, rows_of
-from tireroad.modal.solver.fields import multiply
-from tireroad.modal.solver.team import Team
+from tireroad.modal.solver.fields import largest_entry, multiply, rows_of
+from tireroad.modal.solver.slicing import Team
 
 # Largest entry of R A R - A relative to that of A. A symmetric state converges to about 1e-13; a
 # road load, a slope of the footprint or a different mesh on one side gives 1e-6 and more.

@@ -21,18 +21,16 @@ from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.static.path.journal import Journal
 from tireroad.modal.solver.canonical import ordered, turn_to_rule
 from tireroad.modal.solver.circulant import repeated
-from tireroad.modal.solver.distributed import row_sum
 from tireroad.modal.solver.fields import (
     CHUNK,
     collect,
     multiply,
     orthonormalise,
+    row_sum,
     scaled_by,
 )
-from tireroad.modal.solver.modes import Modes
-from tireroad.modal.solver.spectrum import Bottom, Part, Slice, Spectrum
+from tireroad.modal.solver.slicing import Bottom, Modes, Part, Slice, Spectrum, Team
 from tireroad.modal.solver.symmetry import Sites, sectors, symmetries, whole
-from tireroad.modal.solver.team import Team
 
 RESIDUAL_TOLERANCE = 1e-8  # relative, per eigenpair
 MOST = 1e-6  # where rounding alone exceeds the tolerance

@@ -17,8 +17,7 @@ from tireroad.contact.rolling import Drive, roll
 from tireroad.contact.solver.choose import make_solver
 from tireroad.contact.tread.compliance import half_space_compliance
 from tireroad.fem.errors import ConvergenceError
-from tireroad.greens.recursion import Recursion
-from tireroad.greens.sharing import SHARED_FROM, sharers
+from tireroad.greens.recursion import SHARED_FROM, Recursion, sharers
 from tireroad.runs.measure.synthetic import Strip, oval_patch
 from tireroad.runs.measure.tabulate import Table
 

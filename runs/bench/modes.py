@@ -196,8 +196,8 @@ def _interval(matrix, top: float) -> int:
 def _rolling(comm: MPI.Comm, operators, modes) -> tuple[Table, float]:
     """The projected problem at 50 rad/s on parts of a basis: time, error of the lowest states."""
     from tireroad.modal.basis import project
+    from tireroad.modal.rolling import truncation
     from tireroad.modal.rotating import checks, matrices, rotating
-    from tireroad.modal.solver.agreement import truncation
 
     observe.say("projected states ...")
     projection = project(modes, operators.rotation(), operators.carried, comm)

@@ -16,11 +16,10 @@ from tireroad.fem.static.state import static_state
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
 from tireroad.fem.turning import Turning
-from tireroad.greens.coupling import Basis, Wheel
+from tireroad.greens.coupling import Basis, Wheel, wheel_of
 from tireroad.greens.recursion import Recursion
-from tireroad.greens.residual.state_selection import keep
-from tireroad.greens.residual.truncation import Cutoff, estimate
-from tireroad.greens.small_motions import wheel_of
+from tireroad.greens.response import keep
+from tireroad.greens.responses import Cutoff, estimate
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes, rolling_modes
 from tireroad.modal.standing import standing_modes

@@ -13,8 +13,7 @@ from tireroad.fem.static.state import StaticState
 from tireroad.modal.basis import ModalBasis, Projection
 from tireroad.modal.damping import Damping, StrainEnergy
 from tireroad.modal.rotation_shapes import up_to
-from tireroad.modal.solver.modes import Modes
-from tireroad.modal.solver.team import how_many
+from tireroad.modal.solver.slicing import Modes, how_many
 from tireroad.modal.standing import projected, solved, with_fields
 from tireroad.modal.waves import Labels, label
 from tireroad.runs.process import observe

@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 
 from tireroad.fem.static.state import StaticState
-from tireroad.greens.axle import remaining
 from tireroad.greens.coupling import Wheel
+from tireroad.greens.outputs import remaining
 from tireroad.modal.basis import ModalBasis
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe

@@ -11,13 +11,11 @@ import numpy as np
 from tireroad.fem.cavity.column import Column
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.parallel import on_root
-from tireroad.greens.coupling import Wheel
-from tireroad.greens.small_motions import wheel_of
+from tireroad.greens.coupling import Wheel, wheel_of
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.campbell import Campbell, critical_speed, growth, onset, sweep
 from tireroad.modal.damping import Proportional, StrainEnergy
-from tireroad.modal.full_states import full_states
-from tireroad.modal.rolling import RollingModes, rolling_modes
+from tireroad.modal.rolling import RollingModes, full_states, rolling_modes
 from tireroad.modal.rotating import StateModes
 from tireroad.runs.files.store import put
 from tireroad.runs.stages.base.job import Job

@@ -13,7 +13,7 @@ from tireroad.contact.results.spectra import amplitudes
 from tireroad.fem.errors import InputError
 from tireroad.fem.static.state import StaticState
 from tireroad.greens.basis import Basis
-from tireroad.greens.vibration import Surface, mean_square_velocity, radiated_power
+from tireroad.greens.outputs import Surface, mean_square_velocity, radiated_power
 from tireroad.runs.files.store import put
 from tireroad.runs.stages.base.stage import Done
 from tireroad.runs.stages.build.forces import Forces

@@ -13,8 +13,8 @@ from scipy import sparse
 
 from tireroad.fem.matrices.receptance import receptance
 from tireroad.fem.model import SmallMotions
-from tireroad.greens.axle import by_free_rim, by_momentum, from_moment
-from tireroad.greens.small_motions import wheel_of
+from tireroad.greens.coupling import wheel_of
+from tireroad.greens.outputs import by_free_rim, by_momentum, from_moment
 from tireroad.modal.corner import MOMENTS
 from tireroad.modal.standing import solved
 from tireroad.runs.measure.tabulate import Table

@@ -18,8 +18,8 @@ from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
 from tireroad.fem.transient.linear import FullTire
-from tireroad.greens.axle import by_free_rim
 from tireroad.greens.coupling import Basis, Wheel
+from tireroad.greens.outputs import by_free_rim
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import couple
 from tireroad.modal.basis import project

@@ -14,8 +14,8 @@ from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.path.loading import Loader
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
+from tireroad.greens import coupling
 from tireroad.greens.coupling import Basis, Wheel
-from tireroad.greens.residual import attachment
 from tireroad.modal.basis import project
 from tireroad.modal.solver import undamped
 from tireroad.runs.measure.torus import thesis_torus
@@ -58,10 +58,10 @@ def test_what_is_left_out_is_within_the_tolerance(tire, speed, monkeypatch):
     projection = project(modes, wheel.rotation, operators.carried, COMM)
     shape = operators.trace(modes.vectors)
     basis = Basis(shape=shape, projection=projection, states=wheel.decouple(projection, COMM))
-    monkeypatch.setattr(attachment, "FEW", 0)
+    monkeypatch.setattr(coupling, "FEW", 0)
     reduced = wheel.respond(basis, modes, probes, probes, "attachment")
-    monkeypatch.setattr(attachment, "TOLERANCE", 0.0)
-    monkeypatch.setattr(attachment, "FASTEST", np.inf)
+    monkeypatch.setattr(coupling, "TOLERANCE", 0.0)
+    monkeypatch.setattr(coupling, "FASTEST", np.inf)
     every = wheel.respond(basis, modes, probes, probes, "attachment")
     frequency = np.linspace(0.0, modes.frequency[-1] / 2, 8)
     exact = every.receptance(frequency)
@@ -97,21 +97,21 @@ def test_directions_that_are_left_out_add_up_to_less_than_the_tolerance():
     turn = np.linalg.qr(random.standard_normal((40, 40)))[0]
     missing = turn @ np.diag(np.logspace(0, -9, 40)) @ turn.T
     own = 3.0 * np.diag(missing)
-    kept = attachment.foremost(missing, own)
+    kept = coupling.foremost(missing, own)
     assert 5 < kept.shape[1] < 30
     lost = missing - kept @ (kept.T @ missing @ kept) @ kept.T
-    assert (np.abs(lost) <= attachment.TOLERANCE * np.sqrt(np.outer(own, own))).all()
-    assert attachment.foremost(missing, 1e-30 * own).shape[1] == 40
-    assert attachment.foremost(missing, 1e6 * own).shape[1] == 0
+    assert (np.abs(lost) <= coupling.TOLERANCE * np.sqrt(np.outer(own, own))).all()
+    assert coupling.foremost(missing, 1e-30 * own).shape[1] == 40
+    assert coupling.foremost(missing, 1e6 * own).shape[1] == 0
 
 
 def test_points_closer_than_nodes_need_no_load_each():
     """Their unit loads and weights make them up again; fewer points than touched numbers stay as they are."""
     random = np.random.default_rng(3)
     probes = sparse.csr_matrix(random.random((12, 4)) @ np.eye(30)[[3, 7, 8, 21]])
-    weights, loads = attachment.fewest(probes)
+    weights, loads = coupling.fewest(probes)
     assert loads.shape == (4, 30)
     np.testing.assert_array_equal((weights @ loads).toarray(), probes.toarray())
-    weights, loads = attachment.fewest(probes[:3])
+    weights, loads = coupling.fewest(probes[:3])
     assert loads.shape == (3, 30)
     np.testing.assert_array_equal((weights @ loads).toarray(), probes[:3].toarray())

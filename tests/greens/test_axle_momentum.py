@@ -6,9 +6,9 @@ from mpi4py import MPI
 from scipy import sparse
 
 from tireroad.fem.turning import Turning
-from tireroad.greens.axle import by_momentum
 from tireroad.greens.basis import Basis
-from tireroad.greens.completed import with_left_out
+from tireroad.greens.coupling import with_left_out
+from tireroad.greens.outputs import by_momentum
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import couple
 from tireroad.modal.basis import Projection

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from systems import make
 
-from tireroad.greens.residual.state_selection import keep, participation
-from tireroad.greens.residual.truncation import Cutoff, estimate
+from tireroad.greens.response import keep, participation
+from tireroad.greens.responses import Cutoff, estimate
 
 
 def error(found, exact, frequency) -> np.ndarray:

@@ -21,12 +21,11 @@ from tireroad.fem.static.path.loading import Loader
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
-from tireroad.greens.axle import by_free_rim
 from tireroad.greens.coupling import Basis, Wheel
+from tireroad.greens.outputs import by_free_rim
 from tireroad.greens.response import couple
-from tireroad.modal.basis import project
+from tireroad.modal.basis import project, with_corner
 from tireroad.modal.corner import SEEN
-from tireroad.modal.joined import with_corner
 from tireroad.modal.solver import undamped
 from tireroad.modal.standing import sites
 from tireroad.runs.measure.torus import thesis_torus

@@ -17,12 +17,11 @@ from tireroad.fem.static.path.loading import Loader
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
 from tireroad.greens.coupling import Basis, Wheel
-from tireroad.greens.residual.truncation import Cutoff, estimate, estimate_axle, relative
-from tireroad.modal.basis import project
-from tireroad.modal.joined import joined
+from tireroad.greens.responses import Cutoff, estimate, estimate_axle, relative
+from tireroad.modal.basis import joined, project
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.fields import gram, multiply
-from tireroad.modal.solver.modes import Modes
+from tireroad.modal.solver.slicing import Modes
 from tireroad.runs.measure.torus import thesis_torus
 
 MATERIAL = {

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from systems import make
 
-from tireroad.greens.residual.second_order import Moments, second_order
+from tireroad.greens.basis import Moments, second_order
 from tireroad.greens.response import couple
 from tireroad.modal.rotating import rotating
 

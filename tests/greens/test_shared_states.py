@@ -10,9 +10,8 @@ from systems import make
 from test_recursion import STEPS, march, some_force
 
 from tireroad.contact.solver.together import Solved, Together
-from tireroad.greens import sharing
-from tireroad.greens.recursion import Recursion
-from tireroad.greens.sharing import sharers
+from tireroad.greens import recursion
+from tireroad.greens.recursion import Recursion, sharers
 
 
 @pytest.mark.mpi
@@ -82,7 +81,7 @@ def test_a_small_loop_is_not_shared_out(monkeypatch: pytest.MonkeyPatch) -> None
     """Each process takes all of it, and a large one its part: the same motion, the same states at a checkpoint."""
     response, force = make(speed=60.0).response(), some_force(4)
     assert sharers(response, MPI.COMM_WORLD).size == 1
-    monkeypatch.setattr(sharing, "SHARED_FROM", 0.0)
+    monkeypatch.setattr(recursion, "SHARED_FROM", 0.0)
     found = []
     for comm in (MPI.COMM_SELF, sharers(response, MPI.COMM_WORLD)):
         tire = Recursion(response=response, step=1e-3, scheme="linear", comm=comm)
@@ -101,7 +100,7 @@ def test_processes_that_round_otherwise_do_not_share_a_loop(
 ) -> None:
     """Nodes of two kinds: each process would go on by its own rounding, and wait for messages that never come."""
     response = make(speed=60.0).response()
-    monkeypatch.setattr(sharing, "SHARED_FROM", 0.0)
+    monkeypatch.setattr(recursion, "SHARED_FROM", 0.0)
     assert sharers(response, MPI.COMM_WORLD).size == MPI.COMM_WORLD.size
-    monkeypatch.setattr(sharing, "_kernels", lambda: f"kernels of {MPI.COMM_WORLD.rank}")
+    monkeypatch.setattr(recursion, "_kernels", lambda: f"kernels of {MPI.COMM_WORLD.rank}")
     assert sharers(response, MPI.COMM_WORLD).size == 1

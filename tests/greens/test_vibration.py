@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tireroad.contact.results.levels import a_weighting, band_sums
-from tireroad.greens.vibration import Surface, mean_square_velocity
+from tireroad.greens.outputs import Surface, mean_square_velocity
 
 
 def _sphere(n: int) -> tuple[np.ndarray, np.ndarray]:

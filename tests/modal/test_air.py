@@ -6,7 +6,7 @@ from scipy import linalg
 
 from tireroad.fem.cavity import duct
 from tireroad.fem.cavity.gas import Gas, inflated
-from tireroad.modal.air import Air
+from tireroad.modal.basis import Air
 from tireroad.modal.rotating import checks, rotating
 
 GAS = inflated(2.2e5, 293.15)

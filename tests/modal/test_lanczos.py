@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from tireroad.modal.solver.lanczos import BLOCK, nearest
-from tireroad.modal.solver.shifted import Shifted
-from tireroad.modal.solver.slices import Interval, eigenpairs
+from tireroad.modal.solver.slicing import BLOCK, Interval, Shifted, eigenpairs, nearest
 
 SIZE = 320
 

@@ -8,8 +8,8 @@ from rings import random_tire, wave_ring
 from scipy import sparse
 
 from tireroad.fem.errors import ConvergenceError
+from tireroad.modal.rolling import missing, truncation
 from tireroad.modal.rotating import matrices, rotating
-from tireroad.modal.solver.agreement import missing, truncation
 from tireroad.modal.solver.fields import multiply
 from tireroad.modal.solver.quadratic import solve
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from tireroad.modal import rotating as room
-from tireroad.modal.refined import AT_REST, at_rest, refined, residual
-from tireroad.modal.rotating import checks, rotating
+from tireroad.modal.rotating import AT_REST, at_rest, checks, refined, residual, rotating
 
 
 def free_rim(drift: float, count: int = 40) -> tuple[np.ndarray, np.ndarray]:

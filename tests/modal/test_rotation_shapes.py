@@ -21,7 +21,7 @@ from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.wall import compounds
 from tireroad.fem.turning import Turning
 from tireroad.greens.basis import Basis
-from tireroad.greens.small_motions import wheel_of
+from tireroad.greens.coupling import wheel_of
 from tireroad.modal.basis import project
 from tireroad.modal.rolling import rolling_modes
 from tireroad.modal.rotation_shapes import TOLERANCE, up_to, with_rotation_shapes

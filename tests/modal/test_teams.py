@@ -9,9 +9,8 @@ from mpi4py import MPI
 from test_circulant import ring
 
 from tireroad.modal.solver import undamped
-from tireroad.modal.solver.shifted import Shifted
+from tireroad.modal.solver.slicing import Shifted, Team, how_many
 from tireroad.modal.solver.symmetry import Sites, sectors, symmetries
-from tireroad.modal.solver.team import Team, how_many
 
 COMM = MPI.COMM_WORLD
 NODES, COUNT = 520, 90

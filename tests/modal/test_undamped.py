@@ -8,9 +8,8 @@ from scipy import sparse
 
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.modal.solver import undamped
-from tireroad.modal.solver.boundaries import merged
 from tireroad.modal.solver.fields import gram, multiply
-from tireroad.modal.solver.modes import Modes
+from tireroad.modal.solver.slicing import Modes, merged
 from tireroad.modal.solver.symmetry import Sites
 from tireroad.modal.standing import solved
 

@@ -7,8 +7,7 @@ import pytest
 from mpi4py import MPI
 from scipy import linalg
 
-from tireroad.greens.one_step import _phi
-from tireroad.greens.recursion import Recursion
+from tireroad.greens.recursion import Recursion, _phi
 from tireroad.greens.response import couple
 from tireroad.modal.basis import Projection
 from tireroad.modal.rotating import rotating, standing

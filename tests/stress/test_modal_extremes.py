@@ -15,7 +15,7 @@ from tireroad.modal.basis import project
 from tireroad.modal.campbell import critical_speed, growth, onset
 from tireroad.modal.rotating import checks, matrices, rotating
 from tireroad.modal.solver import undamped
-from tireroad.modal.solver.modes import Modes
+from tireroad.modal.solver.slicing import Modes
 from tireroad.modal.standing import sites
 from tireroad.runs.measure.torus import thesis_torus
 

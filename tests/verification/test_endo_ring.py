@@ -21,7 +21,7 @@ from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.mesh import Torus
 from tireroad.modal.basis import project
 from tireroad.modal.rotating import matrices, rotating
-from tireroad.modal.solver.modes import Modes
+from tireroad.modal.solver.slicing import Modes
 from tireroad.modal.waves import label
 
 R, H, E, RHO = 0.3, 0.003, 4.8e8, 1200.0

@@ -22,9 +22,9 @@ from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
 from tireroad.fem.turning import Turning
+from tireroad.greens.coupling import wheel_of
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.responses import make_response
-from tireroad.greens.small_motions import wheel_of
 from tireroad.modal.damping import StrainEnergy
 from tireroad.modal.rolling import rolling_modes
 from tireroad.modal.standing import standing_modes

@@ -12,9 +12,9 @@ from tireroad.fem.static.path.loading import Loader
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
 from tireroad.modal.basis import project
+from tireroad.modal.rolling import truncation
 from tireroad.modal.rotating import checks, matrices, rotating
 from tireroad.modal.solver import quadratic, undamped
-from tireroad.modal.solver.agreement import truncation
 from tireroad.modal.standing import sites
 from tireroad.runs.measure.torus import thesis_torus
 

@@ -15,7 +15,7 @@ from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
 from tireroad.modal.solver import undamped
-from tireroad.modal.solver.modes import Modes
+from tireroad.modal.solver.slicing import Modes
 from tireroad.modal.standing import sites
 from tireroad.runs.measure.torus import thesis_torus
 

@@ -30,8 +30,7 @@ def _static(scene: Scene) -> str:
 
 def _modes(scene: Scene) -> str:
     from tireroad.modal.rotation_shapes import TOLERANCE as shapes
-    from tireroad.modal.solver.lanczos import BLOCK
-    from tireroad.modal.solver.slices import TOLERANCE
+    from tireroad.modal.solver.slicing import BLOCK, TOLERANCE
     from tireroad.modal.solver.undamped import ORTHONORMALITY_TOLERANCE, RESIDUAL_TOLERANCE
 
     return (

@@ -10,8 +10,7 @@ import numpy as np
 
 from tireroad.fem.cavity.duct import Duct
 from tireroad.fem.model import SmallMotions
-from tireroad.modal.air import Air
-from tireroad.modal.basis import ModalBasis
+from tireroad.modal.basis import Air, ModalBasis
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
 from tireroad.runs.scene.tables.cavity import has_air

@@ -11,7 +11,7 @@ from scipy import sparse
 from tireroad.contact.patch import Patch
 from tireroad.fem.axle import Axle
 from tireroad.greens.basis import Basis
-from tireroad.greens.blocked import disagreement
+from tireroad.greens.outputs import disagreement
 from tireroad.modal.corner import ARRAYS, SEEN, Corner
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put

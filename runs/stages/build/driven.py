@@ -9,11 +9,10 @@ from scipy import sparse
 
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.static.state import StaticState
-from tireroad.greens.axle import by_free_rim
-from tireroad.greens.coupling import Wheel
+from tireroad.greens.coupling import Wheel, wheel_of
+from tireroad.greens.outputs import by_free_rim
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
-from tireroad.greens.small_motions import wheel_of
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.standing import standing_modes
 from tireroad.runs.stages.base.job import Job

@@ -88,7 +88,7 @@ class Transmissibility(Output):
         From the momentum of the response's states and, if the scene asks for it, from modes of the
         tire with a free rim (greens.axle); each checks the other. Collective.
         """
-        from tireroad.greens.axle import by_momentum
+        from tireroad.greens.outputs import by_momentum
 
         frequency = self.step * np.arange(1, round(self.to / self.step) + 1)
         loads, _ = seen.points()

@@ -13,7 +13,7 @@ import numpy as np
 
 from tireroad.fem.matrices.operators import Operators
 from tireroad.modal.basis import ModalBasis, same_fields
-from tireroad.modal.solver.modes import Modes
+from tireroad.modal.solver.slicing import Modes
 from tireroad.runs.files.store import put
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.stages.base.job import Job

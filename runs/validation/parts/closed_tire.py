@@ -19,7 +19,7 @@ from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import couple
 from tireroad.modal.basis import Projection, project
 from tireroad.modal.rotating import matrices, rotating, standing
-from tireroad.modal.solver.modes import Modes
+from tireroad.modal.solver.slicing import Modes
 
 FLAT = 1e6  # m, radius of the section circle: the part of the torus in use is a cylinder
 COMM = MPI.COMM_SELF

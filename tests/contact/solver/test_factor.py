@@ -8,7 +8,7 @@ from tireroad.contact.solver.complementarity import ActiveSet
 from tireroad.contact.solver.factor import ActiveFactor
 from tireroad.contact.solver.grid_compliance import MatrixCompliance
 from tireroad.fem.errors import ConvergenceError
-from tireroad.greens.residual.sparse_columns import LoadedColumns
+from tireroad.greens.recursion import LoadedColumns
 
 
 def compliance(rng: np.random.Generator, n: int) -> np.ndarray:

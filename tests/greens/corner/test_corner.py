@@ -22,10 +22,9 @@ from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
 from tireroad.fem.turning import Turning
 from tireroad.greens.basis import Basis
-from tireroad.greens.blocked import disagreement
 from tireroad.greens.coupling import Wheel
-from tireroad.modal.basis import project
-from tireroad.modal.joined import with_corner
+from tireroad.greens.outputs import disagreement
+from tireroad.modal.basis import project, with_corner
 from tireroad.modal.rolling import decouple
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.fields import everywhere

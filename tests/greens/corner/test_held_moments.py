@@ -24,11 +24,9 @@ from tireroad.greens.basis import Basis
 from tireroad.greens.coupling import Wheel
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
-from tireroad.modal.basis import ModalBasis
+from tireroad.modal.basis import ModalBasis, with_corner
 from tireroad.modal.corner import SEEN
-from tireroad.modal.full_states import full_states
-from tireroad.modal.joined import with_corner
-from tireroad.modal.rolling import RollingModes, decouple
+from tireroad.modal.rolling import RollingModes, decouple, full_states
 from tireroad.modal.solver.fields import everywhere
 
 HELD = 2  # the place of the held axle in `wheel`

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from scipy import sparse
 from tireroad.runs.process.memory import factors_on_disk
-from tireroad.modal.solver.shifted import Shifted
+from tireroad.modal.solver.slicing import Shifted
 folder = Path({folder!r}) / "factors"
 folder.mkdir()
 matrix = sparse.diags([-1.0, 2.5, -1.0], [-1, 0, 1], shape=(900, 900), format="csr")

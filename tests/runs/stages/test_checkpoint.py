@@ -16,8 +16,8 @@ from mpi4py import MPI
 
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.timing import Timing
-from tireroad.modal.solver import spectrum
-from tireroad.modal.solver.spectrum import Spectrum
+from tireroad.modal.solver import slicing
+from tireroad.modal.solver.slicing import Spectrum
 from tireroad.runs.process.signals import Stopped
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.pipeline import run_scene
@@ -155,7 +155,7 @@ def test_modes(folder: Path, monkeypatch) -> None:
     if COMM.rank == 0:
         (folder / "broken").mkdir()
         (folder / "broken" / "static.h5").write_bytes((folder / "whole" / "static.h5").read_bytes())
-    sliced = counted(monkeypatch, spectrum, "eigenpairs")
+    sliced = counted(monkeypatch, slicing, "eigenpairs")
     run(scene, folder / "whole", "modes")
     whole = len(sliced)
     if COMM.size == 1:

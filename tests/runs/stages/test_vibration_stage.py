@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 import tireroad
 from tireroad.fem.errors import InputError
-from tireroad.greens.vibration import Surface
+from tireroad.greens.outputs import Surface
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.pipeline import run_scene
 

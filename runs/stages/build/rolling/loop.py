@@ -16,9 +16,8 @@ from tireroad.contact.setup import ContactSetup
 from tireroad.contact.solver.friction import Friction
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.free_rolling import free_slip
-from tireroad.greens.recursion import Recursion
+from tireroad.greens.recursion import Recursion, sharers
 from tireroad.greens.response import Response
-from tireroad.greens.sharing import sharers
 from tireroad.runs.stages.base.job import Job
 from tireroad.runs.stages.build import corner
 from tireroad.runs.stages.build.point_forces import directions, histories

@@ -8,9 +8,8 @@ import numpy as np
 
 from tireroad.contact.steps import equal_steps, steps_of
 from tireroad.greens.convolution import Convolution
-from tireroad.greens.recursion import Recursion
+from tireroad.greens.recursion import Recursion, sharers
 from tireroad.greens.response import Response
-from tireroad.greens.sharing import sharers
 from tireroad.runs.process import observe
 from tireroad.runs.scene.tables.contact import Time
 from tireroad.runs.scene.tables.scene import Road

@@ -1,1 +1,0 @@
-"""Truncated modes: static and dynamic residual flexibility, and estimates of their error."""
