@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
+from scipy import sparse
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.timing import Timing
@@ -189,11 +190,18 @@ class HeldSystem:
         """Unit forces at free dofs; for held ones the forces of a unit motion on the free ones."""
         assert self._pull is not None, "columns() before take()"
         held = np.isin(dofs, self._held)
-        moved = self._dense(right.getSize()[1], self._pull.getSizes()[1])
-        moved.getDenseArray()[np.searchsorted(self._held, dofs[held]), numbers[held]] = -1.0
-        moved.assemble()
+        count = right.getSize()[1]
+        # Sparse: PETSc 3.25 crashes in the product with a dense matrix that has no row on a process.
+        at = np.searchsorted(self._held, dofs[held]), numbers[held]
+        shape = len(self._held), count
+        unit = sparse.csr_matrix((np.full(len(at[0]), -1.0), at), shape)
+        sizes = self._pull.getSizes()[1], (None, count)
+        csr = unit.indptr, unit.indices, unit.data
+        moved = PETSc.Mat().createAIJ(sizes, csr=csr, comm=self._comm)
         forces = self._pull.matMult(moved)
-        right.getDenseArray()[:] = forces.getDenseArray()
+        indptr, indices, values = forces.getValuesCSR()
+        dense = right.getDenseArray()
+        dense[:] = sparse.csr_matrix((values, indices, indptr), dense.shape).toarray()
         right.getDenseArray()[self._held] = 0.0
         right.getDenseArray()[dofs[~held], numbers[~held]] = 1.0
         right.assemble()
@@ -204,9 +212,8 @@ class HeldSystem:
         """The motion of all owned dofs, including dependent ones: here there are none."""
         return motion
 
-    def _dense(self, count: int, rows: tuple | None = None) -> PETSc.Mat:
-        rows = rows or self._x.getSizes()
-        matrix = PETSc.Mat().createDense((rows, (None, count)), comm=self._comm)
+    def _dense(self, count: int) -> PETSc.Mat:
+        matrix = PETSc.Mat().createDense((self._x.getSizes(), (None, count)), comm=self._comm)
         matrix.setUp()
         return matrix
 

@@ -18,6 +18,7 @@ pytestmark = pytest.mark.slow
 
 CODE = """
 import sys
+import tireroad
 import ufl
 from dolfinx import mesh
 from mpi4py import MPI
