@@ -9,12 +9,12 @@ from typing import Any, Protocol
 import numpy as np
 
 from tireroad.contact.grid_patch import Surface, make_grid_patch, settle, spread_pull
+from tireroad.contact.loop import Drive
 from tireroad.contact.model import Spec, static_solver
 from tireroad.contact.patch import LEAST_REACH, Patch, make_patch
 from tireroad.contact.roads.cell_mean import CellMean
 from tireroad.contact.roads.kinds.flat import Flat
 from tireroad.contact.roads.under_tire import PreparedRoad, RoadUnderTire
-from tireroad.contact.rolling import Drive
 from tireroad.contact.tread.pattern import Pattern
 from tireroad.fem.static.curved.shape import RoadShape
 from tireroad.greens.response import Response

@@ -8,14 +8,13 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from tireroad.contact.loop import Instant, Steps, check_times, equal_steps, roll
 from tireroad.contact.patch import Patch
 from tireroad.contact.results.chatter import choose, oscillation
 from tireroad.contact.results.limits import Limit, limits, lowest, pitch
 from tireroad.contact.results.spectra import amplitudes, third_octaves
 from tireroad.contact.roads.under_tire import RoadUnderTire
-from tireroad.contact.rolling import Instant, roll
 from tireroad.contact.setup import ContactSetup, Rolled, contact_setup
-from tireroad.contact.steps import Steps, check_times, equal_steps
 from tireroad.contact.tread.law import TREADS, TreadLaw
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.matrices import probe

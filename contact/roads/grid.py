@@ -1,16 +1,341 @@
-"""A road measured on a regular grid, with bilinear heights in between."""
+"""Roads of heights on a regular grid, read row by row, and windows of it with holes filled.
+
+Heights of a road in rows across it, in memory or left in their file until needed.
+
+The part of a road's rows that the tire is passing over, without holes.
+
+A road measured on a regular grid, with bilinear heights in between.
+"""
+
+from __future__ import annotations
 
 import copy
+import os
+import shutil
+import tempfile
+import weakref
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.contact.roads.placement import shown
-from tireroad.contact.roads.rows import ArrayRows, Rows
-from tireroad.contact.roads.window import Window
 from tireroad.fem.errors import InputError
 
 Array = NDArray[np.float64]
+
+# Numbers read at a time, 32 MB: the memory that a road of any length takes.
+PIECE = 4_000_000
+# Points in a list are sorted in memory, and positions along x are kept there.
+MAX_POINTS = 10_000_000
+# Largest number of heights unpacked into a temporary file: 16 GB.
+MAX_UNPACKED = 2_000_000_000
+
+
+def check_count(file: Path, count: int) -> None:
+    """InputError for more positions than can be kept in memory."""
+    if count > MAX_POINTS:
+        raise InputError(
+            f"road.file {file}: {count:,} positions to be held in memory, more than the "
+            f"{MAX_POINTS:,} that may be; cut the road first, or write its heights as a matrix by rows"
+        )
+
+
+class Rows(Protocol):
+    """`shape` (rows, numbers per row); `read` returns rows i0 to i1, (i1 - i0, width).
+
+    Rows are pickled for other processes of the machine: arrays as buffers, files by reopening them.
+    """
+
+    shape: tuple[int, int]
+
+    def read(self, i0: int, i1: int) -> Array: ...
+
+
+class ArrayRows:
+    """Rows in memory."""
+
+    def __init__(self, values: Array) -> None:
+        self._values, self.shape = values, (len(values), values.shape[1])
+
+    def read(self, i0: int, i1: int) -> Array:
+        """A view."""
+        return self._values[i0:i1]
+
+
+class Columns:
+    """Selected columns of rows, reordered."""
+
+    def __init__(self, rows: Rows, columns: list[int]) -> None:
+        self._rows, self._columns = rows, columns
+        self.shape = rows.shape[0], len(columns)
+
+    def read(self, i0: int, i1: int) -> Array:
+        """Rows i0 to i1."""
+        return self._rows.read(i0, i1)[:, self._columns]
+
+
+class Scaled:
+    """Rows in another unit: multiplied by a factor."""
+
+    def __init__(self, rows: Rows, factor: float) -> None:
+        self._rows, self._factor = rows, factor
+        self.shape = rows.shape
+
+    def read(self, i0: int, i1: int) -> Array:
+        """Rows i0 to i1."""
+        return self._factor * self._rows.read(i0, i1)
+
+
+class Packed(NamedTuple):
+    """Position (byte), number type and shape of contiguous rows of numbers in a file."""
+
+    start: int
+    kind: np.dtype
+    shape: tuple[int, int]
+
+
+class FileRows:
+    """Rows packed in a file, read when needed; the file stays open as long as they live.
+
+    `file`: its name, or the descriptor of an open file, which is closed at the end.
+    """
+
+    def __init__(self, file: Path | int, packed: Packed) -> None:
+        self._name, self._packed, self.shape = file, packed, packed.shape
+        self._open = file if isinstance(file, int) else os.open(file, os.O_RDONLY)
+        weakref.finalize(self, os.close, self._open)
+
+    def __reduce__(self) -> tuple[type[FileRows], tuple[Path, Packed]]:
+        """Reopen by name or, for a file without one, through this process's descriptor."""
+        name = self._name
+        if isinstance(name, int):
+            name = Path(f"/proc/{os.getpid()}/fd/{name}")
+        return FileRows, (name, self._packed)
+
+    def read(self, i0: int, i1: int) -> Array:
+        """Rows i0 to i1. InputError if the file has become shorter."""
+        start, kind, (_, width) = self._packed
+        size = width * kind.itemsize
+        first, left, parts = start + i0 * size, (i1 - i0) * size, []
+        while left:  # one call reads at most 2 GB
+            parts.append(os.pread(self._open, left, first))
+            if not parts[-1]:
+                raise InputError(f"road.file {self._name}: ends while it is read")
+            first, left = first + len(parts[-1]), left - len(parts[-1])
+        # A signalling NaN would raise an invalid-operation flag when widened to double.
+        with np.errstate(invalid="ignore"):
+            return np.frombuffer(b"".join(parts), kind).reshape(-1, width).astype(float)
+
+
+class Spool:
+    """Rows that arrive block by block, from text or a compressed file.
+
+    More than `PIECE` numbers go to an unnamed temporary file, as doubles, and are read from there:
+    this takes disk space (TMPDIR) until the program ends, not memory. InputError, which names
+    `source`, if that exceeds half of the free space or MAX_UNPACKED numbers; immediately if their
+    number is `announced`.
+    """
+
+    def __init__(self, source: str = "road", announced: int = 0) -> None:
+        self._source, self._written = source, 0
+        self._check_room(announced)
+        self._blocks: list[Array] = []
+        self._held = self._rows = self._width = 0
+        self._open: int | None = None
+
+    def add(self, block: Array) -> None:
+        """Append rows (n, width)."""
+        self._blocks.append(block)
+        self._held += block.size
+        self._rows += len(block)
+        self._width = block.shape[1]
+        if self._held > PIECE:
+            self._flush()
+
+    def rows(self) -> Rows:
+        """All rows."""
+        if self._open is None:
+            return ArrayRows(np.concatenate(self._blocks) if self._blocks else np.empty((0, 0)))
+        self._flush()
+        return FileRows(self._open, Packed(0, np.dtype(float), (self._rows, self._width)))
+
+    def _flush(self) -> None:
+        if self._open is None:
+            self._open, name = tempfile.mkstemp()
+            os.unlink(name)
+        self._check_room(self._held)
+        self._written += self._held
+        for block in self._blocks:
+            data = np.ascontiguousarray(block, dtype=float).data.cast("B")
+            while data:
+                data = data[os.write(self._open, data) :]
+        self._blocks, self._held = [], 0
+
+    def _check_room(self, numbers: int) -> None:
+        """InputError unless this many more numbers may be written to disk."""
+        if numbers <= PIECE and self._written == 0:
+            return
+        folder = tempfile.gettempdir()
+        free = shutil.disk_usage(folder).free
+        total = self._written + numbers
+        if total > MAX_UNPACKED or 8 * numbers > 0.5 * free:
+            raise InputError(
+                f"{self._source}: unpacked it has {total:.3g} heights, {8e-9 * total:.3g} GB in {folder} "
+                f"({1e-9 * free:.3g} GB free); at most {8e-9 * MAX_UNPACKED:g} GB and half of what is free "
+                "may be taken: cut the road first, set TMPDIR to a larger disk, or write it by "
+                "numpy.savez or to .h5, which need not be unpacked"
+            )
+
+
+def pieces(rows: Rows, overlap: int = 0) -> Iterator[tuple[int, Array]]:
+    """All rows as (first row, rows), in pieces of at most `PIECE` numbers.
+
+    The next piece begins `overlap` rows before the end of the previous one.
+    """
+    count, width = rows.shape
+    step = max(PIECE // width, overlap + 1)
+    first = 0
+    while True:
+        last = min(first + step, count)
+        yield first, rows.read(first, last)
+        if last == count:
+            return
+        first = last - overlap
+
+
+class Window:
+    """Heights z at rows `first` to `first` + len(x) and columns of a road, x (n,), y (w,) in m.
+
+    Only the rows last needed, and as many ahead of them as make `PIECE` numbers, are in memory;
+    holes in them are filled. `missing` counts all holes, `hole` is the first (row, column) or None.
+    """
+
+    def __init__(
+        self, rows: Rows, place: tuple[int, slice], x: Array, y: Array, source: str
+    ) -> None:
+        self._rows, (self._first, self._columns), self._source = rows, place, source
+        self._x, self._y = x, y
+        # As many rows as are read at a time: files yield whole rows, of which a part is kept.
+        self._most = max(PIECE // rows.shape[1], 2)
+        self._begin, self._z = 0, np.empty((0, len(y)))
+        self._corners: tuple[Array, ...] = ()
+        self._known = np.zeros(0, dtype=bool)
+        self.missing = 0
+        self.hole: tuple[int, int] | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The state without the rows in memory, which are read again when needed."""
+        nothing = {"_begin": 0, "_z": np.empty((0, len(self._y))), "_corners": ()}
+        return self.__dict__ | nothing
+
+    def scan(self) -> None:
+        """Search all rows for holes, once. InputError if there is no height at all."""
+        known = np.ones(len(self._x), dtype=bool)
+        for first in range(0, len(self._x), self._most):
+            missing = np.isnan(self._read(first, min(first + self._most, len(self._x))))
+            known[first : first + len(missing)] = ~missing.all(axis=1)
+            if self.hole is None and missing.any():
+                i, j = np.argwhere(missing)[0]
+                self.hole = first + int(i), int(j)
+            self.missing += int(missing.sum())
+        if not known.any():
+            raise InputError(f"{self._source}: no valid height in the strip driven over")
+        self._known = known
+
+    def bilinear(self, i: NDArray[np.intp], s: Array, j: NDArray[np.intp], t: Array) -> Array:
+        """Heights in the cells (i, j) at the fractions s along and t across."""
+        if i.size == 0:
+            return np.zeros(i.shape)
+        low, high = int(i.min()), int(i.max())
+        if high - low + 2 > self._most:
+            return self._by_pieces(i, s, j, t)
+        self._hold(low, high + 2)
+        k = (i - self._begin) * len(self._y) + j
+        near, near_left, far, far_left = (corner.take(k) for corner in self._corners)
+        near += t * (near_left - near)
+        far += t * (far_left - far)
+        return near + s * (far - near)
+
+    def bounds(self, rows: slice, columns: slice) -> tuple[float, float]:
+        """Lowest and highest height of the rows and columns, without holes."""
+        low, high = np.inf, -np.inf
+        for first in range(rows.start, rows.stop, self._most):
+            last = min(first + self._most, rows.stop)
+            self._hold(first, last)
+            z = self._z[first - self._begin : last - self._begin, columns]
+            # Without a known height both stay infinite, and nothing is warned of.
+            low = min(low, np.nanmin(z, initial=np.inf))
+            high = max(high, np.nanmax(z, initial=-np.inf))
+        return float(low), float(high)
+
+    def _by_pieces(self, i: NDArray[np.intp], s: Array, j: NDArray[np.intp], t: Array) -> Array:
+        out, piece = np.empty(i.shape), i // (self._most - 1)
+        for one in np.unique(piece):
+            here = piece == one
+            out[here] = self.bilinear(i[here], s[here], j[here], t[here])
+        return out
+
+    def _hold(self, low: int, high: int) -> None:
+        """Load the rows from `low` to `high`, and as many beyond as there is room for."""
+        if low >= self._begin and high <= self._begin + len(self._z):
+            return
+        # A few behind too, since not all points of a patch are evaluated in one call.
+        margin = (self._most - (high - low)) // 8
+        begin = max(low - margin, 0)
+        end = min(max(begin + self._most, high), len(self._x))
+        z = self._read(begin, end)
+        if len(self._known) and self.missing:
+            z = self._without_holes(z, begin, end)
+        # Four views in which a single index finds the corners of a cell.
+        self._begin, self._z = begin, np.ascontiguousarray(z)
+        flat, width = self._z.ravel(), len(self._y)
+        self._corners = flat, flat[1:], flat[width:], flat[width + 1 :]
+
+    def _without_holes(self, z: Array, begin: int, end: int) -> Array:
+        """Fill holes, using the nearest known row on either side for rows without any height."""
+        known = np.flatnonzero(self._known)
+        k0, k1 = np.searchsorted(known, [begin, end - 1])
+        before, after = known[max(k0 - 1, 0)], known[min(k1, len(known) - 1)]
+        extra = [row for row in (before, after) if not begin <= row < end]
+        index = np.concatenate([np.arange(begin, end), np.array(extra, dtype=int)])
+        z = np.concatenate([z, *(self._read(row, row + 1) for row in extra)])
+        order = np.argsort(index)
+        filled = fill_holes(z[order], self._x[index[order]], self._y, self._source)
+        return filled[np.searchsorted(index[order], np.arange(begin, end))]
+
+    def _read(self, i0: int, i1: int) -> Array:
+        try:
+            z = self._rows.read(self._first + i0, self._first + i1)[:, self._columns]
+        except (OSError, RuntimeError) as error:
+            raise InputError(f"{self._source}: cannot be read ({error})") from error
+        if np.isinf(z).any():
+            raise InputError(f"{self._source}: {int(np.isinf(z).sum())} heights are infinite")
+        return z
+
+
+def fill_holes(z: Array, x: Array, y: Array, source: str = "road") -> Array:
+    """z (nx, ny) m with NaN replaced.
+
+    Linear across y between valid neighbours, the nearest one beyond the last; then the same
+    along x for rows without any. InputError if all heights are missing.
+    """
+    if not np.isnan(z).any():
+        return z
+    z = z.copy()
+    for row in np.flatnonzero(np.isnan(z).any(axis=1)):
+        valid = ~np.isnan(z[row])
+        if valid.any():
+            z[row] = np.interp(y, y[valid], z[row, valid])
+    known = ~np.isnan(z[:, 0])
+    if not known.any():
+        raise InputError(f"{source}: no valid height in the strip driven over")
+    for column in range(z.shape[1] if not known.all() else 0):
+        z[:, column] = np.interp(x, x[known], z[known, column])
+    return z
+
 
 # Axes that deviate from even spacing by less than this fraction of a step count as even, because
 # files round positions.
@@ -32,7 +357,7 @@ class Axis:
         self._per_metre = 1.0 / mean
         self.step = mean if self._even else float(np.diff(positions).min())
 
-    def part(self, places: slice) -> "Axis":
+    def part(self, places: slice) -> Axis:
         """A contiguous part of the positions."""
         return Axis(self.positions[places])
 
@@ -147,7 +472,7 @@ class Grid:
             i0, i1 = 0, len(self._x.positions) - 2
         return slice(int(i0), int(i1) + 2), slice(int(j0), int(j1) + 2)
 
-    def prepare(self, x0: float, x1: float, y0: float, y1: float) -> "Grid":
+    def prepare(self, x0: float, x1: float, y0: float, y1: float) -> Grid:
         """The road of the strip alone (m), without holes, for fast evaluation in it.
 
         InputError if the strip leaves the road or contains holes that are to be refused.

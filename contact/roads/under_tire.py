@@ -1,19 +1,297 @@
-"""A road placed under the tire: the strip of a run, with run-in and levelling."""
+"""The road as the tire meets it: run-in, level, side, motion, and levels of its texture.
 
-from collections.abc import Iterator
+Texture characteristics of a profile: mean profile depth and third-octave levels.
+
+Mean profile depth (ISO 13473-1): the profile without waves shorter than 2.5 mm is divided into
+pieces of 100 mm, each less its straight line; the mean of the highest peaks in the two halves of a
+piece, averaged over the pieces. Level of a third octave (ISO 13473-4): 20 lg(a / 1 um), a being the
+root mean square of the profile in the band, from a periodogram of Hann-windowed pieces with half
+overlap, each less its straight line. Bands by wavelength, 10^(k/10) m.
+
+A road that repeats, as on a drum, blended over a seam so that its heights are continuous.
+
+The part of a road that the axle is assumed to follow: its mean height, or its long waves.
+
+Vertical motion of the whole road, such as that of a shaker or a drum.
+
+A road placed under the tire: the strip of a run, with run-in and levelling.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.contact.roads.levelling import Level, mean_level, wave_level
 from tireroad.contact.roads.placement import begun_at, moved_start
-from tireroad.contact.roads.texture.levels import Texture, texture_of
-from tireroad.contact.roads.texture.repeated import Repeated
 from tireroad.fem.errors import InputError
+from tireroad.fem.parameters import Parameters, choice, number
 
 Array = NDArray[np.float64]
+BASE = 0.1  # m, of a piece
+SHORTEST = 2.5e-3  # m, shortest waves that count for the mean profile depth
+REFERENCE = 1e-6  # m
+_CYCLES = 5  # waves in a piece at a band's centre, at least
+
+
+@dataclass(frozen=True)
+class Texture:
+    """Mean profile `depth` m, None for a profile shorter than 100 mm, and third-octave levels.
+
+    `wavelength` (k,) m, descending, and `level` (k,) dB re 1 um.
+    """
+
+    depth: float | None
+    wavelength: Array
+    level: Array
+
+
+def texture_of(profile: Array, pitch: float, shortest: float = 0.0) -> Texture:
+    """The texture of heights (n,) m every `pitch` m, in bands of waves longer than `shortest` m.
+
+    Below that, a road on a grid has what its interpolation makes: 26 dB at 1.3 mm of a road cut off
+    at 4 mm.
+    """
+    depth, (wavelength, level) = mean_profile_depth(profile, pitch), third_octaves(profile, pitch)
+    whole = wavelength > 10**0.05 * shortest
+    return Texture(depth, wavelength[whole], level[whole])
+
+
+def mean_profile_depth(profile: Array, pitch: float) -> float | None:
+    """Mean profile depth, m; None for less than 100 mm, or fewer than 8 points per 100 mm."""
+    count = round(BASE / pitch)
+    if count < 8 or len(profile) < count:
+        return None
+    smooth = _without_short(profile, pitch)
+    pieces = _level(smooth[: len(smooth) // count * count].reshape(-1, count))
+    halves = np.array_split(pieces, 2, axis=1)
+    return float(np.mean([half.max(axis=1) for half in halves]))
+
+
+def third_octaves(profile: Array, pitch: float) -> tuple[Array, Array]:
+    """Wavelengths (k,) m, descending, and levels (k,) dB re 1 um; empty for a short profile."""
+    length = len(profile) * pitch
+    first = int(np.ceil(10 * np.log10(2.5 * pitch)))
+    last = int(np.floor(10 * np.log10(length / _CYCLES / 2)))
+    exponents = np.arange(last, first - 1, -1)
+    if len(exponents) == 0:
+        return np.zeros(0), np.zeros(0)
+    wavelength = 10.0 ** (exponents / 10)
+    count = min(len(profile), 2 * int(_CYCLES * wavelength[0] / pitch))
+    density, spacing = _periodogram(profile, pitch, count)
+    # The integral of the density up to a wave number, linear between its lines.
+    edges = (np.arange(len(density) + 1) - 0.5) * spacing
+    total = np.concatenate([[0.0], np.cumsum(density) * spacing])
+    low, high = (np.interp(10**s / wavelength, edges, total) for s in (-0.05, 0.05))
+    power = np.maximum(high - low, 1e-30)
+    return wavelength, 10 * np.log10(power / REFERENCE**2)
+
+
+def _periodogram(profile: Array, pitch: float, count: int) -> tuple[Array, float]:
+    """One-sided density (count // 2 + 1,) m^3 of pieces of `count` points; line spacing (1/m)."""
+    window = np.hanning(count + 1)[:-1]
+    begin = np.arange(0, len(profile) - count + 1, max(count // 2, 1))
+    total = np.zeros(count // 2 + 1)
+    for first in begin:  # one at a time: a long road has thousands
+        piece = _level(profile[None, first : first + count])[0]
+        total += np.abs(np.fft.rfft(window * piece)) ** 2
+    return 2 * total / len(begin) * pitch / (window @ window), 1 / (count * pitch)
+
+
+def _level(pieces: Array) -> Array:
+    """Each row (n,) m less its straight line."""
+    place = np.linspace(-1.0, 1.0, pieces.shape[1])
+    slope = pieces @ place / (place @ place)
+    return pieces - pieces.mean(axis=1, keepdims=True) - slope[:, None] * place
+
+
+def _without_short(profile: Array, pitch: float) -> Array:
+    """The profile without waves shorter than 2.5 mm, by the Gaussian filter of ISO 16610-21.
+
+    The filter passes half of a wave of that length.
+    """
+    from scipy.ndimage import gaussian_filter1d  # not needed to read a scene
+
+    return gaussian_filter1d(profile, DEVIATION * SHORTEST / pitch, mode="nearest")
+
+
+_SEAM = 0.1  # of the length, and at most this many metres, are blended
+_LONGEST = 0.2
+
+
+class Repeated:
+    """h(x mod L) of a road h, whose last part b blends into the mirror image of its beginning:
+
+        z = (1 - w) h(x) + w h(L - x),   w from 0 to 1 over L - b < x < L.
+
+    So z is continuous and only its slope jumps, and the road is needed only over its `length` L
+    (m). x counts from the first x of a measured road, and from 0 on others.
+    """
+
+    def __init__(self, road: Road, length: float) -> None:
+        self._road, self._length = road, length
+        self._first: float = getattr(road, "measured", (0.0, 0.0))[0]
+        self._seam = min(_SEAM * length, _LONGEST)
+        self.spacing = road.spacing
+        self.shortest_wave: float = getattr(road, "shortest_wave", 0.0)
+        self.filled: int = getattr(road, "filled", 0)
+        self.notes: tuple[str, ...] = (
+            *getattr(road, "notes", ()),
+            f"repeats after {length:.4g} m, blended over {self._seam:.2g} m",
+        )
+
+    @property
+    def extent(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Endless along x, as wide as the road, m."""
+        return (-np.inf, np.inf), self._road.extent[1]
+
+    @property
+    def _period(self) -> tuple[float, float]:
+        """The part of the road that is needed, m."""
+        return self._first, self._first + self._length
+
+    def height(self, x: Array, y: Array) -> Array:
+        """Heights (m) at x, y (m) of equal shape."""
+        place = np.mod(x - self._first, self._length)
+        z = self._road.height(self._first + place, y)
+        share = (place - (self._length - self._seam)) / self._seam
+        late = share > 0
+        if late.any():
+            w = share[late] ** 2 * (3.0 - 2.0 * share[late])
+            back = self._first + (self._length - place[late])
+            mirrored = self._road.height(back, np.asarray(y)[late])
+            z = np.array(z)
+            z[late] = (1.0 - w) * z[late] + w * mirrored
+        return z
+
+    def highest(self, x0: float, x1: float, y0: float, y1: float) -> float:
+        """Upper bound of the heights anywhere along x, m."""
+        return self._road.highest(*self._period, y0, y1)
+
+    def lowest(self, x0: float, x1: float, y0: float, y1: float) -> float:
+        """Lower bound of the heights anywhere along x, m."""
+        return self._road.lowest(*self._period, y0, y1)
+
+    def prepare(self, x0: float, x1: float, y0: float, y1: float) -> Repeated:
+        """The repeated road, with one period prepared. InputError if the road is shorter."""
+        return Repeated(self._road.prepare(*self._period, y0, y1), self._length)
+
+
+# The profile of the strip is sampled at no more than this many points.
+MOST_POINTS = 1_000_000
+PIECE = 20_000  # points evaluated at once
+# The Gaussian profile filter of ISO 16610-21 passes half of a wave of the cut-off length; its
+# weight exp(-pi (x / (alpha lambda))^2) has the standard deviation alpha lambda / sqrt(2 pi).
+DEVIATION = np.sqrt(np.log(2) / np.pi) / np.sqrt(2 * np.pi)
+
+
+class Level:
+    """Heights (m) along x (m), linear between its points and constant beyond them."""
+
+    def __init__(self, x: Array, z: Array) -> None:
+        self._x, self._z = x, z
+
+    def __call__(self, x: Array) -> Array:
+        return np.interp(x, self._x, self._z)
+
+    def bounds(self, x0: float, x1: float) -> tuple[float, float]:
+        """Least and greatest height from x0 to x1, m."""
+        inside = self._z[np.searchsorted(self._x, x0) : np.searchsorted(self._x, x1)]
+        ends = np.interp([x0, x1], self._x, self._z)
+        values = np.concatenate([inside, ends])
+        return float(values.min()), float(values.max())
+
+
+def mean_level(road: Road, x0: float, x1: float, y0: float, y1: float) -> Level:
+    """The mean height of a strip of road (contact.roads.under_tire.Road), as a constant level."""
+    _, profile = _profile(road, x0, x1, y0, y1)
+    return Level(np.array([x0]), np.array([profile.mean()]))
+
+
+def wave_level(
+    road: Road, x0: float, x1: float, y0: float, y1: float, longest_wave: float
+) -> Level:
+    """The waves of the strip longer than `longest_wave` (m): ISO 16610-21 on its mean profile.
+
+    Beyond its ends the profile is continued by reflection. It is then a sum of cosines, each
+    transmitted by the filter as exp(-pi (alpha lambda_c / lambda)^2), at a cost that does not
+    depend on the cut-off.
+    """
+    from scipy.fft import dct, idct  # not needed to read a scene
+
+    x, profile = _profile(road, x0, x1, y0, y1)
+    waves = np.arange(len(x)) / (2 * (x1 - x0))  # 1/m
+    passed = np.exp(-0.5 * (2 * np.pi * DEVIATION * longest_wave * waves) ** 2)
+    return Level(x, idct(passed * dct(profile)))
+
+
+def _profile(road: Road, x0: float, x1: float, y0: float, y1: float) -> tuple[Array, Array]:
+    """x (n,) m and mean height over the width (n,) m, at half the road's spacing if affordable."""
+    step = 0.5 * road.spacing
+    if not np.isfinite(step):
+        return np.array([x0]), np.zeros(1)
+    counts = [max(int(np.ceil(d / step)), 1) for d in (x1 - x0, y1 - y0)]
+    excess = np.sqrt(max(1.0, counts[0] * counts[1] / MOST_POINTS))
+    nx, ny = (max(int(c / excess), 1) for c in counts)
+    x = x0 + (np.arange(nx) + 0.5) * (x1 - x0) / nx
+    y = y0 + (np.arange(ny) + 0.5) * (y1 - y0) / ny
+    # The full width of a short piece at a time, so that a file is read once and a texture generated
+    # once, not once for every y.
+    pieces = np.array_split(x, max(nx * ny // PIECE, 1))
+    means = [road.height(*np.meshgrid(piece, y)).sum(axis=0) / ny for piece in pieces]
+    return x, np.concatenate(means)
+
+
+def smoothstep(s: float) -> float:
+    """6 s^5 - 15 s^4 + 10 s^3 on [0, 1], constant outside: twice continuously differentiable."""
+    s = min(max(s, 0.0), 1.0)
+    return s * s * s * (10.0 + s * (6.0 * s - 15.0))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motion(Parameters):
+    """Height r(t) of the road over time: 0, a ramp, or a sine."""
+
+    owner = "road.motion"
+
+    kind: str = choice(
+        "none", ("none", "ramp", "sine"), "vertical motion of the whole road over time"
+    )
+    amplitude: float = number(1.0e-3, "m", "amplitude of the motion, positive up", least=-1, most=1)
+    frequency: float = number(
+        50.0,
+        "Hz",
+        "frequency of the sine",
+        least=1e-3,
+        most=1e5,
+        only_for=("kind", ("none", "sine")),
+    )
+    duration: float = number(
+        0.01, "s", "duration of the ramp", least=1e-5, most=1e5, only_for=("kind", ("none", "ramp"))
+    )
+
+
+def make_motion(
+    kind: str, amplitude: float = 0.0, frequency: float = 50.0, duration: float = 0.01
+) -> Callable[[float], float]:
+    """Height r(t) in m of the road over time t in s, r(0) = 0.
+
+    kind "none": 0; "ramp": from 0 to `amplitude` (m, may be negative) over `duration` (s) by a
+    smoothstep, then constant; "sine": amplitude sin(2 pi frequency t), frequency in Hz. InputError
+    for another kind or a value outside the range given in `Motion`.
+    """
+    Motion(kind=kind, amplitude=amplitude, frequency=frequency, duration=duration)
+    if kind == "ramp":
+        return lambda t: amplitude * smoothstep(t / duration)
+    if kind == "sine":
+        return lambda t: amplitude * math.sin(2.0 * math.pi * frequency * t)
+    return lambda t: 0.0
+
 
 NOTHING = 1e-9  # m: relief below is rounding
 # Smallest number of pieces that a strip is divided into for its bounds: the level varies slowly
@@ -46,7 +324,7 @@ class Road(Bounded, Protocol):
 
     def height(self, x: Array, y: Array) -> Array: ...
 
-    def prepare(self, x0: float, x1: float, y0: float, y1: float) -> "Road": ...
+    def prepare(self, x0: float, x1: float, y0: float, y1: float) -> Road: ...
 
 
 def is_level(road: Bounded, x0: float, x1: float, y0: float, y1: float) -> bool:
@@ -88,7 +366,7 @@ class RoadUnderTire:
         self._lateral, self.run_in, self._offset = lateral, run_in, offset
         self._longest_wave = longest_wave
 
-    def prepare(self, x0: float, x1: float, y0: float, y1: float) -> "PreparedRoad":
+    def prepare(self, x0: float, x1: float, y0: float, y1: float) -> PreparedRoad:
         """The strip of a run, in distances (m) from the axle's start and from the tire's middle.
 
         x0 is the foremost point of the patch at t = 0, ahead of the axle, x1 the farthest it gets,

@@ -1,11 +1,32 @@
-"""An elastic layer bonded to a rigid base, like a tread on its belt."""
+"""A tread layer on a rigid base: normal and tangential influence.
+
+An elastic layer bonded to a rigid base, like a tread on its belt.
+
+An elastic layer bonded to a rigid base under horizontal forces, coupled with pressure.
+
+Forces in waves of wave number k = m/h along a direction of the surface, h the thickness and G the
+shear modulus, move it by 1/(G k) times
+
+    T = (1 - nu) [(3 - 4 nu) sinh 2m + 2m] / D      along, under forces along,
+    S = tanh m                                      across, under forces across,
+    C = [(3 - 4 nu)(1 - 2 nu)/2 (cosh 2m - 1) - m^2] / D
+                                                    upwards, under forces along, in quadrature,
+    D = (3 - 4 nu) cosh 2m + 2 m^2 + 5 - 4 nu (3 - 2 nu)
+
+(tests/contact/tread/test_shear.py solves the layer's equations for them). The limit m to infinity
+is the half-space: T = 1 - nu, S = 1, C = (1 - 2 nu)/2. Unlike a half-space, a thin incompressible
+layer is squeezed out sideways by pressure.
+"""
+
+from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
-from scipy.special import j1
+from scipy.special import j1, jv
 
 from tireroad.contact.tread.compliance import half_space_influence
+from tireroad.contact.tread.shear import half_space_shear
 from tireroad.fem.errors import InputError, UnsuitedSettings
 
 Array = NDArray[np.float64]
@@ -90,3 +111,77 @@ class LayerInfluence:
             cosh = np.cosh(top * (node + 1.0))
             total += weight * (self._bounded(np.minimum(x * cosh, REACH)) / cosh - x)
         return np.where(x > 0.0, top * total, 0.0)
+
+
+_FIRST = 1e-4  # thicknesses: the table begins near 0, where J1/rho and J2/rho^2 are limits
+
+
+def transforms(m: Array, poisson_ratio: float) -> tuple[Array, Array, Array]:
+    """T, S and C at m = wave number x thickness, with e^(2m) divided out."""
+    nu, decay = poisson_ratio, np.exp(-2.0 * m)
+    a = 3.0 - 4.0 * nu
+    cosh, sinh = 0.5 * (1.0 + decay**2), 0.5 * (1.0 - decay**2)
+    below = a * cosh + (2.0 * m**2 + 5.0 - 4.0 * nu * (3.0 - 2.0 * nu)) * decay
+    along = (1.0 - nu) * (a * sinh + 2.0 * m * decay) / below
+    coupling = (0.5 * a * (1.0 - 2.0 * nu) * (cosh - decay) - m**2 * decay) / below
+    return along, np.tanh(m), coupling
+
+
+class LayerShear:
+    """As `half_space_shear`, for a layer of `thickness` m.
+
+    The half-space's displacements plus a smooth correction, the mean over the rectangle by Gauss
+    points of
+
+        2 pi G u_x = [p0 - cos 2t q2] t_x - sin 2t q2 t_y,
+        2 pi G u_z = c1 (cos t t_x + sin t t_y),
+
+    t being the direction of the offset r, p0 = 1/h int (T + S - 2 + nu)/2 J0(m r/h) dm, q2 with
+    (T - S + nu)/2 J2, c1 with (C - (1 - 2 nu)/2) J1.
+    """
+
+    def __init__(self, youngs_modulus: float, poisson_ratio: float, thickness: float) -> None:
+        self._elastic, self._thickness = (youngs_modulus, poisson_ratio), thickness
+        nu = self._nu = poisson_ratio
+        nodes, weights = np.polynomial.legendre.leggauss(200 + int(4 * LAST * REACH / np.pi))
+        m = 0.5 * LAST * (nodes + 1.0)
+        weights = 0.5 * LAST * weights
+        along, across, coupling = transforms(m, nu)
+        parts = (
+            0.5 * (along + across) - 0.5 * (2.0 - nu),
+            coupling - 0.5 * (1.0 - 2.0 * nu),
+            0.5 * (along - across) + 0.5 * nu,
+        )
+        rho = np.linspace(_FIRST, REACH, int(PER_THICKNESS * REACH) + 1)
+        # Tables of J_n integrals over rho^n: even and smooth at 0.
+        self._tables = [
+            CubicSpline(rho, [jv(n, m * r) @ (weights * part) / r**n for r in rho])
+            for n, part in enumerate(parts)
+        ]
+
+    def __call__(self, x: Array, y: Array, a: Array, b: Array) -> Array:
+        """(5, ...) m/N at offsets x, y (m) from rectangles 2a x 2b (m)."""
+        whole = half_space_shear(x, y, a, b, *self._elastic)
+        h = self._thickness
+        x, y, p, q = np.broadcast_arrays(x / h, y / h, a / h, b / h)
+        count = 6 + int(4 * max(p.max(initial=0.0), q.max(initial=0.0)))
+        nodes, weights = np.polynomial.legendre.leggauss(count)
+        total = np.zeros((5, *x.shape))
+        for s, ws in zip(nodes, weights, strict=True):
+            for t, wt in zip(nodes, weights, strict=True):
+                total += 0.25 * ws * wt * self._at(x - s * p, y - t * q)
+        youngs_modulus, nu = self._elastic
+        return whole + total * (1.0 + nu) / (np.pi * youngs_modulus * h)
+
+    def _at(self, x: Array, y: Array) -> Array:
+        """Correction (5, ...) for a point force, in thicknesses; far away minus the half-space."""
+        rho, nu = np.hypot(x, y), self._nu
+        far = np.maximum(rho, REACH)
+        none = -0.5 * (2.0 - nu) / far, -0.5 * (1.0 - 2.0 * nu) / far**2, 0.5 * nu / far**3
+        near = np.clip(rho, _FIRST, REACH)
+        p0, c1, q2 = (
+            np.where(rho < REACH, table(near), beyond)
+            for table, beyond in zip(self._tables, none, strict=True)
+        )
+        turned = q2 * (x**2 - y**2)
+        return np.stack([p0 - turned, -2.0 * x * y * q2, p0 + turned, x * c1, y * c1])

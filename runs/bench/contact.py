@@ -7,10 +7,10 @@ import time
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from tireroad.contact.loop import Drive, roll
 from tireroad.contact.roads.kinds.flat import Flat
-from tireroad.contact.rolling import Drive, roll
-from tireroad.contact.solver.complementarity import ActiveSet
-from tireroad.contact.solver.friction import Friction
+from tireroad.contact.solver.active_set import ActiveSet
+from tireroad.contact.solver.stick_slip import Friction
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.runs.bench.parts.contact_points import large, rough
 from tireroad.runs.bench.parts.contact_steps import convolution, orders

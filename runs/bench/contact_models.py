@@ -10,9 +10,14 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from scipy.optimize import brentq
 
-from tireroad.contact.literature.asperities import ShiftedSprings, asperities
-from tireroad.contact.literature.springs import fitted_stiffness
-from tireroad.contact.literature.wedges import LookUp, Wedges, look_up
+from tireroad.contact.literature import (
+    LookUp,
+    ShiftedSprings,
+    Wedges,
+    asperities,
+    fitted_stiffness,
+    look_up,
+)
 from tireroad.contact.results.spectra import distance, third_octaves
 from tireroad.contact.tread.law import TREADS
 from tireroad.fem.static.equilibrium import Equilibrium

@@ -13,8 +13,8 @@ import numpy as np
 from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
-from tireroad.contact.rolling import Drive, roll
-from tireroad.contact.solver.choose import make_solver
+from tireroad.contact.loop import Drive, roll
+from tireroad.contact.solver.active_set import make_solver
 from tireroad.contact.tread.compliance import half_space_compliance
 from tireroad.fem.errors import ConvergenceError
 from tireroad.greens.recursion import SHARED_FROM, Recursion, sharers

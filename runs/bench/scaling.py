@@ -12,8 +12,8 @@ import numpy as np
 from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
-from tireroad.contact.rolling import Drive, roll
-from tireroad.contact.solver.complementarity import ActiveSet
+from tireroad.contact.loop import Drive, roll
+from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.tread.compliance import half_space_compliance
 from tireroad.greens.recursion import Recursion
 from tireroad.runs.bench.accuracy.rough_road import Mesh, prepared, write_scene

@@ -9,8 +9,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.contact.results.levels import nominal
-from tireroad.contact.results.spectra import SILENT
+from tireroad.contact.results.spectra import SILENT, nominal
 from tireroad.fem.errors import InputError
 from tireroad.runs.files import xdmf
 from tireroad.runs.files.disk import replacing

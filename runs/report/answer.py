@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tireroad.contact.results.levels import nominal
-from tireroad.contact.results.spectra import SILENT, deviation
+from tireroad.contact.results.spectra import SILENT, deviation, nominal
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.read import Absent, Results
 from tireroad.runs.report.quantities import bounded, digits, quantity

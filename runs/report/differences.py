@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from tireroad.contact.results.levels import nominal
-from tireroad.contact.results.spectra import SILENT
+from tireroad.contact.results.spectra import SILENT, nominal
 from tireroad.runs.files.reader import RunResults
 
 Array = NDArray[np.float64]

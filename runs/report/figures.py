@@ -15,8 +15,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from tireroad.contact.results.levels import nominal
-from tireroad.contact.results.spectra import SILENT
+from tireroad.contact.results.spectra import SILENT, nominal
 from tireroad.runs.report.thinned import envelope, peak_hold
 
 COMPONENTS = ("x, forward", "y, along the axle", "z, up")

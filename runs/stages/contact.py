@@ -9,11 +9,11 @@ from typing import ClassVar
 
 from threadpoolctl import threadpool_limits
 
+from tireroad.contact.loop import Loop, roll
 from tireroad.contact.model import solver_name
 from tireroad.contact.results.chatter import Chatter, Chosen
 from tireroad.contact.results.energy import Work
 from tireroad.contact.results.totals import Totals
-from tireroad.contact.rolling import Loop, roll
 from tireroad.contact.setup import ContactSetup
 from tireroad.fem.static.state import StaticState
 from tireroad.modal.rolling import RollingModes

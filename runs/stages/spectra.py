@@ -8,9 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from tireroad.contact.results.levels import least_duration, lowest_wanted, nominal
 from tireroad.contact.results.limits import Limit, lowest
-from tireroad.contact.results.spectra import amplitudes
+from tireroad.contact.results.spectra import amplitudes, least_duration, lowest_wanted, nominal
 from tireroad.contact.setup import ContactSetup
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put

@@ -8,8 +8,7 @@ from typing import Any, ClassVar
 import h5py
 import numpy as np
 
-from tireroad.contact.results.levels import a_weighting, band_sums
-from tireroad.contact.results.spectra import amplitudes
+from tireroad.contact.results.spectra import a_weighting, amplitudes, band_sums
 from tireroad.fem.errors import InputError
 from tireroad.fem.static.state import StaticState
 from tireroad.greens.basis import Basis

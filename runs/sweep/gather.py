@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.contact.results.levels import nominal
-from tireroad.contact.results.spectra import SILENT
+from tireroad.contact.results.spectra import SILENT, nominal
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.disk import replacing
 from tireroad.runs.files.reader import RunResults

@@ -9,8 +9,8 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from tireroad.contact.grid_patch import OnPoints
+from tireroad.contact.loop import roll
 from tireroad.contact.model import Spec, step_solver
-from tireroad.contact.rolling import roll
 from tireroad.contact.setup import ContactSetup
 
 

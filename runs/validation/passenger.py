@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tireroad.contact.results.levels import nominal
-from tireroad.contact.results.spectra import third_octaves
+from tireroad.contact.results.spectra import nominal, third_octaves
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.validation.comparison import digits
 from tireroad.runs.validation.histories import History, follow

@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from tireroad.contact.driven import Driven
+from tireroad.contact.loop import Drive, Driven, roll
 from tireroad.contact.patch import Patch
 from tireroad.contact.roads.kinds.flat import Flat
-from tireroad.contact.rolling import Drive, roll
-from tireroad.contact.solver.complementarity import ActiveSet
+from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 

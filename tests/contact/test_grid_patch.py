@@ -7,13 +7,18 @@ import pytest
 from mpi4py import MPI
 
 from tireroad.contact import grid_patch, model
-from tireroad.contact.grid_patch import OnPoints, make_grid_patch, settle, spread_pull
+from tireroad.contact.grid_patch import (
+    OnPoints,
+    halved,
+    make_grid_patch,
+    settle,
+    spread_pull,
+    thinned,
+)
 from tireroad.contact.model import step_solver
 from tireroad.contact.patch import make_patch
-from tireroad.contact.respaced import halved, thinned
-from tireroad.contact.solver.complementarity import ActiveSet
+from tireroad.contact.solver.active_set import ActiveSet, UsualSet
 from tireroad.contact.solver.projected_cg import ProjectedCG
-from tireroad.contact.solver.usual_set import UsualSet
 from tireroad.contact.tread.laws.elastic import HalfSpace
 from tireroad.fem.errors import InputError
 from tireroad.fem.static.tread_surface import TreadSurface

@@ -3,9 +3,14 @@
 import numpy as np
 import pytest
 
-from tireroad.contact.literature.asperities import Asperities, ShiftedSprings, asperities
-from tireroad.contact.literature.springs import fitted_stiffness
-from tireroad.contact.literature.wedges import Wedges, look_up
+from tireroad.contact.literature import (
+    Asperities,
+    ShiftedSprings,
+    Wedges,
+    asperities,
+    fitted_stiffness,
+    look_up,
+)
 from tireroad.contact.tread.law import TREADS
 from tireroad.fem.errors import InputError
 

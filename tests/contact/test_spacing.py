@@ -7,12 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tireroad.contact.patch import make_patch
+from tireroad.contact.patch import make_patch, spacing
 from tireroad.contact.roads.kinds.flat import Flat
 from tireroad.contact.roads.road import make_road
 from tireroad.contact.roads.under_tire import RoadUnderTire
 from tireroad.contact.setup import ContactSetup, Rolled
-from tireroad.contact.spacing import spacing
 from tireroad.contact.tread.laws.elastic import HalfSpace
 from tireroad.fem.static.footprint import Footprint
 from tireroad.runs.scene.load import load

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from systems import make
 from test_recursion import STEPS, march, some_force
 
-from tireroad.contact.solver.together import Solved, Together
+from tireroad.contact.loop import Solved, Together
 from tireroad.greens import recursion
 from tireroad.greens.recursion import Recursion, sharers
 

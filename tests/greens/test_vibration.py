@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tireroad.contact.results.levels import a_weighting, band_sums
+from tireroad.contact.results.spectra import a_weighting, band_sums
 from tireroad.greens.outputs import Surface, mean_square_velocity
 
 

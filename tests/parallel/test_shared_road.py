@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from tireroad.contact.roads import rows
+from tireroad.contact.roads import grid
 from tireroad.contact.roads.kind import RoadKind
 from tireroad.contact.roads.kinds.laser import LaserFile
 from tireroad.contact.roads.kinds.measured import GridFile
@@ -84,7 +84,7 @@ def test_one_process_reads_and_all_have_the_same_bits(monkeypatch, folder, kind:
     strip = STRIP if kind != "points" else (0.001, 0.018, *STRIP[2:])
     x, y = (a + (b - a) * np.random.default_rng(2).random(500) for a, b in (strip[:2], strip[2:]))
     alone = surface.make().prepare(*strip).height(x, y)
-    monkeypatch.setattr(rows, "PIECE", 5000)  # more than that goes to a temporary file
+    monkeypatch.setattr(grid, "PIECE", 5000)  # more than that goes to a temporary file
     read = counted(monkeypatch, surface)
     share(surface, COMM)
     road = made(surface)
@@ -124,10 +124,10 @@ def test_all_processes_are_told_of_a_damaged_file(folder: Path) -> None:
 
 def test_a_process_that_cannot_open_the_others_file_reads_by_itself(monkeypatch, folder) -> None:
     """Processes that see another /proc, or none."""
-    monkeypatch.setattr(rows, "PIECE", 5000)
+    monkeypatch.setattr(grid, "PIECE", 5000)
     surface = written(folder, "packed")
     monkeypatch.setattr(
-        rows.FileRows, "__reduce__", lambda self: (rows.FileRows, (Path("/nowhere"), self._packed))
+        grid.FileRows, "__reduce__", lambda self: (grid.FileRows, (Path("/nowhere"), self._packed))
     )
     share(surface, COMM)
     assert np.isfinite(made(surface).prepare(*STRIP).highest(*STRIP))

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from tireroad.contact.loop import Drive, roll
 from tireroad.contact.roads.kinds.flat import Flat
-from tireroad.contact.rolling import Drive, roll
-from tireroad.contact.solver.complementarity import ActiveSet
+from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.tread.compliance import half_space_compliance
 from tireroad.greens.recursion import Recursion
 from tireroad.runs.measure.synthetic import Strip, oval_patch

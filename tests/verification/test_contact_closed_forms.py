@@ -14,7 +14,7 @@ from tireroad.contact.closed_forms import (
     westergaard_mean,
     westergaard_pressure,
 )
-from tireroad.contact.solver.complementarity import ActiveSet
+from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.solver.grid_compliance import MatrixCompliance
 from tireroad.contact.solver.projected_cg import ProjectedCG
 from tireroad.contact.tread.compliance import half_space_compliance

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from tireroad.contact.loop import roll
 from tireroad.contact.model import step_solver
 from tireroad.contact.results.spectra import amplitudes
-from tireroad.contact.roads.motion import make_motion
 from tireroad.contact.roads.road import make_road
-from tireroad.contact.rolling import roll
+from tireroad.contact.roads.under_tire import make_motion
 from tireroad.contact.setup import Rolled, contact_setup
 from tireroad.contact.tread.laws.elastic import HalfSpace
 from tireroad.fem.errors import InputError

@@ -5,10 +5,10 @@ import pytest
 from mpi4py import MPI
 from scipy import sparse
 
+from tireroad.contact.loop import Drive, roll
 from tireroad.contact.patch import Patch
-from tireroad.contact.rolling import Drive, roll
-from tireroad.contact.solver.complementarity import ActiveSet
-from tireroad.contact.solver.friction import Friction
+from tireroad.contact.solver.active_set import ActiveSet
+from tireroad.contact.solver.stick_slip import Friction
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.matrices.probe import nodes

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tireroad.contact.closed_forms import brush_force, carter_force, carter_traction, hertz_cylinder
-from tireroad.contact.solver.complementarity import ActiveSet
-from tireroad.contact.solver.friction import Friction
+from tireroad.contact.solver.active_set import ActiveSet
+from tireroad.contact.solver.stick_slip import Friction
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import rectangle_potential
 

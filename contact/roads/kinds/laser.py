@@ -7,12 +7,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.contact.roads.files.grid_file import UNITS
-from tireroad.contact.roads.grid import Grid
+from tireroad.contact.roads.grid import Grid, check_count
+from tireroad.contact.roads.grid_file import UNITS
 from tireroad.contact.roads.kind import Levelled, road_kind
-from tireroad.contact.roads.rows import check_count
-from tireroad.contact.roads.texture.cleaning import cleaned
-from tireroad.contact.roads.texture.widened import memory, widened
+from tireroad.contact.roads.texture.measured_line import cleaned, memory, widened
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import ParameterError, choice, filename, integer, number
 
@@ -138,7 +136,7 @@ class LaserFile(Levelled):
         """Without waves shorter than `shortest_wave` (ISO 16610-21), sampled at a quarter of it."""
         from scipy.ndimage import gaussian_filter1d  # not needed to read a scene
 
-        from tireroad.contact.roads.levelling import DEVIATION
+        from tireroad.contact.roads.under_tire import DEVIATION
 
         step = max(math.floor(self.shortest_wave / 4 / pitch), 1)
         if step > 1:

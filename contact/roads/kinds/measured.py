@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from tireroad.contact.roads.files.grid_file import UNITS, read_grid
-from tireroad.contact.roads.files.opencrg import read_opencrg
 from tireroad.contact.roads.grid import Grid
+from tireroad.contact.roads.grid_file import UNITS, read_grid
 from tireroad.contact.roads.kind import Levelled, road_kind
+from tireroad.contact.roads.opencrg import read_opencrg
 from tireroad.fem.parameters import ParameterError, choice, filename
 
 _LAYOUT = (

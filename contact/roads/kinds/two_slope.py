@@ -4,9 +4,15 @@ import numpy as np
 
 from tireroad.contact.roads.kind import Levelled, road_kind
 from tireroad.contact.roads.kinds.iso8608 import CLASSES, Iso8608
-from tireroad.contact.roads.texture.isotropic import bands
-from tireroad.contact.roads.texture.layered import MOST_SKEW, Layered, band_power, textured
-from tireroad.contact.roads.texture.tiles import MOST_PLACES, tile_places
+from tireroad.contact.roads.texture.random_surface import (
+    MOST_PLACES,
+    MOST_SKEW,
+    Layered,
+    band_power,
+    bands,
+    textured,
+    tile_places,
+)
 from tireroad.fem.keys import Limits
 from tireroad.fem.parameters import ParameterError, choice, integer, number, numbers
 

@@ -60,6 +60,6 @@ class Layer(Elastic):
 
     def shear(self, farthest: float) -> Influence:
         """The half-space's shear with a correction; see contact.tread.layer_shear."""
-        from tireroad.contact.tread.layer_shear import LayerShear
+        from tireroad.contact.tread.layer import LayerShear
 
         return LayerShear(self.youngs_modulus, self.poisson_ratio, self.thickness)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.contact.results.levels import FEW, nominal
-from tireroad.contact.results.spectra import SILENT
+from tireroad.contact.results.spectra import FEW, SILENT, nominal
 from tireroad.runs.files.read import Results, Section, Table
 from tireroad.runs.report import figures, live
 from tireroad.runs.report.quantities import quantity

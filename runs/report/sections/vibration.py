@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.contact.results.levels import nominal
+from tireroad.contact.results.spectra import nominal
 from tireroad.runs.files.read import Results, Section
 from tireroad.runs.report import live
 from tireroad.runs.report.figures import COLOURS, RANGE_DB, WIDE, encode, line_canvas, styled

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tireroad.contact.patch import ON_A_NODE
 from tireroad.contact.roads.kinds.obstacle import Edges
 from tireroad.contact.roads.placement import begun_at
-from tireroad.contact.spacing import ON_A_NODE
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections.mesh2d import SectionMesh
 from tireroad.runs.scene.extent.wall import wall_of

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from tireroad.contact.roads.kind import ROADS, RoadKind
-from tireroad.contact.roads.motion import Motion
 from tireroad.contact.roads.placement import Placement
+from tireroad.contact.roads.under_tire import Motion
 from tireroad.runs.scene.schema import Variants, registered, table, variant
 
 

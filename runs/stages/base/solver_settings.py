@@ -71,8 +71,8 @@ def _contact(scene: Scene) -> str:
 
         parts.append(f"PETSc SNES vinewtonrsls, at most {MAX_ITERATIONS} iterations")
     if scene.contact.rubs:
-        from tireroad.contact.solver.friction import TOLERANCE as change
-        from tireroad.contact.solver.friction import TURNS
+        from tireroad.contact.solver.stick_slip import TOLERANCE as change
+        from tireroad.contact.solver.stick_slip import TURNS
 
         parts.append(f"friction to {change:g} of the largest force in at most {TURNS} iterations")
     return "; ".join([*parts, f"scheme {scene.time.scheme}"])

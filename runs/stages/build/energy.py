@@ -6,9 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tireroad.contact.driven import Driven
-from tireroad.contact.results.balance import Motion, energy_left, own_states, springs
-from tireroad.contact.results.energy import Circulation, Work
+from tireroad.contact.loop import Driven
+from tireroad.contact.results.energy import (
+    Circulation,
+    Motion,
+    Work,
+    energy_left,
+    own_states,
+    springs,
+)
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.modal.rolling import RollingModes

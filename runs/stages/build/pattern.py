@@ -10,7 +10,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from tireroad.contact.roads.files.archive import UNREADABLE, read_numbers
+from tireroad.contact.roads.grid_file import UNREADABLE, read_numbers
 from tireroad.contact.setup import ContactSetup
 from tireroad.contact.tread.pattern import Heights, Pattern, pitch_starts
 from tireroad.fem.errors import InputError

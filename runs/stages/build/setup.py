@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from scipy import sparse
 
-from tireroad.contact.roads.motion import make_motion
+from tireroad.contact.patch import spacing
 from tireroad.contact.roads.road import placed
+from tireroad.contact.roads.under_tire import make_motion
 from tireroad.contact.setup import ContactSetup, Rolled, contact_setup, nodes_within
-from tireroad.contact.spacing import spacing
 from tireroad.contact.tread.free_rolling import shape_slip
 from tireroad.fem.matrices import probe
 from tireroad.fem.static.state import StaticState

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tireroad.contact.respaced import MOST, ratio
+from tireroad.contact.grid_patch import MOST, ratio
 from tireroad.contact.results.chatter import choose, oscillation
 from tireroad.contact.setup import ContactSetup
 from tireroad.fem.errors import ConvergenceError, InputError

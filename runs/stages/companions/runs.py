@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tireroad.contact.respaced import halved, thinned
+from tireroad.contact.grid_patch import halved, thinned
 from tireroad.contact.results.error_bars import (
     Bars,
     Measured,

@@ -11,8 +11,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from tireroad.contact.loop import Instant
 from tireroad.contact.results.chatter import Chosen
-from tireroad.contact.rolling import Instant
 from tireroad.contact.setup import ContactSetup
 from tireroad.runs.files import packed, store
 from tireroad.runs.files.checksum import seal

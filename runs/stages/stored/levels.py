@@ -5,7 +5,7 @@ from __future__ import annotations
 import h5py
 import numpy as np
 
-from tireroad.contact.results import levels
+from tireroad.contact.results import spectra
 from tireroad.contact.results.spectra import (
     FORCE,
     MOMENT,
@@ -82,13 +82,13 @@ def levels_of(history: ContactHistory, start: int, up_to: float) -> dict[str, np
         welch = density(flat, history.step, up_to, rate)
         found[f"density/{what}"] = welch.density.reshape(-1, *shape)
     spacing = 1 / (len(flat) * history.step)
-    count = levels.lines(centre, spacing)
+    count = spectra.lines(centre, spacing)
     return found | {
         "third_octave/centre": centre,
-        "third_octave/nominal": levels.nominal(centre),
+        "third_octave/nominal": spectra.nominal(centre),
         "third_octave/lines": count,
-        "third_octave/confidence": levels.confidence(levels.freedom(count)),
-        "third_octave/too_narrow": levels.too_narrow(spacing, up_to),
+        "third_octave/confidence": spectra.confidence(spectra.freedom(count)),
+        "third_octave/too_narrow": spectra.too_narrow(spacing, up_to),
         "density/frequency": welch.frequency,
         "density/confidence": welch.confidence,
         "density/segment": np.array(welch.segment),
@@ -121,7 +121,7 @@ def describe(
                 (total, f"dB{letter} re 1 N") if total > SILENT else _CONSTANT
             )
         _warn_of_window(record, vertical, what)
-    narrow = levels.nominal(found["third_octave/too_narrow"])
+    narrow = spectra.nominal(found["third_octave/too_narrow"])
     if len(narrow):
         record.headline["bands left out, narrower than three lines"] = (_named(narrow), "-")
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.contact import closed_forms
-from tireroad.contact.solver.complementarity import ActiveSet
+from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.tread.compliance import half_space_compliance, rectangle_potential
 from tireroad.runs.thesis.claim import Claim
 from tireroad.runs.thesis.figure import Reproduced, figure

@@ -7,9 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from tireroad.contact import closed_forms as exact
-from tireroad.contact.solver.complementarity import ActiveSet
-from tireroad.contact.solver.friction import Friction
-from tireroad.contact.solver.tangential import Stiffness, stick_slip
+from tireroad.contact.solver.active_set import ActiveSet
+from tireroad.contact.solver.stick_slip import Friction, Stiffness, stick_slip
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import half_space_compliance, rectangle_potential
 

@@ -13,12 +13,12 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 
+from tireroad.contact.loop import roll
 from tireroad.contact.patch import Patch
 from tireroad.contact.roads.kinds.flat import Flat
 from tireroad.contact.roads.under_tire import RoadUnderTire
-from tireroad.contact.rolling import roll
 from tireroad.contact.setup import ContactSetup, Rolled
-from tireroad.contact.solver.complementarity import ActiveSet
+from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.tread.compliance import winkler_compliance
 from tireroad.contact.tread.pattern import Pattern, pitch_starts
 from tireroad.runs.measure.synthetic import oval_patch

@@ -10,20 +10,21 @@ from mpi4py import MPI
 from scipy import sparse
 
 from tireroad.contact.grid_patch import OnPoints
+from tireroad.contact.loop import Drive, roll
 from tireroad.contact.roads.kinds.flat import Flat
 from tireroad.contact.roads.kinds.obstacle import Cleat, Step
-from tireroad.contact.rolling import Drive, roll
-from tireroad.contact.solver.complementarity import ActiveSet
-from tireroad.contact.solver.friction import Friction
+from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.solver.grid_compliance import SpreadCompliance
 from tireroad.contact.solver.projected_cg import ProjectedCG
+from tireroad.contact.solver.stick_slip import Friction
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import (
+    GridPlaces,
+    KernelTread,
     half_space_compliance,
     half_space_influence,
     winkler_compliance,
 )
-from tireroad.contact.tread.kernel import GridPlaces, KernelTread
 from tireroad.contact.tread.shear import MatrixShear, half_space_shear
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.greens.recursion import Recursion

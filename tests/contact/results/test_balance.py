@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from tireroad.contact.results.balance import Motion, energy_left, springs
-from tireroad.contact.results.energy import Work
+from tireroad.contact.results.energy import Motion, Work, energy_left, springs
 from tireroad.fem.turning import Turning
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import couple

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
-from tireroad.contact.results import levels
+from tireroad.contact.results import spectra
 from tireroad.contact.results.spectra import VELOCITY, density, third_octaves
 
 STEP = 1e-4
@@ -19,12 +19,12 @@ CENTRES = 1000.0 * 10.0 ** (np.arange(-16, 2) / 10)
 
 
 def test_bands_are_named_as_in_the_standard() -> None:
-    assert levels.nominal(CENTRES) == pytest.approx(NAMES)
-    assert levels.nominal(np.array([87.0])) == 87.0, "no band, no other name"
+    assert spectra.nominal(CENTRES) == pytest.approx(NAMES)
+    assert spectra.nominal(np.array([87.0])) == 87.0, "no band, no other name"
 
 
 def test_a_weighting_of_every_band_is_the_standards() -> None:
-    np.testing.assert_allclose(levels.a_weighting(CENTRES), WEIGHTS, atol=0.05)
+    np.testing.assert_allclose(spectra.a_weighting(CENTRES), WEIGHTS, atol=0.05)
 
 
 def test_a_sine_has_its_level_weighted_and_not() -> None:
@@ -85,8 +85,8 @@ def test_confidence_covers_the_level_of_the_process() -> None:
     """Of 400 records of white noise, 95 % have the true level within the interval; of few lines and of many."""
     rng = np.random.default_rng(5)
     for band, spacing in ((100.0, 5.0), (500.0, 5.0)):
-        count = levels.lines(np.array([band]), spacing)
-        low, high = levels.confidence(levels.freedom(count))[0]
+        count = spectra.lines(np.array([band]), spacing)
+        low, high = spectra.confidence(spectra.freedom(count))[0]
         width = band * (10**0.05 - 10**-0.05)
         exact = 10 * np.log10(width / 2500.0)
         inside = 0
@@ -99,7 +99,7 @@ def test_confidence_covers_the_level_of_the_process() -> None:
 
 def test_bands_of_fewer_than_three_lines_are_told() -> None:
     """Lines 13 Hz apart: 3 lines are 39 Hz, what a band has from 169 Hz on."""
-    left_out = levels.nominal(levels.too_narrow(13.0, 258.0))
+    left_out = spectra.nominal(spectra.too_narrow(13.0, 258.0))
     assert left_out == pytest.approx([20, 25, 31.5, 40, 50, 63, 80, 100, 125, 160])
-    centre, _ = levels.band_sums(13.0 * np.arange(40), np.ones(40), 258.0)
-    assert levels.nominal(centre) == pytest.approx([200])
+    centre, _ = spectra.band_sums(13.0 * np.arange(40), np.ones(40), 258.0)
+    assert spectra.nominal(centre) == pytest.approx([200])

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import RegularGridInterpolator
 
-from tireroad.contact.roads.files.grid_file import read_grid
-from tireroad.contact.roads.grid import Grid
-from tireroad.contact.roads.window import fill_holes
+from tireroad.contact.roads.grid import Grid, fill_holes
+from tireroad.contact.roads.grid_file import read_grid
 from tireroad.fem.errors import InputError
 
 X, Y = 5.0 + 0.1 * np.arange(31), np.linspace(-0.5, 0.5, 11)

@@ -7,7 +7,7 @@ import pytest
 
 from tireroad.contact.roads.kinds.laser import LaserFile
 from tireroad.contact.roads.road import make_road
-from tireroad.contact.roads.texture.widened import memory, widened
+from tireroad.contact.roads.texture.measured_line import memory, widened
 from tireroad.fem.errors import InputError
 
 PITCH = 5e-4

@@ -7,12 +7,10 @@ import h5py
 import numpy as np
 import pytest
 
-from tireroad.contact.roads import rows, window
-from tireroad.contact.roads.files import grid_npz
-from tireroad.contact.roads.files.grid_file import read_grid
-from tireroad.contact.roads.grid import Grid
+from tireroad.contact.roads import grid, grid_file
+from tireroad.contact.roads.grid import ArrayRows, FileRows, Grid, pieces
+from tireroad.contact.roads.grid_file import read_grid
 from tireroad.contact.roads.road import make_road
-from tireroad.contact.roads.rows import ArrayRows, FileRows, pieces
 from tireroad.fem.errors import InputError
 
 pytestmark = pytest.mark.slow
@@ -70,7 +68,7 @@ def test_ten_kilometres_in_bounded_memory(tmp_path: Path) -> None:
 
 @pytest.fixture
 def small_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (rows, window, grid_npz):
+    for module in (grid, grid_file):
         monkeypatch.setattr(module, "PIECE", 200)
 
 
@@ -111,7 +109,7 @@ def test_pieces_of_a_file_are_the_road(tmp_path: Path, name: str, end: str) -> N
     write(tmp_path / name, z)
     strip = (0.0, 40.0 if end == "mirror" else 30.0, -0.35, 0.4)
     road = read_grid(tmp_path / name, holes="fill", end=end).prepare(*strip)
-    filled = window.fill_holes(z[:, 1:], X, Y[1:])
+    filled = grid.fill_holes(z[:, 1:], X, Y[1:])
     exact = Grid(X, Y[1:], filled, end=end)
     assert road.filled == np.isnan(z[:, 1:]).sum()
     x, y = np.random.default_rng(5).uniform(strip[::2], strip[1::2], (500, 2)).T
@@ -144,7 +142,7 @@ def test_all_pieces_cover_the_rows() -> None:
 
 def test_a_file_that_is_cut_while_it_is_driven_on(tmp_path: Path) -> None:
     (tmp_path / "z").write_bytes(Z.tobytes())
-    there = FileRows(tmp_path / "z", rows.Packed(0, Z.dtype, Z.shape))
+    there = FileRows(tmp_path / "z", grid.Packed(0, Z.dtype, Z.shape))
     assert np.array_equal(there.read(3, 7), Z[3:7])
     (tmp_path / "z").write_bytes(Z.tobytes()[:1000])
     with pytest.raises(InputError, match="ends while it is read"):

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tireroad.contact.roads.files.opencrg import read_opencrg
+from tireroad.contact.roads.opencrg import read_opencrg
 from tireroad.contact.roads.road import make_road
 from tireroad.fem.errors import InputError
 

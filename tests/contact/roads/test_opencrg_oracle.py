@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from test_opencrg import FORMATS, Z, crg
 
-from tireroad.contact.roads.files.opencrg import read_opencrg
+from tireroad.contact.roads.opencrg import read_opencrg
 
 pyopencrg = pytest.importorskip("pyopencrg", reason="PyOpenCRG is not installed")
 

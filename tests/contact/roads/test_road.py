@@ -7,9 +7,8 @@ import pytest
 
 from tireroad.contact.roads.grid import Grid
 from tireroad.contact.roads.kinds.sine import Sine
-from tireroad.contact.roads.motion import make_motion
 from tireroad.contact.roads.road import make_road
-from tireroad.contact.roads.under_tire import PreparedRoad, RoadUnderTire
+from tireroad.contact.roads.under_tire import PreparedRoad, RoadUnderTire, make_motion
 from tireroad.fem.errors import InputError
 
 STRIP = (0.1, 5.0, -0.1, 0.1)

@@ -8,10 +8,9 @@ import h5py
 import numpy as np
 import pytest
 
-from tireroad.contact.roads import rows
-from tireroad.contact.roads.files import grid_csv
-from tireroad.contact.roads.files.grid_file import read_grid
+from tireroad.contact.roads import grid, grid_file
 from tireroad.contact.roads.grid import Grid
+from tireroad.contact.roads.grid_file import read_grid
 from tireroad.fem.errors import InputError
 
 X, Y = 5e-4 * np.arange(400), 5e-4 * np.arange(200)
@@ -109,11 +108,11 @@ def test_unpacking_takes_no_more_than_half_of_the_disk(tmp_path: Path, monkeypat
     head = ",".join(["", *(f"{y:g}" for y in Y)])
     body = [f"{x:g},{line.partition(',')[2]}" for x, line in zip(X[1:], text[1:], strict=True)]
     (tmp_path / "zeros.csv").write_text("\n".join([head, *body]))
-    monkeypatch.setattr(rows, "PIECE", 1000)
-    monkeypatch.setattr(grid_csv, "BLOCK", 10)
+    monkeypatch.setattr(grid, "PIECE", 1000)
+    monkeypatch.setattr(grid_file, "BLOCK", 10)
     for name in ("zeros.npz", "zeros.csv"):
         read_grid(tmp_path / name)
-    monkeypatch.setattr(rows, "MAX_UNPACKED", 10_000)
+    monkeypatch.setattr(grid, "MAX_UNPACKED", 10_000)
     for name in ("zeros.npz", "zeros.csv"):
         with pytest.raises(InputError, match=rf"road\.file .*{name}: unpacked"):
             read_grid(tmp_path / name)

@@ -8,11 +8,20 @@ import pytest
 from tireroad.contact.roads.grid import Grid
 from tireroad.contact.roads.kinds.two_slope import TwoSlope
 from tireroad.contact.roads.road import make_road
-from tireroad.contact.roads.texture.isotropic import bands, profile_power, surface_density
-from tireroad.contact.roads.texture.layered import Skewed, band_power
-from tireroad.contact.roads.texture.levels import mean_profile_depth, texture_of, third_octaves
-from tireroad.contact.roads.texture.tiles import Tiles
-from tireroad.contact.roads.under_tire import RoadUnderTire
+from tireroad.contact.roads.texture.random_surface import (
+    Skewed,
+    Tiles,
+    band_power,
+    bands,
+    profile_power,
+    surface_density,
+)
+from tireroad.contact.roads.under_tire import (
+    RoadUnderTire,
+    mean_profile_depth,
+    texture_of,
+    third_octaves,
+)
 from tireroad.fem.errors import InputError
 
 PITCH = 5e-4

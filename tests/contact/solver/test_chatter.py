@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from tireroad.contact.loop import Drive, roll
 from tireroad.contact.model import step_solver
 from tireroad.contact.results.chatter import (
     FEWEST,
@@ -21,9 +22,8 @@ from tireroad.contact.results.chatter import (
     oscillation,
 )
 from tireroad.contact.roads.kinds.flat import Flat
-from tireroad.contact.rolling import Drive, roll
-from tireroad.contact.solver.complementarity import ActiveSet
-from tireroad.contact.solver.friction import Friction
+from tireroad.contact.solver.active_set import ActiveSet
+from tireroad.contact.solver.stick_slip import Friction
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.law import TREADS
 from tireroad.greens.recursion import Recursion, alternating

@@ -5,8 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from tireroad.contact.solver.choose import make_solver
-from tireroad.contact.solver.complementarity import ActiveSet
+from tireroad.contact.solver.active_set import ActiveSet, make_solver
 from tireroad.contact.solver.grid_compliance import MatrixCompliance
 from tireroad.contact.solver.projected_cg import ProjectedCG
 from tireroad.contact.solver.snes_vi import SnesVI

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tireroad.contact.solver.complementarity import ActiveSet
+from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.tread.creep import TreadMemory, creep_of, steady
 from tireroad.contact.tread.laws.viscoelastic import Viscoelastic
 from tireroad.fem.errors import InputError

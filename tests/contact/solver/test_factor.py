@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from tireroad.contact.solver.complementarity import ActiveSet
-from tireroad.contact.solver.factor import ActiveFactor
+from tireroad.contact.solver.active_set import ActiveFactor, ActiveSet
 from tireroad.contact.solver.grid_compliance import MatrixCompliance
 from tireroad.fem.errors import ConvergenceError
 from tireroad.greens.recursion import LoadedColumns

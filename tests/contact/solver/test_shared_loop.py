@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from tireroad.contact.rolling import Drive, roll
-from tireroad.contact.solver.choose import make_solver
-from tireroad.contact.solver.friction import Friction
+from tireroad.contact.loop import Drive, Solved, Together, roll
+from tireroad.contact.solver.active_set import make_solver
 from tireroad.contact.solver.grid_compliance import MatrixCompliance
-from tireroad.contact.solver.together import Solved, Together
+from tireroad.contact.solver.stick_slip import Friction
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import half_space_compliance
 from tireroad.fem.errors import ConvergenceError

@@ -10,13 +10,11 @@ from scipy import sparse
 from started import environment
 
 from tireroad.contact.model import DENSE_POINTS
-from tireroad.contact.solver.choose import make_solver
-from tireroad.contact.solver.complementarity import ActiveSet
+from tireroad.contact.solver.active_set import ActiveSet, make_solver
 from tireroad.contact.solver.grid_compliance import SpreadCompliance
 from tireroad.contact.solver.projected_cg import ProjectedCG
 from tireroad.contact.solver.snes_vi import PREFIX, SnesVI
-from tireroad.contact.tread.compliance import half_space_influence
-from tireroad.contact.tread.kernel import GridPlaces, KernelTread
+from tireroad.contact.tread.compliance import GridPlaces, KernelTread, half_space_influence
 
 
 @pytest.fixture(params=["vinewtonrsls", "vinewtonssls"])

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from tireroad.contact.solver.krylov import gmres
-from tireroad.contact.solver.tangential import Stiffness, stick_slip
+from tireroad.contact.solver.stick_slip import Stiffness, gmres, stick_slip
 
 
 @pytest.mark.parametrize("skew", [0.0, 1.0, 30.0])

@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 
-from tireroad.contact.solver import usual_set
-from tireroad.contact.solver.complementarity import ActiveSet
+from tireroad.contact.solver import active_set
+from tireroad.contact.solver.active_set import ActiveSet, Pivot, UsualSet
 from tireroad.contact.solver.grid_compliance import MatrixCompliance
-from tireroad.contact.solver.pivot import Pivot
-from tireroad.contact.solver.usual_set import UsualSet
 from tireroad.contact.tread.compliance import half_space_compliance
 from tireroad.fem.errors import ConvergenceError, InputError
 
@@ -53,8 +51,8 @@ def test_pivoted_forces_are_those_of_the_matrix() -> None:
 @pytest.mark.parametrize("price", [6.0, 1e-3])
 def test_agrees_with_the_plain_active_set(price: float, monkeypatch) -> None:
     """Also where the base is chosen anew again and again, and points dropped."""
-    monkeypatch.setattr(usual_set, "PRICE", price)
-    monkeypatch.setattr(usual_set, "SELDOM", 0.5)
+    monkeypatch.setattr(active_set, "PRICE", price)
+    monkeypatch.setattr(active_set, "SELDOM", 0.5)
     matrix = compliance()
     usual, plain = UsualSet(MatrixCompliance(matrix)), ActiveSet(matrix)
     counts = []

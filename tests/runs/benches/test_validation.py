@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from tireroad.contact.loop import Loop, roll
 from tireroad.contact.model import step_solver
 from tireroad.contact.results.spectra import distance
-from tireroad.contact.rolling import Loop, roll
 from tireroad.runs.measure.tabulate import modules
 from tireroad.runs.validation import passenger, rolling, schemes
 from tireroad.runs.validation.comparison import Comparison

@@ -4,7 +4,7 @@ import h5py
 import numpy as np
 import pytest
 
-from tireroad.contact.steps import equal_steps, steps_of
+from tireroad.contact.loop import equal_steps, steps_of
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.tables.road import Motion, Road
 from tireroad.runs.stages.build.rolling.stepping import passing_period

@@ -15,7 +15,7 @@ import pytest
 from synthetic_results import sealed, write_results, write_rotating
 from written_page import page
 
-from tireroad.contact.results.levels import nominal
+from tireroad.contact.results.spectra import nominal
 from tireroad.fem.errors import InputError
 from tireroad.runs.report import figures, surface_figures
 from tireroad.runs.report.page import write_report

@@ -7,13 +7,12 @@ from typing import NamedTuple
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from tireroad.contact.driven import Driven
 from tireroad.contact.grid_patch import OnPoints
+from tireroad.contact.loop import Driven, Loop, roll
 from tireroad.contact.model import step_solver, tread_memory, tread_shear
 from tireroad.contact.patch import Patch
-from tireroad.contact.rolling import Loop, roll
 from tireroad.contact.setup import ContactSetup
-from tireroad.contact.solver.friction import Friction
+from tireroad.contact.solver.stick_slip import Friction
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.free_rolling import free_slip
 from tireroad.greens.recursion import Recursion, sharers

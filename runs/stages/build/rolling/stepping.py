@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tireroad.contact.steps import equal_steps, steps_of
+from tireroad.contact.loop import equal_steps, steps_of
 from tireroad.greens.convolution import Convolution
 from tireroad.greens.recursion import Recursion, sharers
 from tireroad.greens.response import Response

@@ -1,1 +1,0 @@
-"""Contact models of the literature for comparison: asperities, wedges, fitted springs."""
