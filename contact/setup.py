@@ -16,7 +16,7 @@ from tireroad.contact.roads.cell_mean import CellMean
 from tireroad.contact.roads.kinds.flat import Flat
 from tireroad.contact.roads.under_tire import PreparedRoad, RoadUnderTire
 from tireroad.contact.tread.pattern import Pattern
-from tireroad.fem.static.curved.shape import RoadShape
+from tireroad.fem.static.road import RoadShape
 from tireroad.greens.response import Response
 
 _RUNG = 1.1

@@ -10,7 +10,7 @@ from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.keys import Limits, finite, whole
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.model import SmallMotions
-from tireroad.fem.static.path.journal import Journal
+from tireroad.fem.static.checkpoint import Journal
 from tireroad.fem.turning import Turning
 from tireroad.modal.basis import ModalBasis, project, with_air, with_corner
 from tireroad.modal.rotation_shapes import with_rotation_shapes

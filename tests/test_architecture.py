@@ -144,7 +144,6 @@ TO_MERGE = {
     "fem/decks/prony.py",
     "fem/decks/shape/mirror.py",
     "fem/static/diagnosis.py",
-    "fem/static/path/snap.py",
     "fem/tire/surface.py",
     "runs/bench/parts/truth.py",
     "runs/report/drawn.py",

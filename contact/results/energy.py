@@ -175,7 +175,7 @@ def springs(response: Response, force: np.ndarray) -> float:
     """Elastic energy (J) in the residual flexibility, with static states, at forces (k,) N.
 
     The first k outputs are the forces' own displacements; readings may follow them
-    (contact.driven).
+    (contact.loop).
     """
     if response.pulse:
         return 0.0

@@ -378,7 +378,7 @@ class Axis:
 class Grid:
     """Heights z (nx, ny) at ascending x (nx,) and y (ny,), all in m: z(x, y) at the file's own x.
 
-    z may be rows in a file (contact.roads.rows), read as the road rolls by, 32 MB at a time.
+    z may be rows in a file (above), read as the road rolls by, 32 MB at a time.
     `holes`: treatment of missing heights (NaN) in the strip given to `prepare`: "refuse", or "fill"
     by linear interpolation across the road, then along it, and by the nearest valid height at the
     borders; `filled` counts them. `end`: treatment of a strip longer than the road: "refuse", or

@@ -35,7 +35,7 @@ The active set on a rough road with hundreds of points, relative to the set that
 
 On a road whose texture makes points touch and lift off, a step of a few millimetres exchanges a
 hundred points, so a factor of the touching set serves only one step. The set of points that touch
-more often than not remains the same. Relative to it (contact.solver.pivot) the problem has as many
+more often than not remains the same. Relative to it the problem has as many
 nonzero unknowns as points differ: a third of those that touch, on a passenger tire, so a factor
 costs a thirtieth.
 
@@ -172,7 +172,7 @@ class ActiveSet:
     with a skew part three times the symmetric one 15 steps are needed; with ten times the step
     limit is exceeded. Source: Judice and Pires, Computers Ops Res. 21 (1994) 587.
 
-    The factor is kept and bordered as points come and go (contact.solver.factor): a step that ends
+    The factor is kept and bordered as points come and go: a step that ends
     in the set it began with needs no factorisation.
     """
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from tireroad.fem.errors import ConvergenceError, LoadingStopped
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.load_steps import Loader
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.body import Body
 

@@ -1,26 +1,251 @@
-"""Static equilibrium under inflation, steady rolling and a smooth frictionless road.
+"""Equilibrium on the road by Newton's method: forces, drag, resumed steps, and the solution.
+
+Record of the solutions on a load path, so that an interrupted path is retraced without solving.
+
+The path is a function of the outcomes and states of its solutions. It is retraced from its start,
+and each recorded solution is put in place. The solution after the last recorded one may use its
+tangent, which is not stored; the last solution of each problem is therefore solved again, from
+where it began.
+
+Springs to the current position that slow the motion of a body through a snap.
+
+Outcome of one equilibrium solve.
+
+Assembled residual and tangent of one body at its present displacement, without a road.
+
+Static equilibrium under inflation, steady rolling and a smooth frictionless road.
 
 F_int(u) + p F_pressure(u) + Omega^2 S (X + u) + gamma1 Omega B u + gamma2 Omega K M^-1 B u = f,
 with f >= 0 and z + u_z >= z_road at the tread dofs, one of the two an equality. On roads other than
-a level plane they move in road coordinates (curved.unrolled). Friction: fem.static.friction.
+a level plane they move in road coordinates (fem.static.road). Friction: fem.static.friction_road.
 """
 
 from __future__ import annotations
 
-import numpy as np
-from mpi4py import MPI
+import hashlib
+import math
+import weakref
+from collections.abc import Callable
+from dataclasses import dataclass
 
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from tireroad.fem import compat
 from tireroad.fem.errors import ConvergenceError
-from tireroad.fem.static.curved.shape import FLAT, RoadShape
-from tireroad.fem.static.curved.unrolled import Unrolled
-from tireroad.fem.static.forces import Forces
-from tireroad.fem.static.held_system import HeldSystem, Moved, System
-from tireroad.fem.static.linear_contact import LinearContact, held_step
-from tireroad.fem.static.path.history import History
-from tireroad.fem.static.path.step import Step
-from tireroad.fem.static.road import Road
-from tireroad.fem.static.virtual_work import AT_REST, Rolling
+from tireroad.fem.static.checkpoint import Entry, Journal
+from tireroad.fem.static.road import FLAT, Road, RoadShape, Unrolled
+from tireroad.fem.static.shape_damping import ShapeDamping
+from tireroad.fem.static.tangent import HeldSystem, LinearContact, Moved, System, held_step
+from tireroad.fem.static.virtual_work import (
+    AT_REST,
+    Rolling,
+    inverted_volume,
+    static_residual,
+    stress_prediction,
+    tangent,
+)
+from tireroad.fem.timing import Timing
 from tireroad.fem.tire.body import Body
+
+_ROAD = "active", "force", "height"
+
+
+class History:
+    """Solutions of the equilibrium problems of one stage, in order; none without a `journal`."""
+
+    def __init__(self, journal: Journal | None) -> None:
+        self._journal = journal
+        self._problems: list[weakref.ref[Equilibrium]] = []  # a past one may be freed
+        self._predicted: list[bool] = []
+        found = journal.found if journal else []
+        last = {int(entry["problem"]): k for k, entry in enumerate(found)}
+        self._again = set(last.values())
+
+    def solve(self, problem: Equilibrium, solve: Callable[[], Step]) -> Step:
+        """Result of `solve()`, with body and road left as it leaves them. Collective."""
+        if self._journal is None:
+            return solve()
+        number, comm = self._number(problem), problem.body.comm
+        place = self._journal.done
+        entry = self._journal.next(comm, lambda one: _same_mesh(problem, one))
+        predicted, self._predicted = self._predicted, []
+        if entry is None:
+            began = _state(problem, "begin")
+            step = solve()
+            found = began | _state(problem, "end") | _step(step)
+            found |= {"problem": np.array(number), "mesh": _mesh(problem)}
+            self._journal.add(found | {"predicted": np.array(predicted, dtype=bool)})
+            return step
+        if place in self._again:
+            _put(problem, entry, "begin")
+            return solve()
+        _put(problem, entry, "end")
+        return problem.solved(_read(entry))
+
+    def predict(self, predict: Callable[[], bool]) -> bool:
+        """Result of `predict()`, or the recorded one if the next solution is known. Collective."""
+        if self._journal is None:
+            return predict()
+        if self._journal.done < len(self._journal.found):
+            known = self._journal.found[self._journal.done]["predicted"]
+            answer = bool(known[len(self._predicted)])
+        else:
+            answer = predict()
+        self._predicted.append(answer)
+        return answer
+
+    def _number(self, problem: Equilibrium) -> int:
+        for k, one in enumerate(self._problems):
+            if one() is problem:
+                return k
+        self._problems.append(weakref.ref(problem))
+        return len(self._problems) - 1
+
+
+def _mesh(problem: Equilibrium) -> np.ndarray:
+    """Hash of the lattice ids of this process's own nodes."""
+    return np.frombuffer(hashlib.sha256(problem.body.ids.tobytes()).digest(), np.uint8)
+
+
+def _same_mesh(problem: Equilibrium, entry: Entry) -> bool:
+    return np.array_equal(_mesh(problem), entry["mesh"])
+
+
+def _state(problem: Equilibrium, when: str) -> dict[str, np.ndarray]:
+    kept = {name: np.array(one) for name, one in zip(_ROAD, problem.road.kept(), strict=True)}
+    kept["field"] = problem.body.u.x.array.copy()
+    return {f"{when}/{name}": value for name, value in kept.items()}
+
+
+def _put(problem: Equilibrium, entry: Entry, when: str) -> None:
+    problem.body.u.x.array[:] = entry[f"{when}/field"]
+    active, force, height = (entry[f"{when}/{name}"] for name in _ROAD)
+    problem.road.put_back((active.copy(), force.copy(), float(height)))
+
+
+def _step(step: Step) -> dict[str, np.ndarray]:
+    counted = np.array([step.converged, step.iterations, step.residual], dtype=float)
+    return {"step": counted, "reason": np.frombuffer(step.reason.encode(), np.uint8)}
+
+
+def _read(entry: Entry) -> Step:
+    converged, iterations, residual = entry["step"]
+    reason = bytes(entry["reason"]).decode()
+    return Step(bool(converged), int(iterations), float(residual), reason)
+
+
+class Drag:
+    """Springs of `stiffness` (owned unknowns,) N/m to the displacement at the last `here`."""
+
+    def __init__(self, body: Body, stiffness: float) -> None:
+        """Proportional to nodal mass, with mean `stiffness` (N/m) per unknown. Collective."""
+        mass = body.nodal_mass()
+        total, count = body.comm.allreduce(np.array([mass.sum(), len(mass)]))
+        self._field = body.u.x
+        self.stiffness = stiffness * mass * (count / total)
+        self.here()
+
+    def here(self) -> None:
+        """Anchor the springs at the current displacement."""
+        self._place = self._field.array[: len(self.stiffness)].copy()
+
+    def add_to(self, out: np.ndarray) -> None:
+        """Add the springs' forces (N) at the owned unknowns."""
+        out += self.stiffness * (self._field.array[: len(out)] - self._place)
+
+    def stiffen(self, tangent: PETSc.Mat) -> None:
+        """Add the springs to the tangent. Collective."""
+        diagonal = tangent.getDiagonal()
+        diagonal.array[:] += self.stiffness
+        tangent.setDiagonal(diagonal)
+
+
+@dataclass(frozen=True)
+class Step:
+    """Outcome of one solve: `iterations` tangents, `residual` relative to the force scale."""
+
+    converged: bool
+    iterations: int
+    residual: float
+    reason: str
+
+
+class Forces:
+    """All forces except those of the road. Forms and matrix are created once. Collective.
+
+    `pressure` (Pa) may be changed; `cost`: seconds by part; `drag`: springs that slow the body
+    during a snap.
+    """
+
+    def __init__(self, body: Body, rolling: Rolling) -> None:
+        self.body, self.rolling = body, rolling
+        self.cost = Timing()
+        self.drag: Drag | None = None
+        self.pressure = fem.Constant(body.mesh, 0.0)
+        self._before = fem.Function(body.space)
+        residual = static_residual(body, self.pressure, rolling)
+        self._damping: ShapeDamping | None = None
+        if rolling.speed * rolling.stiffness_damping:
+            self._damping = ShapeDamping(body, self.pressure, rolling)
+            residual += self._damping.work
+        self._residual = compat.form(residual)
+        self._tangent = compat.form(tangent(body, residual) + stress_prediction(body, self._before))
+        self._inverted = compat.form(inverted_volume(body))
+        self._clamp = [body.clamp()]
+        self._local_tangent = fem.petsc.create_matrix(self._tangent)
+        self.matrix = self._local_tangent
+        self._work = compat.force_vector(self._residual, body.space)
+        self._rim = (3 * body.rim[body.rim < body.nodes, None] + np.arange(3)).ravel()
+
+    @property
+    def lag(self) -> float:
+        """Most of an error that a Newton step leaves because its tangent is incomplete."""
+        return self._damping.lag if self._damping else 0.0
+
+    @property
+    def rounds(self) -> int:
+        """Solutions of a linear problem that complete it to 1e-9: 1 with a complete tangent."""
+        return 1 + math.ceil(math.log(1e-9) / math.log(self.lag)) if self.lag else 1
+
+    def lacking(self, change: np.ndarray, along: Unrolled | None) -> np.ndarray:
+        """Forces (N) of a `change` (m) that the tangent lacks, both in the road's coordinates
+        `along` or the wheel's axes. Collective."""
+        if not (self._damping and self.lag):
+            return np.zeros_like(change)
+        forces = self._damping.lacking(change if along is None else along.spread(change))
+        if along is not None:
+            along.turn(forces)
+        return forces
+
+    def _assemble_residual(self) -> np.ndarray:
+        """Residual forces at the owned dofs, N; 0 on the rim, where the wheel takes them."""
+        if self._damping:
+            self._damping.update()
+        with self._work.localForm() as local:
+            local.set(0.0)
+        fem.petsc.assemble_vector(self._work, self._residual)
+        self._work.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        if self.drag:
+            self.drag.add_to(self._work.array)
+        self._work.array[self._rim] = 0.0
+        return self._work.array_r
+
+    def _assemble_tangent(self) -> None:
+        self._local_tangent.zeroEntries()
+        fem.petsc.assemble_matrix(self._local_tangent, self._tangent, bcs=self._clamp)
+        self._local_tangent.assemble()
+        if self.drag:
+            self.drag.stiffen(self._local_tangent)
+        if self._damping:
+            self.matrix = self._damping.completed(self._local_tangent)
+
+    def _inside_out(self) -> bool:
+        """Whether det F <= 0 at some Gauss point: the energy does not distinguish J from -J."""
+        return self.body.comm.allreduce(fem.assemble_scalar(self._inverted)) > 0
+
 
 MOST_STEPS = 25  # tangents; a load step that needs more is better halved
 TOLERANCE = 1e-12  # of the force scale

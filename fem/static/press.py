@@ -10,10 +10,10 @@ import numpy as np
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.model import TireModel
-from tireroad.fem.static.curved.shape import FLAT, RoadShape
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.friction.press import Friction, with_friction
-from tireroad.fem.static.path.loading import Loader, Progress
+from tireroad.fem.static.friction_press import Friction, with_friction
+from tireroad.fem.static.load_steps import Loader, Progress
+from tireroad.fem.static.road import FLAT, RoadShape
 from tireroad.fem.static.state import StaticState, static_state
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 

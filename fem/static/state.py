@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tireroad.fem.static.curved.shape import FLAT, RoadShape
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.footprint import Footprint, footprint, nodal_area
+from tireroad.fem.static.road import FLAT, RoadShape
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.cord_forces import CordForce, cord_forces
 from tireroad.fem.tire.material import Material

@@ -44,7 +44,7 @@ from tireroad.fem.collective import summed
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.matrices.inertia_relief import RIGID
 from tireroad.fem.matrices.local_rows import from_local_rows
-from tireroad.fem.static.path.journal import Entry, Journal
+from tireroad.fem.static.checkpoint import Entry, Journal
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from petsc4py import PETSc
 
 from tireroad.fem.collective import summed
 from tireroad.fem.errors import ConvergenceError
-from tireroad.fem.static.path.journal import Journal
+from tireroad.fem.static.checkpoint import Journal
 from tireroad.modal.solver.canonical import ordered, turn_to_rule
 from tireroad.modal.solver.circulant import repeated
 from tireroad.modal.solver.fields import (

@@ -65,7 +65,7 @@ def _met(sign: str, asked: float, value: float) -> str:
 def _tire(comm: MPI.Comm):
     from tireroad.fem.matrices.operators import Operators
     from tireroad.fem.static.equilibrium import Equilibrium
-    from tireroad.fem.static.path.loading import Loader
+    from tireroad.fem.static.load_steps import Loader
     from tireroad.fem.tire.body import Body
     from tireroad.fem.tire.material import compound
 

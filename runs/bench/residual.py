@@ -11,7 +11,7 @@ from scipy import sparse
 from tireroad.fem.matrices import probe
 from tireroad.fem.model import SmallMotions, TireModel
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.load_steps import Loader
 from tireroad.fem.static.state import static_state
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound

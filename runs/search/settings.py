@@ -20,7 +20,7 @@ MODES = 2.25  # highest mode over highest frequency of interest, lowest rung: va
 SAMPLES = 8  # steps per period of that frequency on the lowest rung
 PASSING = 2.25  # contact points that pass per period of it, at least
 # Of the outer radius: largest spacing of points, 8 mm. The closest at which the error bars of a
-# radial tire still have a companion with half the spacing (contact.respaced): with 7 mm they missed
+# radial tire still have a companion with half the spacing (contact.grid_patch): with 7 mm they missed
 # the joints of cobblestones (25 % off, estimated as 12 %), with 10 mm a run was 44 % off there.
 POINTS = 1 / 40
 # An estimate can be smaller than the true error by this factor, and seldom by more

@@ -121,7 +121,7 @@ class GreensStage(Computed[Responses]):
         return made.response
 
     def _apart(self, name: str, whole: Response) -> dict[str, Response]:
-        """The contact's response, with prescribed forces as inputs (contact.driven), and theirs."""
+        """The contact's response, with prescribed forces as inputs (contact.loop), and theirs."""
         forces, more = len(self.job.scene.force), corner.readings(self.job)
         if name == "force" or not (forces or more):
             return {name: whole}

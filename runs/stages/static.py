@@ -10,11 +10,10 @@ import numpy as np
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.garbage import collect
 from tireroad.fem.static.diagnosis import with_cause
-from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.equilibrium import Equilibrium, History
 from tireroad.fem.static.footprint import Footprint
 from tireroad.fem.static.load_error import UNKNOWN, load_error
-from tireroad.fem.static.path.history import History
-from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.load_steps import Loader
 from tireroad.fem.static.press import Near, place
 from tireroad.fem.static.state import StaticState, static_state
 from tireroad.fem.static.virtual_work import AT_REST, Rolling

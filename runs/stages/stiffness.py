@@ -11,8 +11,8 @@ import numpy as np
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.matrices.road_stiffness import RoadStiffness, road_stiffness
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.path.load_curve import CurvePoint, load_curve, slopes
-from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.load_curve import CurvePoint, load_curve, slopes
+from tireroad.fem.static.load_steps import Loader
 from tireroad.fem.static.state import StaticState
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe

@@ -11,11 +11,10 @@ import tireroad
 from tireroad.fem.garbage import collect
 from tireroad.fem.matrices.operators import ROTATION
 from tireroad.fem.model import SmallMotions
-from tireroad.fem.static.curved.shape import FLAT
-from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.path.history import History
-from tireroad.fem.static.path.journal import Journal
-from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.checkpoint import Journal
+from tireroad.fem.static.equilibrium import Equilibrium, History
+from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.road import FLAT
 from tireroad.fem.static.virtual_work import AT_REST
 
 

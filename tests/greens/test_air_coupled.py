@@ -13,7 +13,7 @@ from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.matrices.rim_motion import rim_motion
 from tireroad.fem.matrices.support import Support
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.load_steps import Loader
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound

@@ -11,7 +11,7 @@ from tireroad.fem.matrices import direct, probe
 from tireroad.fem.matrices.compliance import LoadedShapes, compliance, on_own_rows
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.load_steps import Loader
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
 from tireroad.greens import coupling

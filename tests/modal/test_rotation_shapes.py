@@ -14,7 +14,7 @@ from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.model import SmallMotions, TireModel
 from tireroad.fem.sections.grid import PlyLine
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.load_steps import Loader
 from tireroad.fem.static.state import static_state
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound

@@ -9,12 +9,11 @@ import pytest
 from mpi4py import MPI
 
 from tireroad.fem.sections.split import split_ring
-from tireroad.fem.static import companion
 from tireroad.fem.static import load_error as of_load
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.footprint import Footprint
 from tireroad.fem.static.load_error import ENOUGH, LoadError, at_finer_footprint, load_error
-from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.load_steps import Loader
 from tireroad.fem.static.state import static_state
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.body import Body
@@ -92,7 +91,7 @@ def test_half_the_ring_tells_what_the_whole_does(monkeypatch):
     loader = pressed(ring(12, 6))
     half = load_error(loader, AT_REST)
     monkeypatch.setattr(Loader, "halved", None)
-    monkeypatch.setattr(companion, "looks_the_same", lambda ring, rolling: False)
+    monkeypatch.setattr(of_load, "looks_the_same", lambda ring, rolling: False)
     whole = load_error(loader, AT_REST)
     assert half.bulk == pytest.approx(whole.bulk, rel=1e-6)
     assert half.footprint == pytest.approx(whole.footprint, abs=2 * ENOUGH)
@@ -101,14 +100,14 @@ def test_half_the_ring_tells_what_the_whole_does(monkeypatch):
 
 def test_a_state_that_half_a_turn_changes_is_taken_whole():
     loader = pressed(ring(12, 6))
-    given = companion.Balance.of(loader, AT_REST)
-    assert isinstance(given.near(given.ring), companion.HalfTurnEquilibrium)
+    given = of_load.Balance.of(loader, AT_REST)
+    assert isinstance(given.near(given.ring), of_load.HalfTurnEquilibrium)
     bent = given.displacement.copy()
     ahead = loader.body.lattice.points(np.arange(len(bent)))[:, 0] > 0
     bent[ahead, 0] += 1e-3 * loader.body.ring.thickness
     loader.body.set_displacement(bent)
-    given = companion.Balance.of(loader, AT_REST)
-    assert not isinstance(given.near(given.ring), companion.HalfTurnEquilibrium)
+    given = of_load.Balance.of(loader, AT_REST)
+    assert not isinstance(given.near(given.ring), of_load.HalfTurnEquilibrium)
 
 
 @pytest.mark.long
@@ -122,7 +121,7 @@ def test_cords_between_whose_points_long_elements_are_strained(tmp_path, monkeyp
     loader = Loader(Equilibrium(make_body(MPI.COMM_SELF, tire, tire.ring())), lambda _: None)
     loader.inflate(2.2e5)
     loader.carry(4000.0)
-    finer = at_finer_footprint(companion.Balance.of(loader, AT_REST))
+    finer = at_finer_footprint(of_load.Balance.of(loader, AT_REST))
     monkeypatch.setattr(of_load, "at_finer_footprint", lambda _: finer)
     found = load_error(loader, AT_REST)
     assert finer.solved.solve(finer.height).converged  # to rounding

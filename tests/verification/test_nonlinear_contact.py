@@ -13,7 +13,7 @@ from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.matrices.probe import nodes
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.load_steps import Loader
 from tireroad.fem.static.state import static_state
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound

@@ -8,7 +8,7 @@ from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.matrices.road_stiffness import road_stiffness
 from tireroad.fem.sections.radial import radial
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.load_steps import Loader
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.symmetry import Sites
 from tireroad.runs.bench.series.inflated import InflatedRing, lowest

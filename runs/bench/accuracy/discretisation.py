@@ -82,7 +82,7 @@ def _fourier() -> np.ndarray:
 def _inflated(section):
     """A loader with the tire inflated. Collective."""
     from tireroad.fem.static.equilibrium import Equilibrium
-    from tireroad.fem.static.path.loading import Loader
+    from tireroad.fem.static.load_steps import Loader
 
     loader = Loader(Equilibrium(_body(section)), lambda progress: None)
     loader.inflate(INFLATION)

@@ -81,8 +81,7 @@ def at_heights(loader, cuts: Mapping[float, int]) -> list[Known]:
     From 2 `cuts` on also its limit, from that many bisections of the elements at the footprint.
     Collective.
     """
-    from tireroad.fem.static.companion import Balance
-    from tireroad.fem.static.load_error import at_finer_footprint, load_error
+    from tireroad.fem.static.load_error import Balance, at_finer_footprint, load_error
 
     found = []
     rolling = loader.equilibrium.rolling

@@ -41,12 +41,12 @@ PIECE = 64
 MOST = 1000
 """Touching points up to which "auto" takes the active set (contact.model.MOST_TOUCHING)."""
 PIVOT, PIVOTED, USUAL = 5, 2, 3
-"""Copies of the matrix of the usual set during pivoting and afterwards (contact.solver.pivot), and its
+"""Copies of the matrix of the usual set during pivoting and afterwards (contact.solver.active_set), and its
 size over the number of points that touch at rest: 3,094 of 958 (2026-11-25)."""
 SLIPPING = 16
 """Copies of the matrix of the touching points while the largest unique friction is found: the tread's
 kernels and their indices 7, the normal forces' 1, of twice its width the lifts 2, the coupling 1, its
-singular values 1 (contact.solver.friction). Not during pivoting."""
+singular values 1 (contact.solver.stick_slip). Not during pivoting."""
 
 FOOTPRINT = "columns of the footprint"
 FACTOR = "factor of the stiffness"

@@ -20,7 +20,7 @@ def solver_settings(stage: str, scene: Scene) -> str:
 
 def _static(scene: Scene) -> str:
     from tireroad.fem.static.equilibrium import MOST_STEPS, TOLERANCE
-    from tireroad.fem.static.path.way import LOAD_TOLERANCE
+    from tireroad.fem.static.load_steps import LOAD_TOLERANCE
 
     return (
         f"Newton's method, residual at most {TOLERANCE:g} of the force scale, at most {MOST_STEPS} "

@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 
 from tireroad.fem.matrices.road_stiffness import RoadStiffness
-from tireroad.fem.static.friction.slide import Slid, Slide
+from tireroad.fem.static.friction_press import Slid, Slide
 from tireroad.fem.static.state import StaticState
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe

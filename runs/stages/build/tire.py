@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
     from tireroad.fem.sections.ring import Ring
-    from tireroad.fem.static.curved.shape import RoadShape
+    from tireroad.fem.static.road import RoadShape
     from tireroad.fem.tire.body import Body
     from tireroad.runs.scene.tables.scene import Scene
     from tireroad.runs.scene.tables.tire import Tire
@@ -25,7 +25,7 @@ def make_tire(comm: MPI.Comm, tire: Tire):
 
 def road_shape(scene: Scene) -> RoadShape:
     """The road's shape under the tire: the wheel's camber, and the drum if there is one."""
-    from tireroad.fem.static.curved.shape import RoadShape
+    from tireroad.fem.static.road import RoadShape
 
     drum = scene.road.drum_radius if scene.road else None
     return RoadShape(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from tireroad.fem.static.friction.press import Friction
+from tireroad.fem.static.friction_press import Friction
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.turning import Turning
 from tireroad.modal.damping import Damping, Proportional, StrainEnergy

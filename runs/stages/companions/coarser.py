@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from tireroad.fem.errors import InputError
-from tireroad.fem.static.path.carried_over import carried_over
+from tireroad.fem.static.load_error import carried_over
 from tireroad.fem.static.state import StaticState
 from tireroad.runs.files.folder import make_folder
 from tireroad.runs.process.mpi import on_root

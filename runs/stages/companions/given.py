@@ -28,7 +28,7 @@ class Given:
     Its `job`, static state, patch and road (`setup`, not settled), response and rolling modes; the
     first `steps` of `step` s of its loop, integrated by `scheme`. `free_slip`: the slip of free
     rolling, already in `setup`; another setup of the scene needs it too. `most`: touching points
-    that a companion may have (contact.respaced.ratio).
+    that a companion may have (contact.grid_patch.ratio).
     """
 
     job: Job

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tireroad.fem.static.path.journal import Entry, Journal
+from tireroad.fem.static.checkpoint import Entry, Journal
 from tireroad.runs.files import store
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root

@@ -11,7 +11,7 @@ from scipy.sparse.linalg import eigsh
 
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.load_steps import Loader
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import Material, compound
 from tireroad.fem.tire.mesh import Torus

@@ -12,8 +12,8 @@ from scipy.optimize import root_scalar
 from tireroad.contact import closed_forms as exact
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.friction.balance import RubbingEquilibrium
-from tireroad.fem.static.friction.sliding import Passing, Sliding, Standing
+from tireroad.fem.static.friction_press import RubbingEquilibrium
+from tireroad.fem.static.friction_road import Passing, Sliding, Standing
 from tireroad.fem.static.virtual_work import AT_REST
 from tireroad.runs.validation.parts.roller import Roller, middle, plane
 

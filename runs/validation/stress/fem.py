@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.load_steps import Loader
 from tireroad.fem.static.state import StaticState, static_state
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body

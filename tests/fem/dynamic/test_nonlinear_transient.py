@@ -9,7 +9,7 @@ from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.matrices import probe
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.load_steps import Loader
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
 from tireroad.fem.transient.linear import FullTire

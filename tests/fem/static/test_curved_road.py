@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from tireroad.fem.static.curved.shape import FLAT, RoadShape
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.load_steps import Loader
 from tireroad.fem.static.press import place
+from tireroad.fem.static.road import FLAT, RoadShape
 from tireroad.fem.static.state import static_state
 
 SHAPES = {

@@ -7,7 +7,7 @@ from petsc4py import PETSc
 
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.load_steps import Loader
 from tireroad.fem.static.state import static_state
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.material import compound

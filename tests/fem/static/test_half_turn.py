@@ -7,11 +7,11 @@ import pytest
 from mpi4py import MPI
 
 from tireroad.fem.sections.grid import PlyLine
+from tireroad.fem.static import load_steps
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.held_system import HeldSystem
-from tireroad.fem.static.path import loading
-from tireroad.fem.static.path.loading import Loader
-from tireroad.fem.static.symmetry.half_turn import looks_the_same
+from tireroad.fem.static.half_model import looks_the_same
+from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.tangent import HeldSystem
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.cords import Cords
 from tireroad.fem.tire.material import compound
@@ -53,7 +53,7 @@ def test_half_the_ring_finds_the_state_of_the_whole(make_body, monkeypatch, roll
     half = _loaded(_tire(make_body), rolling)
     assert [step.iterations for step in taken] == [0]
     assert max(factorised) == 3 * _tire(make_body).lattice.shape[1] * 9  # nodes at 9 of 16 angles
-    monkeypatch.setattr(loading, "looks_the_same", lambda ring, rolling: False)
+    monkeypatch.setattr(load_steps, "looks_the_same", lambda ring, rolling: False)
     whole = _loaded(_tire(make_body), rolling)
     assert half.load() == pytest.approx(LOAD, rel=1e-9)
     assert half.deflection == pytest.approx(whole.deflection, rel=1e-9)
@@ -84,7 +84,7 @@ def test_a_curve_by_halves_is_that_of_the_whole(make_body, monkeypatch):
         return [loader.load() for _ in loader.visit((1e-3, 2e-3, 4e-3))]
 
     by_halves = loads()
-    monkeypatch.setattr(loading, "looks_the_same", lambda ring, rolling: False)
+    monkeypatch.setattr(load_steps, "looks_the_same", lambda ring, rolling: False)
     np.testing.assert_allclose(by_halves, loads(), rtol=1e-9)
 
 

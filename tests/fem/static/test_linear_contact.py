@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from tireroad.fem.static import linear_contact
+from tireroad.fem.static import tangent
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.linear_contact import LinearContact, held_step
-from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.tangent import LinearContact, held_step
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.material import compound
 
@@ -46,7 +46,7 @@ def test_columns_are_as_good_as_a_factorisation(make_body, monkeypatch, load, ro
     system = taken(problem, others)
     wanted = held_step(problem.body.comm, system, road, (out, system.closing, load))
     reaction, rise, road.height = wanted[1], road.height - height, height
-    monkeypatch.setattr(linear_contact, "_ROUNDS", 0)
+    monkeypatch.setattr(tangent, "_ROUNDS", 0)
     system = taken(problem, some)
     contact = LinearContact(problem.body.comm, system, road)
     road.active = others.copy()

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tireroad.fem.static.curved.shape import FLAT, RoadShape
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.load_steps import Loader
 from tireroad.fem.static.press import Near, place
+from tireroad.fem.static.road import FLAT, RoadShape
 from tireroad.fem.static.state import static_state
 from tireroad.fem.static.virtual_work import Rolling
 

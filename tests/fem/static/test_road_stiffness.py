@@ -11,8 +11,8 @@ from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.matrices.road_stiffness import road_stiffness
 from tireroad.fem.matrices.support import rigid_motions
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.path.load_curve import load_curve, slopes
-from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.load_curve import load_curve, slopes
+from tireroad.fem.static.load_steps import Loader
 
 pytestmark = pytest.mark.slow
 

@@ -8,7 +8,7 @@ from tireroad.fem.matrices.direct import solve_all
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.matrices.probe import nodes
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.load_steps import Loader
 from tireroad.fem.static.state import static_state
 from tireroad.fem.static.virtual_work import Rolling
 

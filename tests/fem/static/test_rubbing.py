@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tireroad.fem.static.curved.shape import FLAT
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.friction.press import Friction
-from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.friction_press import Friction
+from tireroad.fem.static.load_steps import Loader
 from tireroad.fem.static.press import place
+from tireroad.fem.static.road import FLAT
 from tireroad.fem.static.state import static_state
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.runs.validation.parts import static_friction as closed

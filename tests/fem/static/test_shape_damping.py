@@ -7,11 +7,11 @@ from scipy import sparse
 from scipy.sparse.linalg import eigs
 
 from tireroad.fem.static import shape_damping
-from tireroad.fem.static.curved.shape import FLAT, RoadShape
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.friction.press import Friction
-from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.friction_press import Friction
+from tireroad.fem.static.load_steps import Loader
 from tireroad.fem.static.press import place
+from tireroad.fem.static.road import FLAT, RoadShape
 from tireroad.fem.static.virtual_work import Rolling
 
 SPEED = 60.0

@@ -8,12 +8,11 @@ from mpi4py import MPI
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.road_stiffness import road_stiffness
-from tireroad.fem.static.curved.shape import FLAT, RoadShape
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.friction.press import Friction
-from tireroad.fem.static.friction.slide import Slide
-from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.friction_press import Friction, Slide
+from tireroad.fem.static.load_steps import Loader
 from tireroad.fem.static.press import place
+from tireroad.fem.static.road import FLAT, RoadShape
 from tireroad.fem.static.state import static_state
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 

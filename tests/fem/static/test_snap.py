@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.path import snap
-from tireroad.fem.static.path.loading import Loader
-from tireroad.fem.static.path.step import Step
-from tireroad.fem.static.path.stepping import Show, march
+from tireroad.fem.static import load_steps
+from tireroad.fem.static.equilibrium import Equilibrium, Step
+from tireroad.fem.static.load_steps import Loader, Show, march
 from tireroad.fem.tire.material import compound
 
 SOFT = compound("neo-hookean", 1100.0, youngs_modulus=5e6, poisson_ratio=0.49)
@@ -28,7 +26,7 @@ def loader(make_body):
 def test_falls_to_the_state_that_small_steps_find(loader):
     """One shape carries this load, and no drag is left in it."""
     problem, start = loader.equilibrium, loader.body.u.x.array.copy()
-    fallen = snap.fall(problem, loader.touch + DEEP)
+    fallen = load_steps.fall(problem, loader.touch + DEEP)
     assert fallen.converged and problem.drag is None
     found, force = loader.body.u.x.array.copy(), problem.load()
     loader.body.u.x.array[:] = start
@@ -45,8 +43,8 @@ def test_what_does_not_come_to_rest_is_put_back(loader, monkeypatch):
     problem = loader.equilibrium
     loader.deflect(0.005)
     before, force, height = loader.body.u.x.array.copy(), problem.load(), problem.road_height
-    monkeypatch.setattr(snap, "_MOST", 3)
-    fallen = snap.fall(problem, loader.touch + DEEP)
+    monkeypatch.setattr(load_steps, "_MOST_FALLS", 3)
+    fallen = load_steps.fall(problem, loader.touch + DEEP)
     assert not fallen.converged and "pseudo-transient continuation" in fallen.reason
     assert problem.drag is None and problem.road_height == problem.road.height == height
     assert problem.load() == force

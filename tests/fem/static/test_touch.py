@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.load_steps import Loader
 from tireroad.fem.static.tread_surface import TreadSurface
 from tireroad.fem.tire.mesh import Lattice, position
 from tireroad.runs.measure.torus import thesis_torus

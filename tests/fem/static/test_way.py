@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from tireroad.fem.errors import ConvergenceError
-from tireroad.fem.static.path.loading import Loader
-from tireroad.fem.static.path.step import Step
-from tireroad.fem.static.path.way import Way
+from tireroad.fem.static.equilibrium import Step
+from tireroad.fem.static.load_steps import Loader, Way
 
 # As measured on a torus of 16 x 6 elements: m, N. Its wall folds at 0.094 m.
 DEFLECTION = 0.0, 0.0511, 0.0661, 0.0886, 0.0916, 0.0938, 0.0948, 0.0976, 0.1066, 0.1124, 0.13

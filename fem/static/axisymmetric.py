@@ -23,7 +23,7 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from tireroad.fem.errors import LoadingStopped
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.held_system import Moved
+from tireroad.fem.static.tangent import Moved
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.timing import Timing
 from tireroad.fem.tire.body import Body

@@ -1,1 +1,0 @@
-"""Roads other than a level plane: camber and drums."""

@@ -1,1 +1,0 @@
-"""Load steps from the unloaded tire to the requested static state."""

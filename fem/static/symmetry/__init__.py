@@ -1,1 +1,0 @@
-"""Static states reduced by symmetry: one section, or half of the ring."""
