@@ -167,12 +167,16 @@ def _spread(group: h5py.Group, over: h5py.Dataset) -> Columns:
         label, values = NAMES.get(name, name.replace("_", " ")), held[()].reshape(-1, points, 3)
         for point in range(points):
             place = f" {point + 1}" if held.ndim > 2 else ""
-            unit = held.attrs["unit"]
-            column = values[:, point]
-            if unit.startswith("dB"):  # of what does not vary: no level, an empty cell
-                column = np.where(column > SILENT, column, np.nan)
+            unit, column = held.attrs["unit"], values[:, point]
+            if unit.startswith("dB"):
+                column = _heard(column)
             columns |= _components(label + place, column, unit)
     return columns
+
+
+def _heard(level: NDArray) -> NDArray:
+    """Levels in dB, NaN for an empty cell where nothing varies."""
+    return np.where(level > SILENT, level, np.nan)
 
 
 def response(file: h5py.File) -> dict[str, Callable[[Path], object]]:
@@ -207,7 +211,7 @@ def vibration(file: h5py.File) -> dict[str, Callable[[Path], object]]:
     }
     centre = file["third_octave/centre"][()]
     columns = {"band [Hz]": nominal(centre), "exact centre of the band [Hz]": centre}
-    columns |= {label: file[f"third_octave/{name}"][()] for label, name in names.items()}
+    columns |= {label: _heard(file[f"third_octave/{name}"][()]) for label, name in names.items()}
     return _table("vibration.csv", columns)
 
 

@@ -22,6 +22,7 @@ from tireroad.runs.report.differences import (
     mode_rows,
     scene_rows,
 )
+from tireroad.runs.report.figures import FEWEST_BANDS
 from tireroad.runs.report.quantities import quantity
 from tireroad.runs.version import PROGRAM, VERSION
 
@@ -127,7 +128,7 @@ def _figures(
     found = []
     for group, what in DRAWN.items():
         rows = [row for row in levels if row.group == group]
-        if rows:
+        if len(rows) >= FEWEST_BANDS:  # fewer are in the table
             found.append((pictures.levels(rows, names), f"Third octaves of the {what}."))
     histories = {
         name: (run["contact/time"], run["contact/total_force"][:, 2])

@@ -45,7 +45,6 @@ RANGE_DB = 100.0  # dB: lines further below the highest one of a spectrum are no
 LEAST_RANGE_DB = 20.0  # dB: on a smaller range, tiny differences between bars look large
 
 
-LEAST_BANDS = 5  # least number of bands that get space
 FEWEST_BANDS = 3  # of a chart: fewer are said in numbers
 
 
@@ -164,7 +163,7 @@ def third_octaves(
     here.set_xticks(place, [f"{value:g}" for value in nominal(centre)], rotation=45)
     here.grid(axis="x", visible=False)
     here.set(xlabel="third-octave band in Hz", ylabel=label)
-    here.set_xlim(-0.6, max(len(centre), LEAST_BANDS) - 0.4)
+    here.set_xlim(-0.6, len(centre) - 0.4)
     here.legend(ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0))
     return encode(figure)
 

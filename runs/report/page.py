@@ -74,8 +74,14 @@ def render(directory: Path) -> str:
     sections, left_out, provenance = build_sections(directory, scene, stages, problems)
     with Results(directory, scene) as results:
         facts, strange = answer(results, summary.get("stages_known", {})), unusual(results)
+        short = too_short(results)
     remarked = [("realism", strange)] if strange else []
-    remarked += [(name, warning) for name, stage in stages.items() for warning in stage["warnings"]]
+    remarked += [
+        (name, warning)
+        for name, stage in stages.items()
+        for warning in stage["warnings"]
+        if warning != short
+    ]
     remarked += [(section.title, warning) for section in sections for warning in section.warnings]
     loader = FileSystemLoader(Path(__file__).parent / "pages")
     pages = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
@@ -85,6 +91,7 @@ def render(directory: Path) -> str:
         program={"name": PROGRAM, "version": ""} | summary.get("program", {}),
         processes=summary.get("processes"),
         computed=computed(directory),
+        too_short=short,
         answer=facts,
         script=live.script(),
         style=live.style(),
@@ -98,6 +105,14 @@ def render(directory: Path) -> str:
         left_out=left_out,
         scene_text=scene_text,
     )
+
+
+def too_short(results: Results) -> str:
+    """What the spectra say of a run without its low third octaves, for the head of the page."""
+    try:
+        return str(results.attribute("spectra.h5", "too_short") or "")
+    except (Absent, InputError):
+        return ""
 
 
 def remarks(directory: Path) -> str | None:

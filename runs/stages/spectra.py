@@ -34,7 +34,8 @@ class Spectra:
 
     `frequency` (f,) Hz; `contact_force` and, if stored, `axle_force` (f, 3) N: complex amplitudes;
     `left_out` s: the run-in; `limit`: where the model ends; `levels`: third octaves and densities
-    by the names of runs.stages.stored.levels; `level_error` and `contact_level_error` (b, 3) dB:
+    by the names of runs.stages.stored.levels; `too_short`: what the reader is told of a run without
+    its low bands, empty if it has them; `level_error` and `contact_level_error` (b, 3) dB:
     estimated errors of the third octaves of axle and contact force, NaN where unknown, None if not
     requested; `wheel`: hub moments and motions of a moving wheel, (f, 3) or (f, 1), by the names of
     runs.stages.build.corner.
@@ -45,6 +46,7 @@ class Spectra:
     left_out: float
     limit: Limit
     levels: dict[str, np.ndarray]
+    too_short: str = ""
     wheel: dict[str, np.ndarray] = field(default_factory=dict)
     axle_force: np.ndarray | None = None
     level_error: np.ndarray | None = None
@@ -91,7 +93,9 @@ class SpectraStage(Computed[Spectra]):
         below = frequency <= limit.frequency
         found = levels.levels_of(history, start, limit.frequency)
         levels.describe(record, found, history, start, limit.frequency)
-        _warn_of_short_record(record, found["third_octave/centre"], limit.frequency, start * step)
+        grows = run_in(self.setup.product, self.job.scene.road)
+        short = too_short(found["third_octave/centre"], limit.frequency, grows)
+        record.warnings += [short] if short else []
         axle = {}
         if history.axle_force is not None:
             force = history.axle_force[start:]
@@ -113,6 +117,7 @@ class SpectraStage(Computed[Spectra]):
             limit=limit,
             wheel=wheel,
             levels=found,
+            too_short=short,
             **axle,
         )
 
@@ -163,28 +168,35 @@ class SpectraStage(Computed[Spectra]):
         file.attrs["left_out"] = product.left_out
         file.attrs["limit"] = product.limit.frequency
         file.attrs["limit_cause"] = product.limit.cause
+        file.attrs["too_short"] = product.too_short
 
     def read(self, file) -> Spectra:
         """The same, read back."""
         kept = {name: file[stored][:] for name, (stored, _) in _UNITS.items() if stored in file}
         limit = Limit(float(file.attrs["limit"]), str(file.attrs["limit_cause"]))
         wheel = {name: file[name][:] for name in corner.UNITS if name in file}
-        left_out = float(file.attrs["left_out"])
         return Spectra(
-            left_out=left_out, limit=limit, levels=levels.read(file), wheel=wheel, **kept
+            left_out=float(file.attrs["left_out"]),
+            limit=limit,
+            levels=levels.read(file),
+            too_short=str(file.attrs["too_short"]),
+            wheel=wheel,
+            **kept,
         )
 
 
-def _warn_of_short_record(
-    record: Record, centre: np.ndarray, up_to: float, left_out: float
-) -> None:
-    """Say from which duration on a run that is too short has its low third octaves (b,) Hz."""
+def too_short(centre: np.ndarray, up_to: float, grows: float) -> str:
+    """What a run without its low third octaves is told; empty if it has them.
+
+    `centre` (b,) Hz: the bands it has; `up_to` Hz: where the model ends; `grows` s: the run-in,
+    which is left out of a run of more than twice its length only.
+    """
     wanted = lowest_wanted(up_to)
     if not wanted or centre.min(initial=np.inf) < 1.05 * wanted:
-        return
-    needed = left_out + 1.01 * least_duration(wanted)
+        return ""
+    needed = 1.01 * max(grows + least_duration(wanted), 2 * grows)
     has = f"none below {nominal(centre.min()):g} Hz" if len(centre) else "none"
-    record.warnings.append(
+    return (
         f"the run is too short for third octaves from {nominal(np.array(wanted)):g} Hz on, and has {has}: "
         f"take time.duration = {math.ceil(100 * needed) / 100:g} s"
     )

@@ -99,12 +99,11 @@ def bars(
     *,
     ends: tuple[float, float],
     few: NDArray,
-    least: int,
     height: int = 300,
 ) -> dict[str, Any]:
     """Bars by name, each (values (n,), errors (n,) or None), side by side over named places (n,).
 
-    From ends[0] to at least ends[1], with space for at least `least` places; pale where `few` (n,).
+    From ends[0] to at least ends[1]; pale where `few` (n,).
     Non-finite values have no bar.
     """
     drawn = [
@@ -124,7 +123,6 @@ def bars(
         "floor": float(ends[0]),
         "top": float(ends[1]),
         "few": [bool(one) for one in few],
-        "least": least,
         "height": height,
     }
 

@@ -113,7 +113,7 @@ function drawBars(given, box, key) {
   };
   const shown = (_, low, high) => { // of one bar alone uPlot makes a range of a hundred
     const first = Math.max(Math.round(low), 0), last = Math.min(Math.round(high), count - 1);
-    return [first - 0.6, Math.max(last, Math.min(first + given.least, given.least) - 1) + 0.6];
+    return [first - 0.6, last + 0.6];
   };
   const told = (k, v, n) => (v == null ? "–" : digits(v) + (errors[k][n] == null ? "" : " ± " + digits(errors[k][n])));
   const plot = new uPlot({

@@ -43,11 +43,19 @@ def spectra(results: Results) -> Section:
         from tireroad.runs.report.sections import search
 
         search.add(results, section)
-    section.show(
-        figures.spectrum(frequency, force, of), "Amplitude spectrum.", _lines(frequency, force, of)
-    )
+    if len(frequency) > 2:
+        picture = figures.spectrum(frequency, force, of)
+        section.show(picture, "Amplitude spectrum.", _lines(frequency, force, of))
+    else:
+        section.facts.append(_one_line(frequency[1], force[1], of))
     densities(results, section)
     return section
+
+
+def _one_line(frequency: float, force: NDArray, of: str) -> tuple[str, str]:
+    """The amplitudes (3,) N of a spectrum's only line beside 0 Hz, which would be a chart of a dot."""
+    parts = (f"{axis} {quantity(float(abs(v)), 'N')}" for axis, v in zip("xyz", force, strict=True))
+    return f"{of}, amplitude at {quantity(float(frequency), 'Hz')}", ", ".join(parts)
 
 
 def _lines(frequency: NDArray, force: NDArray, of: str) -> dict:
@@ -77,7 +85,7 @@ def octaves(results: Results, section: Section, of: str) -> None:
             f"{bands} fewer than three spectral lines, so they have no level: lengthen time.duration."
         )
     if centre is None or level is None or not len(centre):
-        section.notes.append("No third-octave bands in spectra.h5.")
+        section.notes.append("The run has no third-octave band.")
         return
     error = results.optional(_FILE, f"third_octave/{name}_error")
     weighted = results.optional(_FILE, f"third_octave/{name}_a_weighted")
@@ -118,7 +126,6 @@ def _show_bands(
         figures.COLOURS,
         ends=figures.level_range(level),
         few=few,
-        least=figures.LEAST_BANDS,
     )
     picture = figures.third_octaves(centre, level, error, label, few)
     section.show(picture, _caption(of, error, few), drawn)
@@ -127,16 +134,20 @@ def _show_bands(
 def _in_numbers(
     centre: NDArray, level: NDArray, error: NDArray | None, of: str, reference: str
 ) -> list[tuple[str, str]]:
-    """Facts of bands too few for a chart: their vertical levels, and errors where they are known."""
-    found = []
-    for band, (name, value) in enumerate(zip(nominal(centre), level[:, 2], strict=True)):
-        if value > SILENT:
-            known = error is not None and np.isfinite(error[band, 2])
-            about = f" ± {error[band, 2]:.1f}" if known else ""
-            found.append(
-                (f"{of}, vertical, third octave {name:g} Hz", f"{value:.1f}{about} {reference}")
-            )
-    return found
+    """Facts of bands too few for a chart: levels (b, 3) by component, and errors where known."""
+    about = np.full_like(level, np.nan) if error is None else error
+    return [
+        (
+            f"{of}, third octave {name:g} Hz, {reference}",
+            ", ".join(f"{axis} {_bounded(v, e)}" for axis, v, e in zip("xyz", *both, strict=True)),
+        )
+        for name, *both in zip(nominal(centre), level, about, strict=True)
+    ]
+
+
+def _bounded(level: float, error: float) -> str:
+    known = level > SILENT and np.isfinite(error)
+    return _texts(np.array([level]))[0] + (f" ± {error:.1f}" if known else "")
 
 
 def few_lines(results: Results, count: int) -> NDArray:

@@ -6,7 +6,15 @@ from numpy.typing import NDArray
 from tireroad.contact.results.spectra import nominal
 from tireroad.runs.files.read import Results, Section
 from tireroad.runs.report import live
-from tireroad.runs.report.figures import COLOURS, RANGE_DB, WIDE, encode, line_canvas, styled
+from tireroad.runs.report.figures import (
+    COLOURS,
+    FEWEST_BANDS,
+    RANGE_DB,
+    WIDE,
+    encode,
+    line_canvas,
+    styled,
+)
 
 
 def vibration(results: Results) -> Section:
@@ -32,6 +40,15 @@ def vibration(results: Results) -> Section:
         return section
     plain = results.array(name, "third_octave/radiated_power_level")
     weighted = results.array(name, "third_octave/radiated_power_level_a_weighted")
+    if len(centre) < FEWEST_BANDS:
+        section.facts += [
+            (
+                f"radiated power, third octave {name:g} Hz",
+                f"{power:.1f} dB, {heard:.1f} dB(A) re 1 pW",
+            )
+            for name, power, heard in zip(nominal(centre), plain, weighted, strict=True)
+        ]
+        return section
     picture = radiated_power(centre, plain, weighted)
     section.show(picture, "Equivalent radiated power in third-octave bands.")
     return section

@@ -206,3 +206,16 @@ def test_a_force_that_does_not_vary_has_an_empty_level(tmp_path: Path) -> None:
     column = rows[0].replace('"', "").split(",").index("axle force level x [dB re 1 N]")
     assert {row.split(",")[column] for row in rows[1:]} == {""}
     assert "-3076" not in "".join(rows)
+
+
+def test_a_face_that_does_not_vibrate_has_an_empty_level(tmp_path: Path) -> None:
+    directory = write_results(tmp_path / "run")
+    (directory / "summary.json").unlink()  # without it every file counts
+    with sealed(directory / "vibration.h5") as file:
+        file["third_octave/centre"] = np.array([100.0])
+        for name in ("velocity_level", "radiated_power_level"):
+            file[f"third_octave/{name}"] = np.array([-2896.5])
+            file[f"third_octave/{name}_a_weighted"] = np.array([60.0])
+    export(directory)
+    row = (directory / "export" / "vibration.csv").read_text().splitlines()[1]
+    assert row == "100,100,,60,,60"

@@ -33,8 +33,8 @@ def write(folder: Path, load: float, level: float, frequencies: list[float], tur
         file["surface/shape"] = -shape[order] if turn else shape
         file["surface/points"] = points
     with h5py.File(folder / "spectra.h5", "w") as file:
-        file["third_octave/centre"] = np.array([100.0, 125.892541])
-        file["third_octave/level"] = np.array([[1.0, 2.0, level], [1.0, 2.0, level + 3]])
+        file["third_octave/centre"] = np.array([100.0, 125.892541, 158.489319])
+        file["third_octave/level"] = np.array([[1.0, 2.0, level + 3 * n] for n in range(3)])
         file["third_octave/contact_level"] = file["third_octave/level"][:] + 4.0
     with h5py.File(folder / "vibration.h5", "w") as file:
         file["third_octave/centre"] = np.array([100.0])
@@ -59,8 +59,9 @@ def test_table_has_what_differs(pair: list[Path], tmp_path: Path) -> None:
     assert float(rows["radiated power", "100 Hz"]["b"]) == 66.0
     assert rows["radiated power", "100 Hz"]["unit"] == "dB re 1 pW"
     assert "+6.0 dB" in page and "+10 %" in page
-    for what in ("vertical axle force", "vertical contact force", "equivalent radiated power"):
+    for what in ("vertical axle force", "vertical contact force"):
         assert f"Third octaves of the {what}." in page
+    assert "Third octaves of the equivalent radiated power." not in page, "one band is no chart"
     # Modes are matched by shape, whatever their order and sign.
     assert float(rows["modes", "mode 1, MAC 1.00"]["b"]) == 51.0
     assert float(rows["modes", "mode 3, MAC 1.00"]["b"]) == 71.0

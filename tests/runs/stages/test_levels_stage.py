@@ -11,7 +11,7 @@ import pytest
 
 from tireroad.contact.results.spectra import SILENT, third_octaves
 from tireroad.runs.stages.base.record import Record
-from tireroad.runs.stages.spectra import _warn_of_short_record
+from tireroad.runs.stages.spectra import too_short
 from tireroad.runs.stages.stored import levels
 from tireroad.runs.stages.stored.contact_file import ContactHistory
 
@@ -153,12 +153,24 @@ def test_an_impact_warns_that_its_level_depends_on_when(
 )
 def test_a_record_too_short_is_told_what_would_do(duration: float, up_to: float, says: str) -> None:
     """0.03 s of run-in, and 3 lines across 63 Hz, which is 14.5 Hz wide: 0.03 + 3 / 14.5 = 0.24 s."""
-    count, record = round(duration / STEP), Record()
-    centre, _ = third_octaves(np.random.default_rng(1).standard_normal((count, 3)), STEP, up_to)
-    _warn_of_short_record(record, centre, up_to, 0.03)
-    assert len(record.warnings) == (says != "")
-    assert says in "".join(record.warnings)
+    told = too_short(bands(duration, 0.0, up_to), up_to, 0.03)
+    assert says in told and bool(told) == bool(says)
     if says:
-        told = float(record.warnings[0].split("=")[1].split()[0])
-        enough = np.zeros((round((told - 0.03) / STEP), 3))
-        assert third_octaves(enough, STEP, up_to)[0].min() < 65.0
+        assert bands(advised(told), 0.03, up_to).min() < 65.0
+
+
+@pytest.mark.parametrize(("duration", "grows"), [(0.1, 0.08), (0.05, 0.2), (0.2, 0.15)])
+def test_the_duration_told_has_room_for_the_run_in(duration: float, grows: float) -> None:
+    """A run-in of half the run or more is not left out; of the run that is advised it is."""
+    told = too_short(bands(duration, 0.0, 400.0), 400.0, grows)
+    assert advised(told) > 2 * grows
+    assert bands(advised(told), grows, 400.0).min() < 65.0
+
+
+def bands(duration: float, left_out: float, up_to: float) -> np.ndarray:
+    """Centres, Hz, of the third octaves of a run of this duration, s."""
+    return third_octaves(np.zeros((round((duration - left_out) / STEP), 3)), STEP, up_to)[0]
+
+
+def advised(told: str) -> float:
+    return float(told.split("=")[1].split()[0])
