@@ -30,7 +30,8 @@ from tireroad.greens.response import Response, couple, reading
 from tireroad.modal.basis import Projection
 from tireroad.modal.corner import MOMENTS, SEEN
 from tireroad.modal.rolling import RollingModes
-from tireroad.modal.rotating import StateModes, checks, growing, rotating
+from tireroad.modal.rotating import checks, rotating
+from tireroad.modal.states import StateModes, growing
 
 # Share of the largest static flexibility below which a direction is rounding of the solver.
 _ROUNDING = 1e-9

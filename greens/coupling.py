@@ -61,8 +61,9 @@ from tireroad.greens.response import Response
 from tireroad.modal.basis import Projection, joined, project, same_fields, with_air, with_corner
 from tireroad.modal.damping import Damping, StrainEnergy, beyond, tail_loss
 from tireroad.modal.rolling import decouple
-from tireroad.modal.rotating import StateModes, held_matrices
+from tireroad.modal.rotating import held_matrices
 from tireroad.modal.solver.slicing import Modes
+from tireroad.modal.states import StateModes
 
 # Of each point's own static flexibility: the most that the shapes left out may add up to. At
 # 90 rad/s the receptance up to half the highest mode changes by 1.2e-3, with 1e-3 by 5e-3.

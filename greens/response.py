@@ -47,7 +47,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import linalg, sparse
 
-from tireroad.modal.rotating import StateModes, growing
+from tireroad.modal.states import StateModes, growing
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ _HOMES = {
     "Projection": "basis",
     "Proportional": "damping",
     "RollingModes": "rolling",
-    "StateModes": "rotating",
+    "StateModes": "states",
     "StrainEnergy": "damping",
     "critical_speed": "campbell",
     "onset": "campbell",

@@ -13,7 +13,8 @@ from scipy import linalg, optimize
 
 from tireroad.modal.basis import Projection
 from tireroad.modal.damping import Damping
-from tireroad.modal.rotating import StateModes, growing, matrices, overlap, rotating
+from tireroad.modal.rotating import matrices, overlap, rotating
+from tireroad.modal.states import StateModes, growing
 
 # Stiffness of a rigid motion of a free wheel over Omega^2: zero but for truncation.
 RIGID = 1e-3

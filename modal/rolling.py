@@ -25,18 +25,11 @@ from tireroad.modal.basis import ModalBasis, Projection
 from tireroad.modal.campbell import Campbell
 from tireroad.modal.corner import meeting
 from tireroad.modal.damping import beyond
-from tireroad.modal.rotating import (
-    DEFECTIVE,
-    StateModes,
-    beside,
-    checks,
-    matrices,
-    rotating,
-    standing,
-)
+from tireroad.modal.rotating import DEFECTIVE, beside, checks, matrices, rotating, standing
 from tireroad.modal.solver import quadratic
 from tireroad.modal.solver.fields import gram
 from tireroad.modal.solver.quadratic import FullModes
+from tireroad.modal.states import StateModes
 
 _BORDER = 0.02  # relative: truncation may move a state across a limit by as much
 

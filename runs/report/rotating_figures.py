@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.modal.rotating import growing
+from tireroad.modal.states import growing
 from tireroad.runs.report import live
 from tireroad.runs.report.figures import COLOURS, MUTED, WIDE, canvas, encode, line_canvas, styled
 

@@ -16,7 +16,7 @@ from tireroad.modal.basis import ModalBasis
 from tireroad.modal.campbell import Campbell, critical_speed, growth, onset, sweep
 from tireroad.modal.damping import Proportional, StrainEnergy
 from tireroad.modal.rolling import RollingModes, full_states, rolling_modes
-from tireroad.modal.rotating import StateModes
+from tireroad.modal.states import StateModes
 from tireroad.runs.files.store import put
 from tireroad.runs.stages.base.job import Job
 from tireroad.runs.stages.base.record import Record

@@ -8,7 +8,8 @@ from scipy import linalg
 from tireroad.fem.errors import ConvergenceError
 from tireroad.modal.basis import Projection
 from tireroad.modal.campbell import critical_speed, growth, onset, sweep
-from tireroad.modal.rotating import _invariant, checks, growing, matrices, rotating, standing
+from tireroad.modal.rotating import _invariant, checks, matrices, rotating, standing
+from tireroad.modal.states import growing
 
 WAVES = {0: 300.0, 1: 420.0, 2: 500.0, 3: 800.0, 4: 1300.0}
 

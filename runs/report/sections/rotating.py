@@ -5,7 +5,7 @@ from contextlib import suppress
 import numpy as np
 
 from tireroad.fem.errors import InputError
-from tireroad.modal.rotating import growing
+from tireroad.modal.states import growing
 from tireroad.runs.files.read import Absent, Results, Section, Table, attributes
 from tireroad.runs.report import rotating_figures
 from tireroad.runs.report.quantities import quantity

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from tireroad.modal.rolling import RollingModes
-from tireroad.modal.rotating import StateModes
+from tireroad.modal.states import StateModes
 from tireroad.runs.files.store import put
 
 _STATES = {"eigenvalue": "1/s", "right": "-", "left": "s", "residual": "-", "left_residual": "-"}

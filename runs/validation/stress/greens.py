@@ -9,7 +9,8 @@ from scipy import linalg
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response, couple
 from tireroad.modal.basis import Projection
-from tireroad.modal.rotating import StateModes, rotating, standing
+from tireroad.modal.rotating import rotating, standing
+from tireroad.modal.states import StateModes
 
 SQUARES = np.array([50.0, 400.0, 2.6e4]) ** 2  # 1/s2
 SHAPE = np.random.default_rng(3).normal(size=(3, 3))  # kg^-1/2
