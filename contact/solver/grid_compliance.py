@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from tireroad.contact.tread.compliance import KernelTread
+from tireroad.contact.tread.kernel import KernelTread
 from tireroad.greens.recursion import LoadedColumns
 
 Array = NDArray[np.float64]

@@ -15,8 +15,9 @@ from scipy.optimize import brentq
 
 from tireroad.contact.patch import Patch
 from tireroad.contact.solver.active_set import ActiveSet
-from tireroad.contact.tread.compliance import GridPlaces, dense_compliance, half_space_influence
+from tireroad.contact.tread.compliance import dense_compliance, half_space_influence
 from tireroad.contact.tread.creep import steady
+from tireroad.contact.tread.kernel import GridPlaces
 
 Array = NDArray[np.float64]
 SHEAR, NU, RADIUS, LOAD, SPEED = 1143e6, 0.4, 0.05, 600e3, 1.0

@@ -15,12 +15,8 @@ from numpy.typing import NDArray
 from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.solver.stick_slip import Friction, Stiffness, stick_slip
 from tireroad.contact.tread.brush import Brush, BrushLaw
-from tireroad.contact.tread.compliance import (
-    GridPlaces,
-    Influence,
-    KernelTread,
-    half_space_influence,
-)
+from tireroad.contact.tread.compliance import Influence, half_space_influence
+from tireroad.contact.tread.kernel import GridPlaces, KernelTread
 from tireroad.contact.tread.shear import KernelShear, half_space_shear
 
 # C11, C22, C23 of a circle by Poisson's ratio: Kalker, Three-Dimensional Elastic Bodies in Rolling

@@ -19,12 +19,11 @@ from tireroad.contact.solver.projected_cg import ProjectedCG
 from tireroad.contact.solver.stick_slip import Friction
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import (
-    GridPlaces,
-    KernelTread,
     half_space_compliance,
     half_space_influence,
     winkler_compliance,
 )
+from tireroad.contact.tread.kernel import GridPlaces, KernelTread
 from tireroad.contact.tread.shear import MatrixShear, half_space_shear
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.greens.recursion import Recursion
