@@ -355,7 +355,7 @@ class Driven:
     `history` (n + 1, k) N at the steps from t = 0 on; `directions` (k, 3) of unit length. After
     each `advance`: `reading` (r,) m; `work` (J) of the prescribed forces so far (trapezoidal rule);
     `lead`, the additional work of the mean forces that the `scheme` applies during the steps
-    (greens.one_step.ahead_of_mean).
+    (greens.recursion.ahead_of_mean).
     """
 
     def __init__(

@@ -153,7 +153,7 @@ class Projection:
     (m, m) 1/rad2, symmetric; all four are None for a standing wheel. `momentum` (3, m) kg^1/2: int
     rho phi_k, the momentum per rate of each mode. `loss_factor` (m,) by strain energy
     (modal.damping), None where no compound has one. The last `shapes` of the m coordinates are
-    static shapes that joined the modes (modal.joined). Further coordinates: a of the `air` after
+    static shapes that joined the modes (modal.basis). Further coordinates: a of the `air` after
     the m, then c of a `corner`; a held wheel has c = 0, but its hub still carries moments.
     """
 

@@ -8,7 +8,7 @@ respond with modes of some kHz, which a basis of the lowest modes lacks, hence s
 
 where omega_m is the circular frequency of the highest mode. x . K x is the relative shift that a
 shape causes in the squared frequencies near w. The leading directions of X in that measure, those
-of `TOLERANCE` and more, join the basis (modal.joined) and take part in the rotating problem. They
+of `TOLERANCE` and more, join the basis (modal.basis) and take part in the rotating problem. They
 are found in the block Krylov space of X X^T K, begun with random combinations of the columns of X
 (Musco and Musco, Advances in Neural Information Processing Systems 28 (2015) 1396): a few solutions
 per direction that counts instead of two per mode. Blocks are added until what counts has settled.

@@ -65,7 +65,7 @@ def solved(
     teams: int | None = None,
     journal: Journal | None = None,
 ) -> Modes:
-    """The modes alone, found by `teams` of processes (modal.solver.team).
+    """The modes alone, found by `teams` of processes (modal.solver.slicing).
 
     Results that the `journal` holds are not computed again. InputError unless one of `count` and
     `up_to` (Hz) is given, within its range. Collective.

@@ -2,7 +2,7 @@
 
 At the touching points a force acts on an instantaneous compliance B (tread and residual
 flexibility). To an alternating force, linear over the steps, the tire's states respond as a
-negative compliance X (greens.residual.alternating). With
+negative compliance X (greens.recursion). With
 
     -X v = mu B v,   mu the largest,
 
@@ -10,7 +10,7 @@ the fastest oscillation of the touching points takes  2 pi / theta  steps,
 cos theta = (1 - 4 mu) / (1 + 2 mu). A mass m on a compliance C has mu = h^2 / (12 m C); its true
 oscillation rotates by (12 mu)^1/2 in a step. At mu = 1 it takes two steps, and beyond it grows
 without bound. Horizontal forces act on bristles and on the tread's shear in the same way; the
-larger mu of the two counts. Damped and constant forces (greens.one_step) have X >= 0: they damp such
+larger mu of the two counts. Damped and constant forces (greens.recursion) have X >= 0: they damp such
 an oscillation, with an error of second and of first order in the step.
 """
 
@@ -63,7 +63,7 @@ class Chatter(ConvergenceError):
 
 @dataclass(frozen=True)
 class Chosen:
-    """The force's course within a step (greens.one_step), and the reason for it.
+    """The force's course within a step (greens.recursion), and the reason for it.
 
     `limit`: the share of points that open and close from step to step above which another is
     tried; inf if this one is final.

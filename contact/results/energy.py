@@ -24,7 +24,7 @@ class Work:
 
     Trapezoidal rule: sum (f + f_before).(u - u_before)/2, second order in the step. `lead`: the
     additional work of the mean forces that a `scheme` applies during the steps
-    (greens.one_step.ahead_of_mean). A checkpoint keeps both, with the last forces and displacement.
+    (greens.recursion.ahead_of_mean). A checkpoint keeps both, with the last forces and displacement.
     """
 
     def __init__(self, scheme: str = "linear") -> None:
@@ -111,7 +111,7 @@ class Circulation:
     The symmetric part of a residual flexibility stores the work done on it. The skew part, which a
     rolling tire has, does not: its work is what the truncated modes dissipate, less what the drive
     supplies to them. `lead`: work on the symmetric part that is not stored, as the mean forces of
-    a `scheme` during the steps are ahead (greens.one_step.ahead_of_mean).
+    a `scheme` during the steps are ahead (greens.recursion.ahead_of_mean).
     """
 
     def __init__(self, flexibility: np.ndarray, scheme: str = "linear") -> None:

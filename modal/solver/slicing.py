@@ -170,7 +170,7 @@ class Modes:
 
     @property
     def count(self) -> int:
-        """Number of modes, m; static shapes that joined them (modal.joined) come after."""
+        """Number of modes, m; static shapes that joined them (modal.basis) come after."""
         return len(self.residual)
 
     @property

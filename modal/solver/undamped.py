@@ -73,7 +73,7 @@ def solve(
     The stiffness (n, n) is in N/m, the diagonal mass (own rows) in kg. Symmetries are sought at the
     `sites` of own unknowns, equal segments unless `waves` is False. A split whose modes are not
     modes of A is discarded for the next. The processes work in `teams`, each of which distributes A
-    over its members; by default each process is its own (modal.solver.team). Counts and slices that
+    over its members; by default each process is its own (modal.solver.slicing). Counts and slices that
     the `journal` holds are not computed again. Raises ConvergenceError if a mode is missing,
     inaccurate or unstable. Collective.
     """

@@ -59,7 +59,7 @@ class Layer(Elastic):
         return LayerInfluence(self.youngs_modulus, self.poisson_ratio, self.thickness)
 
     def shear(self, farthest: float) -> Influence:
-        """The half-space's shear with a correction; see contact.tread.layer_shear."""
+        """The half-space's shear with a correction; see contact.tread.layer."""
         from tireroad.contact.tread.layer import LayerShear
 
         return LayerShear(self.youngs_modulus, self.poisson_ratio, self.thickness)

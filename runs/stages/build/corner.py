@@ -104,7 +104,7 @@ def parts(readings: np.ndarray, static: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def check_blocked(record: Record, rolling: RollingModes, loads, highest: float) -> None:
-    """Record how far hub force and blocked force (greens.blocked) differ up to `highest` Hz.
+    """Record how far hub force and blocked force (greens.outputs) differ up to `highest` Hz.
 
     Nothing is recorded of a hub that no force acts on.
     """

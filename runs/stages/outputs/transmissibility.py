@@ -86,7 +86,7 @@ class Transmissibility(Output):
 
         Force of the tire on the axle per force, -, and moment about the axle's centre per force, m.
         From the momentum of the response's states and, if the scene asks for it, from modes of the
-        tire with a free rim (greens.axle); each checks the other. Collective.
+        tire with a free rim (greens.outputs); each checks the other. Collective.
         """
         from tireroad.greens.outputs import by_momentum
 

@@ -116,7 +116,7 @@ def forces(
 ) -> Forces:
     """Run the loop of the job's scene with another response, step or setup (settled), in memory.
 
-    `scheme`: see greens.one_step; `contact` replaces the scene's table. Raises ConvergenceError
+    `scheme`: see greens.recursion; `contact` replaces the scene's table. Raises ConvergenceError
     if the road touches outside the patch. Collective.
     """
     kept = response.resolved(step)
