@@ -33,7 +33,7 @@ class Pressed:
 
     @classmethod
     def of(cls, balance) -> Pressed:
-        """Figures of a tire in equilibrium (fem.static.companion)."""
+        """Figures of a tire in equilibrium (fem.static.load_error)."""
         extent = balance.extent
         return cls(balance.load, extent.length, extent.width)
 

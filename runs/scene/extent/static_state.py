@@ -8,7 +8,7 @@ TANGENTS = 4
 COLUMNS = 250
 """Columns of a tangent's inverse that solving the contact set takes, held twice.
 
-At most 400 (fem.static.linear_contact). A torus of 220,500 unknowns took 2.3 GB on each of two
+At most 400 (fem.static.tangent). A torus of 220,500 unknowns took 2.3 GB on each of two
 processes; the estimate is 1.8, 1.4 without them. Released before the modes.
 """
 HIGHEST = 3
