@@ -22,17 +22,18 @@ _ALL = (*_TIRE, "greens", "contact")
 PACKAGES: Mapping[str, tuple[str, ...]] = {"static": _TIRE}
 """Source folders that a stage depends on; all five packages if it is not listed here."""
 
+WHEEL = "dolfinx-solver-real"  # dolfinx, PETSc and SLEPc without distributions of their own
 LIBRARIES = {
-    "dolfinx": "fenics-dolfinx",
-    "basix": "fenics-basix",
-    "ffcx": "fenics-ffcx",
-    "ufl": "fenics-ufl",
-    "PETSc": "petsc4py",
-    "SLEPc": "slepc4py",
-    "numpy": "numpy",
-    "scipy": "scipy",
+    "dolfinx": ("fenics-dolfinx", WHEEL),
+    "basix": ("fenics-basix",),
+    "ffcx": ("fenics-ffcx",),
+    "ufl": ("fenics-ufl",),
+    "PETSc": ("petsc4py", WHEEL),
+    "SLEPc": ("slepc4py", WHEEL),
+    "numpy": ("numpy",),
+    "scipy": ("scipy",),
 }
-"""Libraries whose version can change a result, with the names of their distributions."""
+"""Libraries whose version can change a result, with the distributions that may hold them."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ class Identity:
 
 def identity(stage: str) -> Identity:
     """The identity of a stage in this process. Reads the sources once per process, about 10 ms."""
-    return Identity(_code(PACKAGES.get(stage, _ALL)), _libraries())
+    return Identity(_code(PACKAGES.get(stage, _ALL)), libraries())
 
 
 @functools.cache
@@ -70,16 +71,21 @@ def _code(folders: tuple[str, ...]) -> str:
 
 
 @functools.cache
-def _libraries() -> dict[str, str]:
-    versions = {name: _version(package) for name, package in LIBRARIES.items()}
+def libraries() -> dict[str, str]:
+    """Versions by name. The first call needs PETSc loaded."""
+    versions = {name: _version(holders) for name, holders in LIBRARIES.items()}
     return {**versions, "MUMPS": _mumps()}
 
 
-def _version(package: str) -> str:
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return "unknown"
+def _version(holders: tuple[str, ...]) -> str:
+    """The version of the first distribution that is installed, with its name if that is WHEEL."""
+    for name in holders:
+        try:
+            found = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            continue
+        return f"in {WHEEL} {found}" if name == WHEEL else found
+    return "unknown"
 
 
 def _mumps() -> str:
@@ -89,4 +95,4 @@ def _mumps() -> str:
     except OSError:
         return "unknown"
     found = re.search(r"/libdmumps[^/\n]*?(\d+(?:\.\d+)+)", maps)
-    return found.group(1) if found else "unknown"
+    return found.group(1) if found else _version((WHEEL,))

@@ -6,16 +6,14 @@ import platform
 import sys
 from importlib import metadata
 
-NEEDED = {
-    "dolfinx", "basix", "ffcx", "ufl", "petsc4py", "slepc4py", "mpi4py", "h5py", "numpy", "scipy",
-    "matplotlib", "rich", "jinja2", "threadpoolctl", "cffi", "pytest",
-}  # fmt: skip
+from tireroad.runs.process.installation import PACKAGES, compiler
+
+NEEDED = {*PACKAGES, "basix", "ffcx", "ufl", "cffi", "pytest"}
 _INSTALL = (
     "./tireroad of a checkout finds or installs what is missing, and ./tireroad python runs a script with"
     ' it; with pip: pip install ".[solver]"; with conda: conda install -c conda-forge fenics-dolfinx'
     " petsc4py slepc4py mpi4py h5py scipy matplotlib rich jinja2 threadpoolctl"
 )
-_DISTRIBUTIONS = "ufl", "mpi4py", "numpy", "scipy", "matplotlib"
 
 
 def missing(error: ModuleNotFoundError) -> str | None:
@@ -28,29 +26,29 @@ def missing(error: ModuleNotFoundError) -> str | None:
 
 def installation() -> dict[str, str]:
     """Versions and places of everything a result depends on, by name. Starts MPI; not collective."""
-    import basix
     import dolfinx
-    import ffcx
     import h5py
+    import mpi4py
     from mpi4py import MPI
     from petsc4py import PETSc
     from slepc4py import SLEPc
 
     from tireroad.fem import compat, form_cache
     from tireroad.runs.files.cache import Cache
-    from tireroad.runs.process.installation import compiler
+    from tireroad.runs.files.identity import libraries
     from tireroad.runs.version import PROGRAM, VERSION
 
     folder = Cache.of_user().folder
     return {
         PROGRAM: VERSION,
         "Python": f"{platform.python_version()} ({sys.executable})",
+        **libraries(),
         "dolfinx": dolfinx.__version__,
-        "basix, ffcx": f"{basix.__version__}, {ffcx.__version__}",
         "PETSc": ".".join(map(str, PETSc.Sys.getVersion())),
         "SLEPc": ".".join(map(str, SLEPc.Sys.getVersion())),
         "MPI": MPI.Get_library_version().partition("\n")[0].partition(",")[0].strip("\0"),
-        **{name: _version(name) for name in _DISTRIBUTIONS},
+        "mpi4py": mpi4py.__version__,
+        "matplotlib": metadata.version("matplotlib"),
         "h5py": f"{h5py.__version__} (HDF5 {h5py.version.hdf5_version})",
         "BLAS": _blas(),
         "C compiler": compiler() or "none",
@@ -70,15 +68,6 @@ def described(as_json: bool) -> str:
         return json.dumps(found, indent=2)
     width = max(map(len, found))
     return "\n".join(f"{name:{width}s}  {text}" for name, text in found.items())
-
-
-def _version(name: str) -> str:
-    for distribution in (name, f"fenics-{name}"):
-        try:
-            return metadata.version(distribution)
-        except metadata.PackageNotFoundError:
-            continue
-    return "unknown"
 
 
 def _blas() -> str:

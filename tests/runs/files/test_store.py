@@ -112,8 +112,8 @@ def test_code_and_libraries_are_part_of_what_a_stage_is_computed_from(
     with writing(path, replace(ORIGIN, input_hash=written)):
         pass
     assert why_not(path, wanted_hash("static", inputs), "static") == ""
-    libraries = identity._libraries()
-    monkeypatch.setattr(identity, "_libraries", lambda: libraries | {"scipy": "0.1"})
+    libraries = identity.libraries()
+    monkeypatch.setattr(identity, "libraries", lambda: libraries | {"scipy": "0.1"})
     now = wanted_hash("static", inputs)
     assert now != written
     assert "scipy" in why_not(path, now, "static") and "-> 0.1" in why_not(path, now, "static")
@@ -135,7 +135,7 @@ def test_identity_is_cheap() -> None:
     """In processor time: the machine may be busy."""
     identity.identity("contact")
     identity._code.cache_clear()
-    identity._libraries.cache_clear()
+    identity.libraries.cache_clear()
     began = time.process_time()
     identity.identity("contact")
     assert time.process_time() - began < 0.1
@@ -215,3 +215,20 @@ def test_signed_texts_tell_a_change() -> None:
     assert checksum.is_table_as_signed(read)
     read["stages"]["static"]["seconds"] = 1.25
     assert not checksum.is_table_as_signed(read)
+
+
+def test_libraries_in_a_wheel_have_its_version(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The wheel holds dolfinx, PETSc and SLEPc without distributions of their own: they were unknown, and
+    what another wheel had computed was reused."""
+    installed = {identity.WHEEL: "0.11.0", "numpy": "2.5"}
+
+    def version(name: str) -> str:
+        if name not in installed:
+            raise identity.metadata.PackageNotFoundError(name)
+        return installed[name]
+
+    monkeypatch.setattr(identity.metadata, "version", version)
+    found = identity.libraries.__wrapped__()
+    assert found["numpy"] == "2.5" and found["scipy"] == "unknown"
+    for name in ("dolfinx", "PETSc", "SLEPc"):
+        assert found[name] == f"in {identity.WHEEL} 0.11.0"
