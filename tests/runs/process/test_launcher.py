@@ -139,8 +139,8 @@ def test_info_without_a_file_tells_the_installation(launcher) -> None:
     assert "unknown" not in found.values()
 
 
-def _environment_maker(root: Path, tmp_path: Path, pip: str) -> Path:
-    """A python3 beside nothing, with venv and ensurepip, that makes an environment of shell scripts."""
+def _environment_maker(root: Path, tmp_path: Path, made: str) -> Path:
+    """A python3 without packages that makes an environment, whose python is the shell script `made`."""
     tools = tmp_path / "tools"
     tools.mkdir()
     for name in ("sh", "dirname", "readlink", "getconf", "mkdir", "cat", "chmod"):
@@ -154,7 +154,7 @@ case "$*" in
 *make*)
     for folder; do case $folder in */environment) break ;; esac; done
     mkdir -p "$folder/bin"
-    printf '#!/bin/sh\\n{pip}\\n' >"$folder/bin/python"
+    printf '#!/bin/sh\\n{made}\\n' >"$folder/bin/python"
     chmod +x "$folder/bin/python"
     echo made >&2 ;;
 esac
