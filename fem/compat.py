@@ -143,7 +143,7 @@ class _PlainBuilder(cffi.FFI):
         self._declared = csource
 
     def compile(self, tmpdir: Path, **_: Any) -> None:
-        """Compile with the compiler that cffi would take; CompileError where that fails."""
+        """Compile with the compiler that cffi would take; cffi.VerificationError where that fails."""
         source, options = Path(tmpdir) / f"{self._name}.c", self._compile_options
         text = ",".join(str(byte) for byte in self._declared.encode() + b"\0")
         code = f"#include <ufcx.h>\n{self._code}\nconst char {_DECLARED}[] = {{{text}}};\n"

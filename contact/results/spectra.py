@@ -131,6 +131,11 @@ _SEGMENTS = 4.5  # with half overlap, eight averages
 _LONGEST = 0.5  # s of a segment: lines of 2 Hz; longer records give more averages instead
 
 
+def heard(level: np.ndarray) -> np.ndarray:
+    """Levels in dB, NaN where nothing varies."""
+    return np.where(level > SILENT, level, np.nan)
+
+
 def amplitudes(values: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
     """Frequencies (f,) Hz and complex amplitudes (f, d), in the unit of values (n, d).
 

@@ -4,7 +4,6 @@ Compliance of the tread rubber between carcass and road, added to that of the ti
 
 Each function returns a dense (n, n) array in m/N: entry (i, j) is the approach of point i to the
 carcass under a unit force on point j. None of them is collective.
-
 """
 
 from collections.abc import Callable

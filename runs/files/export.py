@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.contact.results.spectra import SILENT, nominal
+from tireroad.contact.results.spectra import heard, nominal
 from tireroad.fem.errors import InputError
 from tireroad.runs.files import xdmf
 from tireroad.runs.files.disk import replacing
@@ -169,14 +169,9 @@ def _spread(group: h5py.Group, over: h5py.Dataset) -> Columns:
             place = f" {point + 1}" if held.ndim > 2 else ""
             unit, column = held.attrs["unit"], values[:, point]
             if unit.startswith("dB"):
-                column = _heard(column)
+                column = heard(column)
             columns |= _components(label + place, column, unit)
     return columns
-
-
-def _heard(level: NDArray) -> NDArray:
-    """Levels in dB, NaN for an empty cell where nothing varies."""
-    return np.where(level > SILENT, level, np.nan)
 
 
 def response(file: h5py.File) -> dict[str, Callable[[Path], object]]:
@@ -211,7 +206,7 @@ def vibration(file: h5py.File) -> dict[str, Callable[[Path], object]]:
     }
     centre = file["third_octave/centre"][()]
     columns = {"band [Hz]": nominal(centre), "exact centre of the band [Hz]": centre}
-    columns |= {label: _heard(file[f"third_octave/{name}"][()]) for label, name in names.items()}
+    columns |= {label: heard(file[f"third_octave/{name}"][()]) for label, name in names.items()}
     return _table("vibration.csv", columns)
 
 

@@ -2,7 +2,6 @@
 
 import _ctypes
 import ctypes
-import importlib.util
 import os
 import resource
 import shlex
@@ -10,7 +9,7 @@ import sys
 from importlib import metadata
 from pathlib import Path
 
-from tireroad.runs.process.installation import compiler
+from tireroad.runs.process.installation import compiler, found
 
 UNKNOWN = b"Prescott"  # OpenBLAS's fallback on x86-64: SSE3, two numbers at a time
 _FLAGS = (  # CPU flags required by each kernel, the widest first
@@ -23,9 +22,9 @@ def prepare() -> None:
     """Settle all of it. Changes OPENBLAS_CORETYPE and CC where they are needed and not set, and loads
     the MPI library of the mpich wheel where dolfinx is a wheel. Not collective, does not start MPI."""
     choose_kernels()
-    if importlib.util.find_spec("dolfinx_solver") is not None:
+    if found("dolfinx_solver"):
         _load_mpi_of_wheel()
-    if compiler() is None and importlib.util.find_spec("ziglang") is not None:
+    if compiler() is None and found("ziglang"):
         os.environ["CC"] = f"{shlex.quote(sys.executable)} -m ziglang cc"
 
 

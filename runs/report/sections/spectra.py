@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.contact.results.spectra import FEW, SILENT, nominal
+from tireroad.contact.results.spectra import FEW, SILENT, heard, nominal
 from tireroad.runs.files.read import Results, Section, Table
 from tireroad.runs.report import figures, live
 from tireroad.runs.report.quantities import quantity
@@ -114,9 +114,9 @@ def _show_bands(
         section.facts += _in_numbers(centre, level, error, of, reference)
         return
     label = f"{of}, rms, in {reference}"
-    heard = np.where(level > SILENT, level, np.nan)
+    shown = heard(level)
     series = {
-        name: (heard[:, n], None if error is None else error[:, n])
+        name: (shown[:, n], None if error is None else error[:, n])
         for n, name in enumerate(figures.COMPONENTS)
     }
     drawn = live.bars(
