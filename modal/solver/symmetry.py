@@ -30,6 +30,7 @@ TOLERANCE = 1e-11
 _PROBES = 8  # random fields that tell whether an isometry leaves the matrix unchanged
 _PIECES = 8  # of a part, formed one by one to save memory
 _NEAR = 1e-6  # of the body's size: distance within which nodes are images of each other
+_OFF_CENTER = 0.37  # of a cell of that size: zero and the mesh's round numbers lie inside of cells
 
 
 @dataclass(frozen=True)
@@ -74,9 +75,11 @@ class Sites:
     def rank(self) -> np.ndarray:
         """(n,) rank of each unknown, ordered by position, lowest points first, then by component.
 
-        It is the same for the same tire on any number of processes.
+        It is the same for the same tire on any number of processes and with any release of the
+        libraries: coordinates that rounding parts count as equal.
         """
-        x, y, z = self.place.T
+        cells = self.place / (_NEAR * max(float(np.abs(self.place).max(initial=0.0)), 1e-300))
+        x, y, z = np.floor(cells + _OFF_CENTER).T
         order = np.lexsort((self.component, x, y, z))
         rank = np.empty(len(order), int)
         rank[order] = np.arange(len(order))
