@@ -34,10 +34,6 @@ from tireroad.modal.basis import Projection
 from tireroad.modal.damping import Damping, rates
 from tireroad.modal.states import StateModes
 
-# Of the largest |s|. A smaller growth rate is rounding: an undamped state has 0 with either sign.
-# Of the largest |s|^2: what rounding of the pencil may add to an s^2.
-
-
 Array = np.ndarray
 
 # States slower than this fraction of the fastest have terms of rounding alone; a residual is
@@ -48,14 +44,22 @@ _MOST = 20  # refinements, a factorisation each; only a few slow states ever nee
 _SAME = 1e-4  # relative change beyond which inverse iteration has moved on to a neighbouring state
 
 
+def _real_by_complex(matrix: Array, vectors: Array) -> Array:
+    """matrix (m, n) vectors (n, q), as one product of real matrices: parts side by side."""
+    if not vectors.size:
+        return np.zeros((len(matrix), vectors.shape[1]), complex)
+    side_by_side = np.ascontiguousarray(vectors, complex).view(float)
+    return (matrix @ side_by_side).view(complex)
+
+
 def residual(drag: Array, stiffness: Array, values: Array, vectors: Array) -> Array:
     """||(s^2 + s D + K) u|| over the sum of the norms of its terms, column by column."""
 
-    # Real by complex, without a complex copy of the matrix.
-    def times(matrix: Array) -> Array:
-        return matrix @ vectors.real + 1j * (matrix @ vectors.imag)
-
-    terms = (vectors * values**2, times(drag) * values, times(stiffness))
+    terms = (
+        vectors * values**2,
+        _real_by_complex(drag, vectors) * values,
+        _real_by_complex(stiffness, vectors),
+    )
     size = sum(np.linalg.norm(term, axis=0) for term in terms)
     least = AT_REST * np.abs(values).max(initial=0.0) ** 2 * np.linalg.norm(vectors, axis=0)
     return np.linalg.norm(sum(terms), axis=0) / np.maximum(size, least)
@@ -122,7 +126,7 @@ def cleared(
     """
     if not len(block):
         return vectors
-    rest = matrix @ vectors.real + 1j * (matrix @ vectors.imag) - vectors * values
+    rest = _real_by_complex(matrix, vectors) - vectors * values
     shifted = values[:, None, None] * np.eye(len(block)) - block
     share = np.linalg.solve(shifted, (inverse @ rest).T[:, :, None])[:, :, 0]
     return vectors + span @ share.T

@@ -39,7 +39,7 @@ from tireroad.modal.solver.slicing import Modes
 Array = np.ndarray
 
 TOLERANCE = 2e-3
-BLOCK = 16  # solutions at a time
+BLOCK = 32  # solutions at a time
 _SPARE = 8  # directions found beyond those that count, as evidence that none is missing
 _SETTLED = 1e-3  # largest relative change of what counts by the last block
 _ROUNDING = 1e-14  # of the largest of a block
