@@ -102,8 +102,9 @@ def _check_processes(args: argparse.Namespace, size: int) -> None:
 def _reproduce(args: argparse.Namespace, comm) -> None:
     """Recompute figures and tables of the thesis. Collective."""
     _check_processes(args, comm.size)
+    _check_checkout("thesis", args.command)
     mpi.start_petsc([])
-    from tireroad.runs.thesis.command import reproduce
+    from tireroad.tests.thesis.command import reproduce
 
     reproduce(args.names, args.out, comm)
 
@@ -154,14 +155,23 @@ def _info(args: argparse.Namespace) -> None:
     return print(describe(args.file, args.json))
 
 
-def _bench(args: argparse.Namespace) -> None:
-    from tireroad.runs.measure.tabulate import run_all
+def _check_checkout(folder: str, command: str) -> None:
+    """Refuse what an installation leaves out: evidence that stands beside the tests."""
+    if not (Path(__file__).resolve().parents[1] / "tests" / folder).is_dir():
+        raise InputError(
+            f"{command} is part of a checkout, not of an installation: clone the repository and run ./tireroad {command} there"
+        )
 
-    run_all("tireroad.runs.bench", args.names, args.out)
+
+def _bench(args: argparse.Namespace) -> None:
+    _check_checkout("bench", args.command)
+    from tireroad.runs.validation.tables import run_all
+
+    run_all("tireroad.tests.bench", args.names, args.out)
 
 
 def _validate(args: argparse.Namespace) -> None:
-    from tireroad.runs.measure.tabulate import run_all
+    from tireroad.runs.validation.tables import run_all
 
     run_all("tireroad.runs.validation", args.names, args.out, args.large)
 

@@ -144,7 +144,6 @@ TO_MERGE = {
     "fem/decks/shape/mirror.py",
     "fem/static/diagnosis.py",
     "fem/tire/surface.py",
-    "runs/bench/parts/truth.py",
     "runs/report/drawn.py",
     "runs/report/section_picture.py",
     "runs/report/verdicts.py",

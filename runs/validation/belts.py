@@ -5,9 +5,8 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from tireroad.runs.measure.tabulate import Table
-from tireroad.runs.validation.comparison import compare, verdicts
-from tireroad.runs.validation.tires import Choice, Tires
+from tireroad.runs.validation.full_elements import Choice, Tires, compare, verdicts
+from tireroad.runs.validation.tables import Table
 
 ABOUT = "a belted tire of lossy rubber rolling, modes against full finite elements of the same mesh"
 

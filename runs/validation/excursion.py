@@ -7,10 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from tireroad.runs.measure.tabulate import Table
-from tireroad.runs.validation.histories import follow
+from tireroad.runs.validation.full_elements import Tires, follow
 from tireroad.runs.validation.rolling import SCENE
-from tireroad.runs.validation.tires import Tires
+from tireroad.runs.validation.tables import Table
 
 ABOUT = "rolling over bumps up to several static deflections: linear against nonlinear finite elements in time"
 

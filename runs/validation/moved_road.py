@@ -7,10 +7,17 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from tireroad.contact.results.spectra import distance
-from tireroad.runs.measure.tabulate import Table
-from tireroad.runs.validation.comparison import compare, digits, percent, verdicts
-from tireroad.runs.validation.histories import follow
-from tireroad.runs.validation.tires import LOADED, Choice, Tires
+from tireroad.runs.validation.full_elements import (
+    LOADED,
+    Choice,
+    Tires,
+    compare,
+    digits,
+    follow,
+    percent,
+    verdicts,
+)
+from tireroad.runs.validation.tables import Table
 
 ABOUT = "a standing tire on a flat road that moves: modes against full finite elements"
 

@@ -8,10 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from tireroad.contact.results.spectra import nominal, third_octaves
-from tireroad.runs.measure.tabulate import Table
-from tireroad.runs.validation.comparison import digits
-from tireroad.runs.validation.histories import History, follow
-from tireroad.runs.validation.tires import Choice, Tires
+from tireroad.runs.validation.full_elements import Choice, History, Tires, digits, follow
+from tireroad.runs.validation.tables import Table
 
 ABOUT = "the passenger tire on a rough road, third octaves of modes against full finite elements"
 

@@ -9,10 +9,8 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from tireroad.runs.measure.tabulate import Table
-from tireroad.runs.validation.comparison import Comparison, verdicts
-from tireroad.runs.validation.histories import History
-from tireroad.runs.validation.tires import Choice, Tires
+from tireroad.runs.validation.full_elements import Choice, Comparison, History, Tires, verdicts
+from tireroad.runs.validation.tables import Table
 
 ABOUT = "displacement under a point force, modes against full finite elements of the same mesh"
 DURATION = 0.2  # s

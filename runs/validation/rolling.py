@@ -9,9 +9,15 @@ from pathlib import Path
 import numpy as np
 
 from tireroad.contact.results.spectra import BAND
-from tireroad.runs.measure.tabulate import Table
-from tireroad.runs.validation.comparison import Comparison, compare, verdicts
-from tireroad.runs.validation.tires import LOADED, Choice, Tires
+from tireroad.runs.validation.full_elements import (
+    LOADED,
+    Choice,
+    Comparison,
+    Tires,
+    compare,
+    verdicts,
+)
+from tireroad.runs.validation.tables import Table
 
 ABOUT = "contact and axle force while rolling, modes against full finite elements of the same mesh"
 

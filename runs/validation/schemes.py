@@ -11,11 +11,9 @@ from tireroad.contact.results.spectra import BAND, distance
 from tireroad.fem.errors import ConvergenceError
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
-from tireroad.runs.measure.tabulate import Table
-from tireroad.runs.validation.comparison import digits
-from tireroad.runs.validation.histories import History, follow
+from tireroad.runs.validation.full_elements import History, Tires, digits, follow
 from tireroad.runs.validation.rolling import ROADS, SCENE
-from tireroad.runs.validation.tires import Tires
+from tireroad.runs.validation.tables import Table
 
 ABOUT = (
     "the scheme chosen on treads of 10 and 340 MPa, against a finer step, and what the others give"

@@ -23,9 +23,9 @@ from tireroad.contact.tread.laws.elastic import HalfSpace
 from tireroad.fem.errors import InputError
 from tireroad.fem.static.tread_surface import TreadSurface
 from tireroad.fem.tire.mesh import field_lattice
-from tireroad.runs.measure.torus import thesis_torus
 from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.scene.tables.contact import Contact
+from tireroad.runs.validation.cases import thesis_torus
 
 SECTION = thesis_torus(segments=60, elements_arc=16, grading="bead", footprint_size=0.3)
 

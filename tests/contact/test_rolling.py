@@ -14,7 +14,7 @@ from tireroad.contact.tread.compliance import half_space_compliance
 from tireroad.fem.errors import ConvergenceError
 from tireroad.greens.convolution import Convolution
 from tireroad.greens.recursion import Recursion
-from tireroad.runs.measure.synthetic import Strip, oval_patch
+from tireroad.runs.validation.cases import Strip, oval_patch
 
 PATCH = oval_patch((9, 7), (0.015, 0.02), 500.0)
 TREAD = half_space_compliance(PATCH.points[:, :2], PATCH.half_sizes, 5e6, 0.45)

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from tireroad.fem.static.state import StaticState
-from tireroad.runs.validation.stress import fem as stress_fem
-from tireroad.runs.validation.stress.fem import Attempt, Ended, attempts, result
+from tireroad.runs.validation import stability
+from tireroad.runs.validation.stability import Attempt, Ended, attempts, result
 
 pytestmark = pytest.mark.slow
 
@@ -107,16 +107,16 @@ def test_a_speed_beyond_what_the_wall_holds():
     found = result(Attempt("", speed=900.0, youngs_modulus=2e6))
     assert "inflation stops at 0 Pa" in found.message
     assert found.state.inflation == 0.0 and not found.state.displacement.any()
-    assert stress_fem.outcome(found)[0] == "stopped at once: nothing converged"
+    assert stability.outcome(found)[0] == "stopped at once: nothing converged"
 
 
 def test_a_state_out_of_balance_is_caught():
     """A row of the table tells of a state that is none, whatever the solver said."""
     asked = next(one for one in attempts() if one.name.startswith("one contact node"))
     good = result(asked)
-    assert stress_fem.outcome(good)[1] == "needs no catching"
+    assert stability.outcome(good)[1] == "needs no catching"
     for wrong in (Ended(good.state, "", 1e-3, 2), Ended(good.state, "static: stops", 1e-12, 1)):
-        assert stress_fem.outcome(wrong)[1] == "not caught"
+        assert stability.outcome(wrong)[1] == "not caught"
 
 
 @pytest.mark.long

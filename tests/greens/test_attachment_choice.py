@@ -18,7 +18,7 @@ from tireroad.greens import coupling
 from tireroad.greens.coupling import Basis, Wheel
 from tireroad.modal.basis import project
 from tireroad.modal.solver import undamped
-from tireroad.runs.measure.torus import thesis_torus
+from tireroad.runs.validation.cases import thesis_torus
 
 COMM = MPI.COMM_WORLD
 SOFT = {"model": "neo-hookean", "youngs_modulus": 48e6, "poisson_ratio": 0.45, "density": 1200.0}

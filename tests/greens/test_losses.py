@@ -21,7 +21,7 @@ from tireroad.greens.coupling import Basis, Wheel
 from tireroad.modal.basis import project
 from tireroad.modal.damping import StrainEnergy, beyond, rates
 from tireroad.modal.solver import undamped
-from tireroad.runs.measure.torus import thesis_torus
+from tireroad.runs.validation.cases import thesis_torus
 
 INFLATION, KEPT = 1e5, 30
 

@@ -11,13 +11,13 @@ from tireroad.contact.roads.kinds.flat import Flat
 from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.tread.compliance import half_space_compliance
 from tireroad.greens.recursion import Recursion
-from tireroad.runs.measure.synthetic import Strip, oval_patch
-from tireroad.runs.validation.stress.contact import (
+from tireroad.runs.validation.cases import Strip, oval_patch
+from tireroad.runs.validation.stability import (
     CRITICAL,
-    Ended,
+    Rolled,
     cases,
     one_mode,
-    outcome,
+    rolled,
     thrown_up,
 )
 
@@ -28,7 +28,7 @@ CASES = [replace(case, steps=min(case.steps, 400)) for case in cases()]
 
 @pytest.mark.parametrize("case", CASES, ids=[case.name for case in CASES])
 def test_case_ends_whole_or_refused(case) -> None:
-    ended = outcome(case)
+    ended = rolled(case)
     if "critical" in case.name and case.strip.speed > CRITICAL and ended.refused:
         assert "positive definite" in ended.refused or "without bound" in ended.refused
     else:
@@ -48,7 +48,7 @@ def test_thousands_of_steps_gain_no_energy() -> None:
 
 
 def test_what_is_not_finite_counts_as_not_caught() -> None:
-    assert Ended("made up", 1, float("nan"), 0.0, 0.0, False).row[-1] == "not caught"
+    assert Rolled("made up", 1, float("nan"), 0.0, 0.0, False).row[-1] == "not caught"
 
 
 def test_states_that_turn_far_in_a_step_are_static_or_blow_up() -> None:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tireroad.fem.sections.grid import PlyLine
-from tireroad.runs.bench.series.harmonics import Membrane, Rubber, frequencies
-from tireroad.runs.measure.torus import thesis_torus
+from tireroad.runs.validation.cases import thesis_torus
+from tireroad.tests.bench.series.harmonics import Membrane, Rubber, frequencies
 
 HALF = np.radians(120)
 

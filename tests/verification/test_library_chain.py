@@ -28,8 +28,8 @@ from tireroad.greens.responses import make_response
 from tireroad.modal.damping import StrainEnergy
 from tireroad.modal.rolling import rolling_modes
 from tireroad.modal.standing import standing_modes
-from tireroad.runs.measure.torus import thesis_torus
 from tireroad.runs.stages.build.turning import rolling_shape
+from tireroad.runs.validation.cases import thesis_torus
 
 SCENE = """
 name = "chain"

@@ -19,9 +19,9 @@ from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.wall import Region
-from tireroad.runs.measure.torus import thesis_torus
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.build.tire import make_body
+from tireroad.runs.validation.cases import thesis_torus
 
 pytestmark = pytest.mark.slow
 

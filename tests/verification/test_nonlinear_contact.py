@@ -19,7 +19,7 @@ from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
 from tireroad.fem.transient.linear import FullTire
 from tireroad.fem.transient.nonlinear import NonlinearTire
-from tireroad.runs.measure.torus import thesis_torus
+from tireroad.runs.validation.cases import thesis_torus
 
 INFLATION, STEP = 2e5, 2e-4
 DAMPING = (400.0, 0.0)
@@ -142,7 +142,7 @@ def test_a_road_that_has_risen_carries_the_static_load():
 def test_rolling_it_tends_to_the_linear_tire(tmp_path):
     """Waves of 0.05 and 0.5 mm at 100 rad/s: what is off grows with them, from nearly none."""
     from tireroad.runs.validation.excursion import _SINE, beside, scene_of
-    from tireroad.runs.validation.tires import Tires
+    from tireroad.runs.validation.full_elements import Tires
 
     mesh, found = {"segments": 16, "elements_arc": 6}, []
     tires = Tires(scene_of(_SINE.format(height=5e-5), mesh, 0.01), tmp_path)

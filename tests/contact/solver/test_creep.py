@@ -7,23 +7,23 @@ from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.tread.creep import TreadMemory, creep_of, steady
 from tireroad.contact.tread.laws.viscoelastic import Viscoelastic
 from tireroad.fem.errors import InputError
-from tireroad.runs.validation.parts.creeping import (
+from tireroad.runs.validation.contact_closed_forms import (
+    CREEP_SPEED,
     DX,
     DY,
     PUBLISHED,
-    SPEED,
     cylinder,
     influence,
     matrix,
     pressed,
-    rolled,
+    rolled_strip,
 )
 
 
 @pytest.mark.parametrize(("time", "published"), PUBLISHED.items())
 def test_published_pressure_of_rolling_cylinders(time, published) -> None:
     """Within 2 % (1.1 % at 0.009 s, a grid four times finer changes 0.02 %); most of it in front between the limits."""
-    patch, pressure = cylinder(), rolled(time)
+    patch, pressure = cylinder(), rolled_strip(time)
     assert pressure.max() == pytest.approx(published, rel=0.012)
     x = patch.points[:, 0]
     centre = float(x @ pressure / pressure.sum())
@@ -38,16 +38,16 @@ def test_published_pressure_of_rolling_cylinders(time, published) -> None:
 def test_rolled_in_time_it_comes_to_the_steady_state(share) -> None:
     """Steps of a point, and of 0.3 of it, where material is read between the points."""
     patch, creep = cylinder(), (np.array([0.6, 0.4]), np.array([0.003, 0.01]))
-    exact = pressed(ActiveSet(matrix(patch) @ steady(creep, patch, SPEED)), patch.gap)
-    step = share * DX / SPEED
-    memory = TreadMemory(creep, influence, patch, SPEED, step)
+    exact = pressed(ActiveSet(matrix(patch) @ steady(creep, patch, CREEP_SPEED)), patch.gap)
+    step = share * DX / CREEP_SPEED
+    memory = TreadMemory(creep, influence, patch, CREEP_SPEED, step)
     solver = ActiveSet(matrix(patch) * memory.at_once)
     for k in range(int(0.06 / step)):
         past = memory.predict()[0]
         pressure = pressed(solver, patch.gap + past)
         memory.advance(pressure * DX * DY * 1e6)
         if k == 40:
-            again = TreadMemory(creep, influence, patch, SPEED, step)
+            again = TreadMemory(creep, influence, patch, CREEP_SPEED, step)
             again.set_state(memory.state())
             assert (again.predict() == memory.predict()).all()
     assert np.abs(pressure - exact).max() < (1e-6 if share == 1.0 else 0.01) * exact.max()

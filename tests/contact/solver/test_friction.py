@@ -16,7 +16,7 @@ from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import half_space_compliance, rectangle_potential
 from tireroad.fem.errors import ConvergenceError
 from tireroad.greens.recursion import Recursion
-from tireroad.runs.measure.synthetic import Strip, oval_patch
+from tireroad.runs.validation.cases import Strip, oval_patch
 
 PATCH = oval_patch((9, 7), (0.015, 0.02), 500.0)
 TREAD = half_space_compliance(PATCH.points[:, :2], PATCH.half_sizes, 5e6, 0.45)

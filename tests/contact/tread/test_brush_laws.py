@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tireroad.contact.tread.brush import Brush, BrushLaw, upstream
-from tireroad.runs.measure.synthetic import oval_patch
+from tireroad.runs.validation.cases import oval_patch
 
 
 def test_upstream_is_linear_interpolation_on_each_line() -> None:

@@ -7,19 +7,21 @@ from tireroad.contact.tread.pattern import Heights, Pattern, pitch_starts
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.tables.pattern import Groove, PatternTable
 from tireroad.runs.stages.build.pattern import make_pattern
-from tireroad.runs.validation.parts import grooved
-from tireroad.runs.validation.parts.grooved import AROUND, grooves, rolled
+from tireroad.runs.validation import contact_closed_forms
+from tireroad.runs.validation.contact_closed_forms import AROUND, grooves, rolled
 
 
 def test_orders_of_equal_pitches_by_hand() -> None:
     """Grooves that never touch, a rigid road: F(t) = sum over the land of the slick's forces; its order n has the
     groove's Fourier coefficient sin(n pi w/l)/(n pi) times the transform of the force along x."""
-    pitch = grooved.AROUND / grooved.PITCHES
-    steps = round(grooved.TIMES * pitch / grooved.SPEED / grooved.STEP)
-    force, _ = rolled(grooves(width=grooved.WIDTH, depth=0.05, flank=1e-4), steps)
-    assert force.mean() == pytest.approx(500.0 * (1 - grooved.WIDTH / pitch), rel=0.01)
-    for order, found in zip((1, 2, 3), grooved.orders(force), strict=True):
-        assert found == pytest.approx(grooved.by_hand(order), rel=0.02)
+    pitch = contact_closed_forms.AROUND / contact_closed_forms.PITCHES
+    steps = round(
+        contact_closed_forms.TIMES * pitch / contact_closed_forms.SPEED / contact_closed_forms.STEP
+    )
+    force, _ = rolled(grooves(width=contact_closed_forms.WIDTH, depth=0.05, flank=1e-4), steps)
+    assert force.mean() == pytest.approx(500.0 * (1 - contact_closed_forms.WIDTH / pitch), rel=0.01)
+    for order, found in zip((1, 2, 3), contact_closed_forms.orders(force), strict=True):
+        assert found == pytest.approx(contact_closed_forms.by_hand(order), rel=0.02)
     lines = 2 * np.abs(np.fft.rfft(force - force.mean())) / len(force)
     between = np.delete(lines, np.arange(0, len(lines), 10))
     assert between.max() < 0.01 * lines[10]

@@ -14,7 +14,7 @@ from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
 from tireroad.fem.transient.linear import FullTire
 from tireroad.fem.transient.nonlinear import NonlinearTire
-from tireroad.runs.measure.torus import thesis_torus
+from tireroad.runs.validation.cases import thesis_torus
 
 pytestmark = pytest.mark.slow
 

@@ -12,7 +12,7 @@ from tireroad.fem.static.press import place
 from tireroad.fem.static.road import FLAT
 from tireroad.fem.static.state import static_state
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
-from tireroad.runs.validation.parts import static_friction as closed
+from tireroad.runs.validation import contact_closed_forms
 
 LOAD = 1500.0
 TURNING = Rolling(speed=40.0)
@@ -123,8 +123,8 @@ def test_what_sticks_keeps_its_distance_on_the_road(make) -> None:
 
 @pytest.mark.long
 def test_pushed_sideways_as_cattaneo_and_mindlin_say() -> None:
-    for pushed in closed.standing(closed.STIFF):
-        half, stuck = closed.HALF, np.sqrt(1 - pushed.share)
+    for pushed in contact_closed_forms.standing(contact_closed_forms.STIFF):
+        half, stuck = contact_closed_forms.STATIC_HALF, np.sqrt(1 - pushed.share)
         x = pushed.x / half
         over = np.sqrt(np.maximum(1 - x**2, 1e-12))
         exact = 1 - np.sqrt(np.maximum(stuck**2 - x**2, 0.0)) / over
@@ -135,12 +135,15 @@ def test_pushed_sideways_as_cattaneo_and_mindlin_say() -> None:
 
 @pytest.mark.long
 def test_it_rolls_as_carter_says() -> None:
-    for share, force in closed.rolling(closed.STIFF, (0.2, 0.6)):
+    for share, force in contact_closed_forms.rolling(contact_closed_forms.STIFF, (0.2, 0.6)):
         assert force == pytest.approx(1 - (1 - share) ** 2, rel=0.045)
 
 
 @pytest.mark.long
 def test_a_thin_layer_that_sticks_is_a_brush() -> None:
-    thick, thin = (closed.over_brush(replace(closed.LAYER, thickness=h)) for h in (4e-3, 2e-3))
+    thick, thin = (
+        contact_closed_forms.over_brush(replace(contact_closed_forms.LAYER, thickness=h))
+        for h in (4e-3, 2e-3)
+    )
     assert 1.0 < thin < 1.12
     assert 2 * thin - thick == pytest.approx(1.0, abs=0.04)

@@ -7,7 +7,7 @@ from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.load_steps import Loader
 from tireroad.fem.static.tread_surface import TreadSurface
 from tireroad.fem.tire.mesh import Lattice, position
-from tireroad.runs.measure.torus import thesis_torus
+from tireroad.runs.validation.cases import thesis_torus
 
 
 def torus(ring, arc):

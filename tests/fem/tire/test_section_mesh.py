@@ -9,7 +9,7 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.sections import reference
 from tireroad.fem.sections.grid import Patch, PlyLine, corners
 from tireroad.fem.sections.torus import Torus
-from tireroad.runs.measure.torus import thesis_torus
+from tireroad.runs.validation.cases import thesis_torus
 
 HALF = np.radians(120)
 BELT = PlyLine("belt", (-0.8, 0.8), 0.75)

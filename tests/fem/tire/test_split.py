@@ -6,7 +6,7 @@ import pytest
 from tireroad.fem.sections import reference
 from tireroad.fem.sections.radial import radial
 from tireroad.fem.sections.split import split_ring, split_section
-from tireroad.runs.measure.torus import thesis_torus
+from tireroad.runs.validation.cases import thesis_torus
 
 
 def area(section) -> float:

@@ -6,16 +6,16 @@ from mpi4py import MPI
 from scipy import sparse
 
 from tireroad.greens.recursion import Recursion
-from tireroad.runs.validation.parts import golden_car as golden
+from tireroad.runs.validation import closed_forms
 
 COMM = MPI.COMM_WORLD
 
 
 def test_the_golden_car_on_its_tire() -> None:
     """Where the road holds a massless tire's spring, H(s) + 1/k_t = 0: published poles, and the polynomial's."""
-    assert golden.response().rigid == 2  # wheel and body fall together
+    assert closed_forms.response().rigid == 2  # wheel and body fall together
     for found, exact, published in zip(
-        golden.poles(), golden.exact_poles(), golden.PUBLISHED, strict=True
+        closed_forms.poles(), closed_forms.exact_poles(), closed_forms.PUBLISHED, strict=True
     ):
         assert abs(found - exact) < 1e-9 * abs(found)
         assert found == pytest.approx(published, abs=1e-3)  # three decimals are published
@@ -23,11 +23,11 @@ def test_the_golden_car_on_its_tire() -> None:
 
 def test_the_golden_car_in_time() -> None:
     """A push on the wheel under a free corner: momentum by impulse, and springs by the exact recursion."""
-    basis = golden.golden_car()
+    basis = closed_forms.golden_car()
     point = sparse.csr_matrix([[0.0, 0.0, 1.0]])
     reading = sparse.hstack([sparse.csr_matrix((2, 3)), sparse.csr_matrix(np.eye(7)[[2, 6]])])
     response = basis.couple(reading.tocsr(), point)
-    step, m_u, body = 1e-3, golden.GOLDEN[3], 1.0
+    step, m_u, body = 1e-3, closed_forms.GOLDEN[3], 1.0
     tire = Recursion(response=response, step=step, scheme="linear", comm=COMM)
     tire.start(np.ones(1))
     places = []
@@ -39,4 +39,4 @@ def test_the_golden_car_in_time() -> None:
     centre = (m_u * wheel + body * car) / (m_u + body)
     assert centre == pytest.approx(0.5 * 3.0**2 / (m_u + body), rel=1e-9)
     # Carried along at a / (m_u + 1), the spring holds the body's share of the force.
-    assert wheel - car == pytest.approx(body / (m_u + body) / golden.GOLDEN[1], rel=1e-4)
+    assert wheel - car == pytest.approx(body / (m_u + body) / closed_forms.GOLDEN[1], rel=1e-4)

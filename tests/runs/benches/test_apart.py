@@ -7,13 +7,13 @@ import signal
 import pytest
 
 from tireroad.fem.errors import ConvergenceError
-from tireroad.runs.bench.accuracy import error_bars
-from tireroad.runs.bench.parts import apart, kept, rolling_cases
-from tireroad.runs.bench.parts.effectivity import shares
-from tireroad.runs.bench.parts.rolling_cases import CASES, Case
-from tireroad.runs.measure import tabulate
-from tireroad.runs.measure.measured_page import page
 from tireroad.runs.scene.load import load
+from tireroad.runs.validation import tables
+from tireroad.runs.validation.tables_page import page
+from tireroad.tests.bench.accuracy import error_bars
+from tireroad.tests.bench.parts import apart, kept, rolling_cases
+from tireroad.tests.bench.parts.effectivity import shares
+from tireroad.tests.bench.parts.rolling_cases import CASES, Case
 
 
 def test_what_another_process_gives(capfd) -> None:
@@ -66,9 +66,9 @@ def test_a_case_that_fails_is_named_and_the_others_go_on(tmp_path, monkeypatch) 
 def test_what_was_not_measured_ends_with_a_status(tmp_path, monkeypatch) -> None:
     table = shares([], "none.", ["a tire: too little memory"])
     module = type("M", (), {"ABOUT": "it", "run": staticmethod(lambda: [table])})
-    monkeypatch.setattr(tabulate, "modules", lambda package: {"it": module})
+    monkeypatch.setattr(tables, "modules", lambda package: {"it": module})
     with pytest.raises(ConvergenceError, match="not measured: a tire: too little memory"):
-        tabulate.run_all("tireroad.runs.bench", ["it"], tmp_path / "out.json")
+        tables.run_all("tireroad.tests.bench", ["it"], tmp_path / "out.json")
     (table_kept,) = json.loads((tmp_path / "out.json").read_text())["results"]["it"]
     assert table_kept["failed"] == table.failed
     assert "not measured: a tire: too little memory" in page({"it": [table]}, {"it": "it"})

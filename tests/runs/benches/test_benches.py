@@ -6,24 +6,23 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from tireroad.runs.bench import scaling, skipping
-from tireroad.runs.bench.accuracy import (
+from tireroad.runs.scene.sections.kinds import torus
+from tireroad.runs.search.journal import Trial
+from tireroad.runs.search.settings import CAUSES, Settings
+from tireroad.runs.validation import tables
+from tireroad.runs.validation.tables import Table
+from tireroad.runs.validation.tables_page import _shown, drawn, page
+from tireroad.tests.bench import scaling, skipping
+from tireroad.tests.bench.accuracy import (
     accuracy_on_demand,
     error_bars,
     headline,
     pareto,
 )
-from tireroad.runs.bench.accuracy.rough_road import Mesh
-from tireroad.runs.bench.parts import apart
-from tireroad.runs.bench.parts.floors import exponent
-from tireroad.runs.bench.parts.rolling_cases import Case
-from tireroad.runs.measure import tabulate
-from tireroad.runs.measure.measured_page import _shown, page
-from tireroad.runs.measure.plots import drawn
-from tireroad.runs.measure.tabulate import Table
-from tireroad.runs.scene.sections.kinds import torus
-from tireroad.runs.search.journal import Trial
-from tireroad.runs.search.settings import CAUSES, Settings
+from tireroad.tests.bench.accuracy.rough_road import Mesh
+from tireroad.tests.bench.parts import apart
+from tireroad.tests.bench.parts.floors import exponent
+from tireroad.tests.bench.parts.rolling_cases import Case
 
 pytestmark = pytest.mark.slow
 
@@ -161,14 +160,14 @@ def test_exponent_of_a_power_law() -> None:
 
 
 def test_kept_as_json_and_page(tmp_path, monkeypatch) -> None:
-    tables = [
+    given = [
         Table("a < b", [("n", "-"), ("time", "s")], [[1, 1e-5], [2, 2.0]], ["so & so"],
               {"x": "n", "y": ["time"], "log": "xy", "targets": [(1.0, "asked: 1 s")]}),
         Table("long", [("word", ""), ("n", "-")], [["w", k] for k in range(40)]),
     ]  # fmt: skip
-    module = type("M", (), {"ABOUT": "it", "run": staticmethod(lambda: tables)})
-    monkeypatch.setattr(tabulate, "modules", lambda package: {"it": module})
-    tabulate.run_all("tireroad.runs.bench", ["it"], tmp_path / "out.json")
+    module = type("M", (), {"ABOUT": "it", "run": staticmethod(lambda: given)})
+    monkeypatch.setattr(tables, "modules", lambda package: {"it": module})
+    tables.run_all("tireroad.tests.bench", ["it"], tmp_path / "out.json")
     data = json.loads((tmp_path / "out.json").read_text())
     assert data["results"]["it"][0]["rows"] == [[1, 1e-5], [2, 2.0]] and "core" in data["machine"]
     text = (tmp_path / "out.html").read_text()

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tireroad.runs.bench.parts.converged_load import Pressed, converged
+from tireroad.tests.bench.parts.converged_load import Pressed, converged
 
 
 def test_a_limit_is_told_only_where_all_of_a_sequence_closes_in() -> None:

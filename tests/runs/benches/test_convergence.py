@@ -5,9 +5,9 @@ import tomllib
 import numpy as np
 import pytest
 
-from tireroad.runs.bench.accuracy import convergence, rough_road
-from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.scene.load import load
+from tireroad.runs.validation.tables import Table
+from tireroad.tests.bench.accuracy import convergence, rough_road
 
 
 @pytest.mark.long

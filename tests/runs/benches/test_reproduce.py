@@ -12,11 +12,11 @@ from tireroad.contact.tread.compliance import rectangle_potential
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.runs.arguments import REPRODUCE
 from tireroad.runs.scene.load import load
-from tireroad.runs.thesis.claim import UNEXPLAINED, Claim, verdict
-from tireroad.runs.thesis.command import known, reproduce
-from tireroad.runs.thesis.figure import FIGURES, Figure, chosen
-from tireroad.runs.thesis.figures import half_space
-from tireroad.runs.thesis.runner import FOLDER
+from tireroad.tests.thesis.claim import UNEXPLAINED, Claim, verdict
+from tireroad.tests.thesis.command import known, reproduce
+from tireroad.tests.thesis.figure import FIGURES, Figure, chosen
+from tireroad.tests.thesis.figures import half_space
+from tireroad.tests.thesis.runner import FOLDER
 
 
 def claim(found: float, thesis: float = 2.0, relation: str = "equal", **more) -> Claim:

@@ -6,11 +6,11 @@ import os
 import pytest
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.measure import tabulate
-from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.process.mpi import judged
 from tireroad.runs.process.signals import Stopped
 from tireroad.runs.process.statuses import STOPPED
+from tireroad.runs.validation import tables
+from tireroad.runs.validation.tables import Table
 
 
 def test_a_stop_says_what_is_kept(tmp_path, monkeypatch) -> None:
@@ -21,16 +21,16 @@ def test_a_stop_says_what_is_kept(tmp_path, monkeypatch) -> None:
 
     done = type("M", (), {"ABOUT": "it", "run": staticmethod(lambda: [Table("t", [], [])])})
     late = type("M", (), {"ABOUT": "late", "run": staticmethod(stopped)})
-    monkeypatch.setattr(tabulate, "modules", lambda package: {"done": done, "late": late})
+    monkeypatch.setattr(tables, "modules", lambda package: {"done": done, "late": late})
     out = tmp_path / "not yet" / "out.json"
     for at, told in ((out, f"kept are done in {out}; "), (None, "nothing is kept; with --out")):
-        status, text = judged(lambda at=at: tabulate.run_all("tireroad.runs.bench", [], at))
+        status, text = judged(lambda at=at: tables.run_all("tireroad.tests.bench", [], at))
         assert status == STOPPED and f"stopped by SIGTERM: {told}" in text
     assert list(json.loads(out.read_text())["results"]) == ["done"]
     out.with_suffix(".kept").mkdir()
     assert (
         "the same command goes on"
-        in judged(lambda: tabulate.run_all("tireroad.runs.bench", [], out))[1]
+        in judged(lambda: tables.run_all("tireroad.tests.bench", [], out))[1]
     )
 
 
@@ -41,6 +41,6 @@ def test_a_name_that_cannot_be_written_is_refused_before_the_work(
     (tmp_path / "file").touch()
     os.mkfifo(tmp_path / "pipe")
     module = type("M", (), {"ABOUT": "it", "run": staticmethod(lambda: pytest.fail("it ran"))})
-    monkeypatch.setattr(tabulate, "modules", lambda package: {"it": module})
+    monkeypatch.setattr(tables, "modules", lambda package: {"it": module})
     with pytest.raises(InputError, match="--out"):
-        tabulate.run_all("tireroad.runs.bench", [], tmp_path / name)
+        tables.run_all("tireroad.tests.bench", [], tmp_path / name)

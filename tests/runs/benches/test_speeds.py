@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from tireroad.runs.bench import speeds
 from tireroad.runs.sweep.definition import read
+from tireroad.tests.bench import speeds
 
 
 def test_a_family_of_speeds_about_one_static_state(tmp_path: Path, monkeypatch) -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tireroad.runs.bench.parts.rolling_cases import Recorded
-from tireroad.runs.bench.parts.truth import Truth
+from tireroad.tests.bench.parts.rolling_cases import Recorded
+from tireroad.tests.bench.parts.truth import Truth
 
 
 def test_runs_of_other_steps_are_compared_over_the_same_time() -> None:

@@ -6,13 +6,10 @@ import pytest
 from tireroad.contact.loop import Loop, roll
 from tireroad.contact.model import step_solver
 from tireroad.contact.results.spectra import distance
-from tireroad.runs.measure.tabulate import modules
-from tireroad.runs.validation import passenger, rolling, schemes
-from tireroad.runs.validation.comparison import Comparison
-from tireroad.runs.validation.histories import History, follow
+from tireroad.runs.validation import closed_forms, passenger, rolling, schemes
+from tireroad.runs.validation.full_elements import Choice, Comparison, History, Tires, follow
 from tireroad.runs.validation.moved_road import SCENE
-from tireroad.runs.validation.parts import closed_tire
-from tireroad.runs.validation.tires import Choice, Tires
+from tireroad.runs.validation.tables import modules
 
 DURATION = 0.1
 
@@ -131,11 +128,11 @@ def test_waves_of_the_turning_ring_are_told_by_their_shapes(monkeypatch) -> None
     """Endo's: 1 % as the ring is, and plainly off without Coriolis and centrifugal forces. Taken for the nearest of all
     60 frequencies, only the lower branch would show that."""
     assert all(
-        found == pytest.approx(exact, rel=0.01) for *_, found, exact in closed_tire._ring(50.0)
+        found == pytest.approx(exact, rel=0.01) for *_, found, exact in closed_forms._ring(50.0)
     )
-    plain = closed_tire.matrices
-    monkeypatch.setattr(closed_tire, "matrices", lambda *given: plain(*given[:-1], "doppler"))
-    off = [abs(found / exact - 1) for *_, found, exact in closed_tire._ring(50.0)]
+    plain = closed_forms.matrices
+    monkeypatch.setattr(closed_forms, "matrices", lambda *given: plain(*given[:-1], "doppler"))
+    off = [abs(found / exact - 1) for *_, found, exact in closed_forms._ring(50.0)]
     assert min(off) > 0.05
 
 

@@ -6,8 +6,8 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.image import imread
 
 from tireroad.fem.sections.grid import PlyLine
-from tireroad.runs.measure.torus import thesis_torus
 from tireroad.runs.report.section_figure import draw_section, save_section
+from tireroad.runs.validation.cases import thesis_torus
 
 
 @pytest.fixture

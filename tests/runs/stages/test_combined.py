@@ -2,14 +2,14 @@
 
 import pytest
 
-from tireroad.runs.validation.parts import combined
+from tireroad.runs.validation import stability
 
 
 def test_every_combination_is_a_scene(tmp_path) -> None:
     from tireroad.runs.scene.load import load
 
-    for one in combined.COMBINATIONS.values():
-        text = combined._BASE.format(**vars(one))
+    for one in stability.COMBINATIONS.values():
+        text = stability._BASE.format(**vars(one))
         if one.tread == "winkler":
             text = text.replace("youngs_modulus = 1e7\n", "")
         (tmp_path / "scene.toml").write_text(text)
@@ -18,6 +18,8 @@ def test_every_combination_is_a_scene(tmp_path) -> None:
 
 @pytest.mark.long
 def test_a_free_cambered_patterned_wheel_on_a_drum_comes_to_its_end() -> None:
-    ((_, _, what, how),) = combined.rows(["free wheel, camber, drum, pattern with friction"])
+    ((_, _, what, how),) = stability.combined_rows(
+        ["free wheel, camber, drum, pattern with friction"]
+    )
     assert "steps, load" in what
     assert "complementarity" in how

@@ -1,1 +1,0 @@
-"""Shared by benchmarks and validation: tables, pages, figures, a synthetic tire."""

@@ -1,1 +1,0 @@
-"""Parts of `validate stability`, one per package of the program."""

@@ -1,0 +1,164 @@
+"""Tables of measured figures: printed, saved as JSON, and drawn on a page."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import io
+import json
+import pkgutil
+import tempfile
+import time
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from types import ModuleType
+
+from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.runs.files.disk import write_text
+from tireroad.runs.process import observe
+from tireroad.runs.process.signals import Stopped
+from tireroad.runs.version import PROGRAM, VERSION
+
+
+@dataclass
+class Table:
+    """Rows under (name, unit) columns; `notes` say what was measured and what the target is.
+
+    `plot`: figure specification for runs.validation.tables_page. `failed`: what could not be measured, one
+    line each with the reason.
+    """
+
+    title: str
+    columns: list[tuple[str, str]]
+    rows: list[list]
+    notes: list[str] = field(default_factory=list)
+    plot: dict | None = None
+    failed: list[str] = field(default_factory=list)
+
+    @property
+    def remarks(self) -> list[str]:
+        """The remarks under the table."""
+        return [*self.notes, *(f"not measured: {line}" for line in self.failed)]
+
+
+def modules(package: str) -> dict[str, ModuleType]:
+    """A package's modules by name, subfolders included: each has ABOUT and run() -> list[Table].
+
+    Some also have run_large(): the same on a mesh that takes too long to wait for.
+    """
+    path = importlib.import_module(package).__path__
+    names = [found.name for found in pkgutil.walk_packages(path, f"{package}.") if not found.ispkg]
+    loaded = {name.rpartition(".")[2]: importlib.import_module(name) for name in names}
+    return {name: loaded[name] for name in sorted(loaded) if hasattr(loaded[name], "ABOUT")}
+
+
+def run_all(package: str, names: list[str], out: Path | None, large: bool = False) -> None:
+    """Run the named modules of a package (all by default), show their tables; save them after each.
+
+    `large`: run only modules with a full-size version, in that version. Raises InputError before
+    anything runs if `out` cannot be written, ConvergenceError at the end if something could not be
+    measured.
+    """
+    known = modules(package)
+    if large:
+        known = {name: module for name, module in known.items() if hasattr(module, "run_large")}
+    for name in names:
+        if name not in known:
+            raise InputError(f"{name!r} is none of: {', '.join(known)}")
+    if out is not None:
+        _check(out)
+    results: dict[str, list[Table]] = {}
+    try:
+        for name in names or known:
+            results[name] = _measured(known[name], name, out, large)
+            if out is not None:
+                _keep(results, {name: known[name].ABOUT for name in results}, out)
+    except Stopped as stop:
+        stop.kept = _left(results, out)
+        raise
+    if out is not None:
+        observe.say(f"{out} and {out.with_suffix('.html')}")
+    failed = [line for tables in results.values() for table in tables for line in table.failed]
+    if failed:
+        raise ConvergenceError(f"not measured: {'; '.join(failed)}")
+
+
+def _check(out: Path) -> None:
+    """Make the folder of `out`; InputError if no file of that name can be written there."""
+    if out.is_dir():
+        raise InputError(f"--out {out} is a folder: name a file, such as {out / 'measured.json'}")
+    if out.exists() and not out.is_file():  # a device would be replaced by the file
+        raise InputError(f"--out {out} is no ordinary file: name another one")
+    if out.suffix == ".html":
+        raise InputError(f"--out {out}: a page of this name is written beside it; end it in .json")
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=out.parent):
+            pass
+    except OSError as error:
+        raise InputError(f"--out {out} cannot be written: {error.strerror}") from None
+
+
+def _left(results: dict[str, list[Table]], out: Path | None) -> str:
+    """What a stop leaves, in words."""
+    if out is None:
+        return "nothing is kept; with --out FILE.json what is finished is written there"
+    finished = f"{', '.join(results)} in {out}" if results else "nothing in the file of --out"
+    kept = out.with_suffix(".kept")
+    if kept.is_dir():
+        return f"kept are {finished}, and cases of the last one in {kept}: the same command goes on"
+    return f"kept are {finished}; name those that remain, with another --out"
+
+
+def _measured(module: ModuleType, name: str, out: Path | None, large: bool) -> list[Table]:
+    """Run a module and show its tables."""
+    observe.say(f"{name}: {module.ABOUT}")
+    began = time.perf_counter()
+    tables = module.run_large() if large else _run(module, out)
+    for table in tables:
+        show(table)
+    observe.say(f"{name}: {time.perf_counter() - began:.1f} s\n")
+    return tables
+
+
+def _run(module: ModuleType, out: Path | None) -> list[Table]:
+    """Run a module; one that can resume gets a folder beside `out` for its results so far."""
+    if out is not None and "kept" in inspect.signature(module.run).parameters:
+        return module.run(kept=out.with_suffix(".kept"))
+    return module.run()
+
+
+def show(table: Table) -> None:
+    """Print a table as text."""
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table as Grid
+
+    grid = Grid(title=table.title, title_justify="left", header_style="bold")
+    for name, unit in table.columns:
+        grid.add_column(
+            name if unit in ("", "-") else f"{name} [{unit}]".replace("[", r"\["), overflow="fold"
+        )
+    for row in table.rows:
+        grid.add_row(*(escape(_shown(value)) for value in row))
+    text = io.StringIO()
+    Console(file=text, width=120).print(grid)
+    observe.say(text.getvalue().rstrip())
+    for line in table.remarks:
+        observe.say(f"  {line}")
+
+
+def _shown(value) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _keep(results: dict[str, list[Table]], about: dict[str, str], out: Path) -> None:
+    """Write JSON at `out`, and a page with figures beside it."""
+    from tireroad.runs.validation.tables_page import machine, page
+
+    data = {name: [asdict(table) for table in tables] for name, tables in results.items()}
+    head = {"program": PROGRAM, "version": VERSION, "machine": machine()}
+    write_text(out, json.dumps(head | {"results": data}, indent=1) + "\n")
+    write_text(out.with_suffix(".html"), page(results, about))

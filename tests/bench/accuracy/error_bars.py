@@ -1,0 +1,159 @@
+"""Estimated over true error of rolling figures: the quality of a run's error bars."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tireroad.contact.results.error_bars import Bars, bars, measured
+from tireroad.runs.files.cache import Cache
+from tireroad.runs.validation.tables import Table
+from tireroad.tests.bench.parts.effectivity import (
+    ALL,
+    FORCES,
+    SMALL,
+    Effectivity,
+    by_cause,
+    every,
+    shares,
+)
+from tireroad.tests.bench.parts.kept import Records, every_case
+from tireroad.tests.bench.parts.rolling_cases import (
+    CASES,
+    DURATION,
+    FINE,
+    TIRES,
+    Case,
+    Driven,
+    Recorded,
+    by_wheel,
+    driven,
+    recorded,
+    sets,
+    told_settings,
+)
+
+ABOUT = "estimated over true error of mean, deviation and third octaves: 3 tires, 4 roads, 2 speeds"
+RUN = {"segments": 18, "arc": 8, "order": 3, "modes": 100, "pitch": 0.008, "step": 2e-4}
+
+
+def run(kept: Path | None = None) -> list[Table]:
+    """Run all cases, except those whose results are in the folder `kept`. On one process."""
+    with tempfile.TemporaryDirectory() as folder:
+        where = Path(folder)
+        return tables(where, CASES, RUN, FINE, DURATION, kept or where / "kept")
+
+
+def tables(
+    folder: Path, cases: Iterable[Case], coarse: dict, fine: dict, duration: float, kept: Path
+) -> list[Table]:
+    """Tables of the `cases`, with settings of the run and of the much finer one. On one process."""
+
+    def settings(case: Case) -> tuple:
+        tire = TIRES[case.tire]
+        return {**coarse, **tire.run}, {**fine, **tire.fine}, duration
+
+    records, failed = every_case(by_wheel(cases), folder, kept, judged, settings, _told)
+    found = [Effectivity(**one) for some in records.values() for one in some]
+    note = f"{told_settings(coarse, 'run')}; true: against {told_settings(fine, 'fine')}."
+    return [shares(found, note, failed), by_cause(found), every(found)]
+
+
+def judged(
+    case: Case, folder: Path, kept: Path, coarse: dict, fine: dict, duration: float
+) -> Records:
+    """The figures of a case (Effectivity), estimated and against finer runs. On one process."""
+    where = _Where(folder, kept, case, duration, coarse, fine)
+    return [asdict(one) for one in _judged(where)]
+
+
+def _told(records: Records) -> str:
+    """The message about a completed case."""
+    good = [one.good for one in (Effectivity(**record) for record in records) if one.cause == ALL]
+    return f"{sum(good)} of {len(good)} figures good"
+
+
+@dataclass(frozen=True)
+class _Where:
+    """A case, its settings, and the folders of its runs and their forces."""
+
+    folder: Path
+    kept: Path
+    case: Case
+    duration: float
+    coarse: dict
+    fine: dict
+
+    def own(self) -> Driven:
+        """The run with its error bars."""
+        scene = self.case.scene(self.folder, self.duration, *sets(**self.coarse))
+        return driven(scene, self.folder / "run", "spectra", self._cache)
+
+    def finer(self, *names: str) -> Recorded:
+        """The run with some settings as fine as the reference's."""
+        keys = self.coarse | {name: self.fine[name] for name in names if name in self.fine}
+        scene = self.case.scene(self.folder, self.duration, *sets(**keys))
+        folder = self.folder / "-".join(("fine", *names))
+        return recorded(scene, folder, self.kept / "forces", self._cache)
+
+    @property
+    def _cache(self) -> Cache:
+        """The cache of stages shared by roads and settings."""
+        return Cache(self.folder / "cache")
+
+
+_MESH = ("segments", "arc", "order", "footprint", "modes")
+
+
+def _judged(where: _Where) -> Iterator[Effectivity]:
+    """Effectivities of all causes together, and of each from two runs that differ only in it."""
+    own = where.own()
+    more = where.finer("modes")
+    pairs: dict[str, tuple[Recorded, Recorded]] = {
+        ALL: (own, where.finer(*_MESH, "pitch", "step", "residual")),
+        "step": (own, where.finer("step")),
+        "points": (own, where.finer("pitch")),
+        "modes": (own, more),
+        "mesh": (more, where.finer(*_MESH)),
+    }
+    accuracy = own.done.done["accuracy"].product
+    for force in FORCES:
+        causes = accuracy.by_cause.get(force, {})
+        for cause, pair in pairs.items():
+            bar = accuracy.total(force) if cause == ALL else causes.get(cause)
+            if bar is not None:
+                yield from _compared(str(where.case), force, cause, own, pair, bar)
+
+
+def _compared(
+    case: str, force: str, cause: str, own: Driven, pair: tuple[Recorded, Recorded], bar: Bars
+) -> Iterator[Effectivity]:
+    """Every figure of the vertical force, after the run-in."""
+    spectra, accuracy = (own.done.done[stage].product for stage in ("spectra", "accuracy"))
+    one, other = (
+        measured(
+            run.forces[FORCES[force]][round(spectra.left_out / run.step) :],
+            run.step,
+            spectra.limit.frequency,
+            accuracy.up_to,
+        )
+        for run in pair
+    )
+    true, load = bars(one, other, 1.0), abs(one.mean[2])
+    figures = [
+        ("mean", true.mean[2], bar.mean[2], SMALL["mean"] * load),
+        ("deviation", true.deviation[2], bar.deviation[2], SMALL["deviation"] * one.deviation[2]),
+        ("history", 100 * true.history[2], 100 * bar.history[2], SMALL["history"]),
+    ]
+    for k, centre in enumerate(one.centre):
+        same = np.flatnonzero(np.isclose(accuracy.centre, centre))
+        level = bar.level[same[0], 2] if len(same) else np.nan
+        if np.isfinite(level) and np.isfinite(true.level[k, 2]):
+            figures.append((f"{centre:.4g} Hz", true.level[k, 2], level, SMALL["level"]))
+    for figure, far, estimated, small in figures:
+        numbers = float(far), float(estimated), float(small)
+        yield Effectivity(case, force, cause, figure, *numbers)

@@ -1,0 +1,119 @@
+"""True and estimated errors of rolling figures, and tables of the estimates' quality."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from tireroad.runs.validation.tables import Table
+
+RANGE, ASKED = (0.5, 2.0), 80.0  # effectivity; % of the cases within it
+SMALL = {
+    "mean": 1e-4,
+    "deviation": 1e-3,
+    "history": 0.1,
+    "level": 0.02,
+}  # of the load, of the deviation, %, dB: smaller errors count as none
+ALL = "all"  # all causes together
+FORCES = {"contact_force": "total_force", "axle_force": "axle_force"}
+
+
+@dataclass(frozen=True)
+class Effectivity:
+    """A figure of a case with true and estimated error (N, % or dB), by one `cause` or all."""
+
+    case: str
+    force: str
+    cause: str
+    figure: str
+    true: float
+    estimated: float
+    small: float
+
+    @property
+    def kind(self) -> str:
+        """Kind of figure; all third octaves are one kind."""
+        return self.figure if self.figure in SMALL else "third octaves"
+
+    @property
+    def good(self) -> bool:
+        """Whether the estimate is within `RANGE`, or both errors are negligible."""
+        if max(self.true, self.estimated) <= self.small:
+            return True
+        return RANGE[0] * self.true <= self.estimated <= RANGE[1] * self.true
+
+
+def _judgement(some: list[Effectivity]) -> list[float]:
+    """Number, share of good ones (%), median and 10 % quantiles of estimated over true error."""
+    ratio = [one.estimated / one.true for one in some if one.true > one.small] or [float("nan")]
+    good = 100 * float(np.mean([float(one.good) for one in some] or [np.nan]))
+    return [len(some), good, *map(float, np.quantile(ratio, [0.5, 0.1, 0.9]))]
+
+
+_JUDGED = [
+    ("figures", "-"),
+    (f"within {RANGE[0]:g} to {RANGE[1]:g}", "%"),
+    ("median", "-"),
+    ("a tenth below", "-"),
+    ("a tenth above", "-"),
+]
+
+
+def shares(found: list[Effectivity], note: str, failed: Sequence[str] = ()) -> Table:
+    """All causes together; `note`: what was compared, `failed`: cases left out, with the reason."""
+    some = [one for one in found if one.cause == ALL]
+    kinds = ("mean", "deviation", "history", "third octaves")
+    parts = {kind: [one for one in some if one.kind == kind] for kind in kinds}
+    rows = [[kind, *_judgement(part)] for kind, part in parts.items() if part]
+    return Table(
+        "Error bars: estimated over true error",
+        [("figure", ""), *_JUDGED],
+        [*rows, ["all", *_judgement(some)]],
+        [
+            f"{len({one.case for one in found})} cases; target: {ASKED:g} % within. {note} Where both are below {SMALL['mean']:g} of the load, {SMALL['deviation']:g} of the "
+            f"deviation, {SMALL['history']:g} % of the history or {SMALL['level']:g} dB a figure counts as good.",
+        ],
+        failed=list(failed),
+    )
+
+
+def by_cause(found: list[Effectivity]) -> Table:
+    """Each cause separately."""
+    rows = []
+    for cause in dict.fromkeys(one.cause for one in found if one.cause != ALL):
+        for force in FORCES:
+            for kind in dict.fromkeys(one.kind for one in found):
+                where = (cause, force, kind)
+                some = [one for one in found if (one.cause, one.force, one.kind) == where]
+                if some:
+                    rows.append([cause, force.replace("_", " "), kind, *_judgement(some)])
+    return Table(
+        "By cause", [("cause", ""), ("force", ""), ("figure", ""), *_JUDGED], rows, [_PAIRS]
+    )
+
+
+_PAIRS = (
+    "True: of two runs that differ in the cause alone, the finer as fine in it as the reference; of the mesh both "
+    "with the modes of the reference."
+)
+
+
+def every(found: list[Effectivity]) -> Table:
+    """Each figure of all causes together, and the history by cause."""
+    columns = [
+        ("case", ""),
+        ("force", ""),
+        ("cause", ""),
+        ("figure", ""),
+        ("true", "N, % or dB"),
+        ("estimated", "N, % or dB"),
+        ("good", ""),
+    ]
+    rows = [
+        [*list(asdict(one).values())[:-1], one.good]
+        for one in found
+        if one.cause == ALL or one.figure == "history"
+    ]
+    return Table("Every figure", columns, rows)

@@ -1,0 +1,179 @@
+"""An inflated tire and its small motions: Fourier series around, finite elements in the section.
+
+  F = I + grad u,   int P(F) : grad v + cords + p int (x_theta x x_s) . v = 0
+
+(axisymmetric, three components); then for each wave number n the tangent on fields
+Re[v(r, y) e^{i n theta}], with stresses, pressure and cords of that state and the rubber's own part
+at its dynamic modulus. The integration is selective as in the program (full for the distortion, one
+point per direction less for dilatation and cords); everything else is independent: numpy, no
+dolfinx.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property, partial
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import eigsh, splu
+
+from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.sections.construction import Construction
+from tireroad.tests.bench.series.pieces import Face, Line, Rule, dofs
+
+STEPS = (0.02, 0.1, 0.3, 0.6, 1.0)  # shares of the inflation pressure
+_SMALL = 1e-10  # m: size of the last Newton step
+_UNIT = np.eye(3)
+
+
+class InflatedRing:
+    """A construction with `elements` from bead to bead, inflated to a pressure (Pa).
+
+    Fields have components (r, theta, y) per node.
+    """
+
+    def __init__(self, tire: Construction, elements: int, order: int, pressure: float):
+        self.section = mesh = tire.section(elements, order)
+        self.pressure = pressure
+        rubber = [tire.compounds[name] for name in mesh.regions]
+        by_cell = {
+            key: np.array([c[key] for c in rubber])[mesh.region]
+            for key in ("youngs_modulus", "poisson_ratio", "density", "dynamic")
+        }
+        modulus, poisson = by_cell["youngs_modulus"], by_cell["poisson_ratio"]
+        self._density, self._dynamic = by_cell["density"], by_cell["dynamic"]
+        cellwise = (slice(None), None, None, None)
+        self._parts = (
+            (Rule(mesh, order + 1), partial(_distortion, (modulus / 2 / (1 + poisson))[cellwise])),
+            (Rule(mesh, order), partial(_dilatation, (modulus / 3 / (1 - 2 * poisson))[cellwise])),
+        )
+        self._cords = [(line, mesh.plies[line.name]) for line in tire.cords]
+        self._size = 3 * len(mesh.nodes)
+        free = np.setdiff1d(np.arange(len(mesh.nodes)), np.unique(mesh.side(mesh.rim)))
+        self._free = dofs(free[None])[0]
+        self.displacement = np.zeros((len(mesh.nodes), 3))
+        self._inflate()
+
+    def _inflate(self) -> None:
+        for share in STEPS:
+            for _ in range(30):
+                tangent = self._inside(self._tangent(0, share * self.pressure))
+                step = splu(tangent).solve(-self._residual(share * self.pressure)[self._free])
+                self.displacement.ravel()[self._free] += step
+                if np.abs(step).max() < _SMALL:
+                    break
+            else:
+                raise ConvergenceError(f"inflation stops at {share:g} of {self.pressure:g} Pa")
+
+    def frequencies(self, wave: int, count: int) -> np.ndarray:
+        """The `count` lowest frequencies (Hz) of a wave, rim held, dynamic moduli; pairs once."""
+        stiffness = self._inside(self._tangent(wave, self.pressure, dynamic=True))
+        stiffness = (stiffness + stiffness.getH()) / 2
+        given = {"M": self._inside(self.mass), "sigma": 0.0, "which": "LM"}
+        squares = eigsh(stiffness, count, **given, return_eigenvectors=False)
+        return np.sqrt(np.sort(squares)) / (2 * np.pi)
+
+    @property
+    def weight(self) -> float:
+        """Mass of wall and cords, kg."""
+        along = np.tile([0.0, 0.0, 1.0], len(self.section.nodes))
+        return float(2 * np.pi * along @ (self.mass @ along))
+
+    @cached_property
+    def mass(self) -> sparse.csr_matrix:
+        """Mass matrix over one radian."""
+        rule = self._parts[0][0]
+        blocks = np.einsum("qa,qb,cq,c->cab", rule.N, rule.N, rule.volume, self._density)
+        out = self._assembled(self.section.cells, _each_component(blocks))
+        for cords, edges in self._cords:
+            line = Line(self.section, edges, cords, self.section.order + 1)
+            heavy = cords.density * cords.area / cords.spacing * line.area
+            blocks = np.einsum("qa,qb,cq->cab", line.N, line.N, heavy)
+            out = out + self._assembled(line.nodes, _each_component(blocks))
+        return out
+
+    def _residual(self, pressure: float) -> np.ndarray:
+        out, u = np.zeros(self._size), self.displacement
+        for rule, stress in self._parts:
+            G, own = rule.gradient(0), dofs(self.section.cells)
+            F = _deformation(G, u.ravel()[own])
+            force = np.einsum("cqhd,cqh,cq->cd", G, _flat(stress(F)), rule.volume)
+            np.add.at(out, own, force)
+        for cords, edges in self._cords:
+            line = Line(self.section, edges, cords, self.section.order)
+            along, tension, _ = line.state(u)
+            force = np.einsum("cqkd,cqk,cq->cd", line.stretch(0), tension * along, line.area)
+            np.add.at(out, dofs(line.nodes), force)
+        face = Face(self.section, u)
+        np.add.at(out, dofs(face.nodes), pressure * face.force())
+        return out
+
+    def _tangent(self, wave: int, pressure: float, dynamic: bool = False) -> sparse.csr_matrix:
+        face, u = Face(self.section, self.displacement), self.displacement
+        out = pressure * self._assembled(face.nodes, face.tangent(wave))
+        for rule, stress in self._parts:
+            F = _deformation(rule.gradient(0), u.ravel()[dofs(self.section.cells)])
+            A, G = _moduli(stress, F), rule.gradient(wave)
+            if dynamic:
+                turning = np.einsum("ij,cqab->cqiajb", _UNIT, np.linalg.solve(F, stress(F)))
+                share = (self._dynamic - 1)[:, None, None, None]
+                A = A + share * (A - turning.reshape(A.shape))
+            blocks = np.einsum("cqhi,cqhk,cqkj,cq->cij", G.conj(), A, G, rule.volume, optimize=True)
+            out = out + self._assembled(self.section.cells, blocks)
+        for cords, edges in self._cords:
+            line = Line(self.section, edges, cords, self.section.order)
+            _, _, B = line.state(u)
+            Z = line.stretch(wave)
+            blocks = np.einsum("cqki,cqkm,cqmj,cq->cij", Z.conj(), B, Z, line.area, optimize=True)
+            out = out + self._assembled(line.nodes, blocks)
+        return out
+
+    def _assembled(self, nodes: np.ndarray, blocks: np.ndarray) -> sparse.csr_matrix:
+        own = dofs(nodes)
+        rows = np.repeat(own, own.shape[1], axis=1).ravel()
+        columns = np.tile(own, (1, own.shape[1])).ravel()
+        return sparse.csr_matrix((blocks.ravel(), (rows, columns)), (self._size, self._size))
+
+    def _inside(self, matrix: sparse.csr_matrix) -> sparse.csc_matrix:
+        return matrix[self._free][:, self._free].tocsc()
+
+
+def _each_component(blocks: np.ndarray) -> np.ndarray:
+    size = 3 * blocks.shape[1]
+    return np.einsum("cab,xy->caxby", blocks, _UNIT).reshape(-1, size, size)
+
+
+def _flat(F: np.ndarray) -> np.ndarray:
+    return F.reshape(*F.shape[:-2], 9)
+
+
+def _deformation(G: np.ndarray, u: np.ndarray) -> np.ndarray:
+    return np.einsum("cqhd,cd->cqh", G, u).reshape(*G.shape[:2], 3, 3) + _UNIT
+
+
+def _distortion(shear: np.ndarray, F: np.ndarray) -> np.ndarray:
+    """P of mu/2 (J^(-2/3) I1 - 3), Pa."""
+    J, I1 = np.linalg.det(F)[..., None, None], (F * F).sum(axis=(-1, -2), keepdims=True)
+    return shear * J ** (-2 / 3) * (F - I1 / 3 * np.swapaxes(np.linalg.inv(F), -1, -2))
+
+
+def _dilatation(bulk: np.ndarray, F: np.ndarray) -> np.ndarray:
+    """P of kappa/2 (J - 1)^2, Pa."""
+    J = np.linalg.det(F)[..., None, None]
+    return bulk * (J - 1) * J * np.swapaxes(np.linalg.inv(F), -1, -2)
+
+
+def _moduli(stress, F: np.ndarray) -> np.ndarray:
+    """dP/dF (c, q, 9, 9) by complex steps, exact to rounding."""
+    out, step = np.empty((*F.shape[:-2], 9, 9)), 1e-30
+    for k in range(9):
+        moved = F.astype(complex)
+        moved[..., k // 3, k % 3] += 1j * step
+        out[..., k] = _flat(stress(moved).imag / step)
+    return out
+
+
+def lowest(tire: InflatedRing, waves: Sequence[int] = (0, 1)) -> np.ndarray:
+    """The two lowest frequencies (Hz) by wave number: lateral, wind-up; yaw/camber, vertical."""
+    return np.concatenate([tire.frequencies(wave, 2) for wave in waves])

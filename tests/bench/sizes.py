@@ -1,0 +1,55 @@
+"""The built-in radial tire from 125/80 R12 to 335/25 R22: does each size build and inflate?"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.fem.sections.radial import radial
+from tireroad.runs.validation.tables import Table
+from tireroad.tests.bench.series.inflated import InflatedRing, lowest
+
+ABOUT = "the built-in radial tire in many sizes: mass, inflated shape, first modes"
+SIZES = (
+    *("125/80 R12", "145/80 R13", "155/65 R14", "165/70 R14", "175/65 R14", "175/80 R14"),
+    *("185/65 R15", "195/50 R15", "195/65 R15", "195/80 R15", "205/60 R15", "205/55 R16"),
+    *("205/45 R17", "215/65 R16", "225/45 R17", "225/40 R18", "235/35 R19", "245/40 R19"),
+    *("245/30 R20", "255/55 R18", "255/35 R20", "275/30 R20", "285/25 R20", "305/30 R19"),
+    *("315/35 R20", "335/25 R22"),
+)
+ELEMENTS, ORDER, PRESSURE = 26, 2, 2.2e5  # the defaults; Pa
+COLUMNS = [
+    ("size", ""),
+    ("mass", "kg"),
+    ("moves", "mm"),
+    ("width", "mm"),
+    ("radius", "mm"),
+    ("lateral", "Hz"),
+    ("wind-up", "Hz"),
+    ("yaw", "Hz"),
+    ("vertical", "Hz"),
+    ("", ""),
+]
+NOTE = (
+    "Inflated to 220 kPa and their first modes by Fourier series around (bench.series.inflated), rim held. "
+    "'moves': the largest displacement of inflation; width and radius are those of the inflated tire."
+)
+
+
+def run() -> list[Table]:
+    """One row per size. Not collective."""
+    table = Table("The built-in radial tire", COLUMNS, [row(size) for size in SIZES], [NOTE])
+    return [table]
+
+
+def row(size: str) -> list:
+    """A size with its figures, or with its error."""
+    try:
+        tire = InflatedRing(radial(size), ELEMENTS, ORDER, PRESSURE)
+    except (InputError, ConvergenceError) as error:
+        return [size, *[float("nan")] * 8, str(error)]
+    line = tire.section.chain(tire.section.outer)
+    moved = 1e3 * (tire.section.nodes[line] + tire.displacement[line][:, [0, 2]])
+    largest = 1e3 * float(np.abs(tire.displacement).max())
+    shape = [tire.weight, largest, 2 * float(moved[:, 1].max()), float(moved[:, 0].max())]
+    return [size, *shape, *(float(value) for value in lowest(tire)), ""]
