@@ -36,7 +36,7 @@ def _sets(node: ast.stmt, name: str) -> bool:
 def _entry(package: str, name: str, home: str) -> str:
     found = _definition(f"{package}.{home}", name)
     if isinstance(found, ast.Assign):  # a registry's decorator
-        tree = ast.parse((ROOT / "fem" / "registry.py").read_text())
+        tree = ast.parse((ROOT / "fem" / "parameters.py").read_text())
         found = next(n for n in ast.walk(tree) if getattr(n, "name", None) == "register")
     text = inspect.cleandoc(ast.get_docstring(found, clean=False) or "")
     return f"\n### {name}\n\n```python\n{_signature(found, name)}\n```\n\n```text\n{text}\n```\n"

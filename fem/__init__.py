@@ -18,7 +18,7 @@ _HOMES = {
     "Operators": "matrices.operators",
     "ParameterError": "parameters",
     "Parameters": "parameters",
-    "Region": "tire.wall",
+    "Region": "tire.mesh",
     "Ring": "sections.ring",
     "SectionMesh": "sections.mesh2d",
     "SmallMotions": "model",

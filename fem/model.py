@@ -12,9 +12,8 @@ from functools import cached_property
 import numpy as np
 
 from tireroad.fem.errors import InputError
-from tireroad.fem.matrices.operators import Operators, Rotation
+from tireroad.fem.matrices.operators import Operators, Rotation, Support
 from tireroad.fem.matrices.rim_motion import RimMotion, rim_motion
-from tireroad.fem.matrices.support import Support
 from tireroad.fem.sections.ring import Ring
 from tireroad.fem.static.state import StaticState
 from tireroad.fem.tire.body import Body

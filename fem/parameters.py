@@ -1,16 +1,123 @@
-"""Parameters of models: type, unit, range, meaning, and the check of values.
+"""Description of one parameter: unit, meaning and range, and how a value is read.
+
+All packages may import this module; it needs only the standard library.
+
+Parameters of models: type, unit, range, meaning, and the check of values.
 
 Dataclass fields are made by `number`, `integer`, `flag`, `choice`, `text`, `filename` or `vector`.
 They are the only description of a parameter: the constructor, the scene file, `check`, the key
 reference and the error messages follow from them. Like `fem.errors`, all packages may import this
 module; it needs only the standard library.
+
+Named variants of a model: a new one is a decorated class in its own file or a user's script.
 """
 
-from dataclasses import dataclass, field
-from typing import Any, dataclass_transform
+import importlib
+import math
+import pkgutil
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import Field, dataclass, field, fields
+from numbers import Integral, Real
+from typing import Any, Generic, TypeVar, dataclass_transform
 
 from tireroad.fem.errors import InputError
-from tireroad.fem.keys import Key, Limits, OnlyFor, described, finite, keys, whole
+
+OnlyFor = tuple[str, tuple[str, ...]] | None
+
+
+@dataclass(frozen=True)
+class Limits:
+    """A closed range; None: no limit. The lower limit of a size is the least sensible value."""
+
+    least: float | None = None
+    most: float | None = None
+
+    def __str__(self) -> str:
+        low = f"≥ {self.least:g}" if self.least is not None else ""
+        high = f"≤ {self.most:g}" if self.most is not None else ""
+        return ", ".join(part for part in (low, high) if part) or "any"
+
+    def check(self, value: float, unit: str) -> None:
+        """Raises ValueError for a value outside the range."""
+        inside = (self.least is None or value >= self.least) and (
+            self.most is None or value <= self.most
+        )
+        if not inside:
+            # The "g" format overflows for very large integers.
+            written = f"{value:g}" if isinstance(value, float) else described(value)
+            shown = f"{written} {unit}".rstrip(" -")
+            raise ValueError(f"must be {self}{f' {unit}' if unit != '-' else ''}, not {shown}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Key:
+    """One parameter: how to read a value, its unit, meaning and allowed values.
+
+    `values` describes in words what is allowed, unless `choices` lists the allowed words; `limits`:
+    range of numbers; `optional`: may be absent (None); `is_file`: a file name; `is_whole`: an integer;
+    `only_for`: (name of the selecting key, its values) for a parameter that only some kinds of its
+    table have.
+    """
+
+    read: Callable[[Any], Any]
+    unit: str = "-"
+    doc: str
+    values: str = ""
+    optional: bool = False
+    only_for: OnlyFor = None
+    limits: Limits | None = None
+    choices: Iterable[str] = ()
+    is_file: bool = False
+    is_whole: bool = False
+
+    @property
+    def allowed(self) -> str:
+        """The allowed values, in words."""
+        return self.values or ", ".join(self.choices)
+
+
+def key_of(item: Field) -> Key | None:
+    """The description of a field; None if it is not a parameter."""
+    return item.metadata.get("key")
+
+
+def keys(of: type) -> Iterator[tuple[Field, Key]]:
+    """The parameters of a dataclass, in order."""
+    for item in fields(of):
+        key = key_of(item)
+        if key is not None:
+            yield item, key
+
+
+def described(value: Any) -> str:
+    """A value as the user wrote it, shortened for a message."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return f'"{value[:60]}"'
+    if isinstance(value, dict):
+        return "a table"
+    return str(value)[:60]
+
+
+def whole(value: Any) -> int:
+    """A whole number, also of numpy, as an int (not bool); else raises ValueError."""
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        raise ValueError(f"must be a whole number, not {described(value)}")
+    return int(value)
+
+
+def finite(value: Any) -> float:
+    """A finite real number, also of numpy, as a float (not bool); else raises ValueError."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise ValueError(f"must be a number, not {described(value)}")
+    try:
+        result = float(value)
+    except OverflowError:
+        raise ValueError("is too large a number") from None
+    if not math.isfinite(result):
+        raise ValueError(f"must be a finite number, not {described(value)}")
+    return result
 
 
 class ParameterError(InputError):
@@ -218,3 +325,80 @@ def vector(
     allowed = f"{size} numbers, {limits}"
     key = Key(read=read, unit=unit, doc=doc, values=allowed, limits=limits, optional=absent)
     return parameter(key, None if absent else default)
+
+
+T = TypeVar("T", bound=Parameters)
+
+
+class Registry(Generic[T]):
+    """Parameter classes by name.
+
+    `label` says what they are ("road kind"). The modules of `package` are imported when a name is
+    first looked up, so that a file added there is found.
+    """
+
+    def __init__(self, label: str, package: str, base: type[T]) -> None:
+        self.label = label
+        self._package, self._base = package, base
+        self._classes: dict[str, type[T]] = {}
+        self._docs: dict[str, str] = {}
+        self._found = False
+
+    def register(self, name: str, doc: str) -> Callable[[type], type]:
+        """Decorator that makes the class a frozen keyword-only dataclass known by `name`.
+
+        `doc` is its line in the key reference. Raises InputError if the name is taken or the class
+        is not derived from the registry's base.
+        """
+
+        def decorate(of: type) -> type:
+            if not issubclass(of, self._base):
+                raise InputError(f"{self.label} {name}: must be derived from {self._base.__name__}")
+            made = dataclass(frozen=True, kw_only=True)(of)
+            known = self._classes.get(name)
+            if known is not None and known.__qualname__ != made.__qualname__:
+                raise InputError(f"{self.label} {name}: is taken by {known.__qualname__}")
+            self._classes[name], self._docs[name] = made, doc
+            return made
+
+        return decorate
+
+    def forget(self, name: str) -> None:
+        """Remove a variant: for notebooks and tests that register their own."""
+        self._classes.pop(name, None)
+        self._docs.pop(name, None)
+
+    def _find(self) -> None:
+        if self._found:
+            return
+        self._found = True
+        package = importlib.import_module(self._package)
+        for module in pkgutil.iter_modules(package.__path__):
+            importlib.import_module(f"{self._package}.{module.name}")
+
+    def __getitem__(self, name: str) -> type[T]:
+        self._find()
+        if name not in self._classes:
+            raise InputError(f"{self.label} {name!r} is unknown: take one of {', '.join(self)}")
+        return self._classes[name]
+
+    def make(self, name: str, **values: Any) -> T:
+        """The variant `name` with these parameters, the others at their defaults."""
+        return self[name](**values)
+
+    def __contains__(self, name: object) -> bool:
+        self._find()
+        return name in self._classes
+
+    def __iter__(self) -> Iterator[str]:
+        self._find()
+        return iter(sorted(self._classes))
+
+    def doc(self, name: str) -> str:
+        """One-line description of the variant."""
+        self._find()
+        return self._docs[name]
+
+    def owners(self, parameter: str) -> list[str]:
+        """The variants that have a parameter of this name."""
+        return [name for name in self if parameter in {one.name for one in fields(self[name])}]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from tireroad.fem.errors import InputError
-from tireroad.fem.keys import Limits, finite
+from tireroad.fem.parameters import Limits, finite
 
 INERTIAS = ("full", "doppler")
 _RATES = Limits(least=0.0)

@@ -37,13 +37,13 @@ from tireroad.fem.matrices.compliance import (
     LoadedShapes,
     compliance,
     on_own_rows,
+    receptance,
     rotating_damping,
     rotating_stiffness,
     static_shapes,
+    statics,
 )
-from tireroad.fem.matrices.inertia_relief import statics
 from tireroad.fem.matrices.operators import Operators, Rotation
-from tireroad.fem.matrices.receptance import receptance
 from tireroad.fem.matrices.rim_motion import RimMotion
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.turning import Turning

@@ -7,9 +7,9 @@ import numpy as np
 from tireroad.fem.axle import Axle
 from tireroad.fem.cavity.column import Column
 from tireroad.fem.errors import ConvergenceError, InputError
-from tireroad.fem.keys import Limits, finite, whole
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.model import SmallMotions
+from tireroad.fem.parameters import Limits, finite, whole
 from tireroad.fem.static.checkpoint import Journal
 from tireroad.fem.turning import Turning
 from tireroad.modal.basis import ModalBasis, project, with_air, with_corner

@@ -35,11 +35,14 @@ def released(request: pytest.FixtureRequest) -> Iterator[None]:
             kept.cache_clear()
     gc.collect()
     # Under mpirun not here: a module that fails on one process would leave the others waiting.
-    if "tireroad.fem.garbage" in sys.modules and os.environ.get("OMPI_COMM_WORLD_SIZE", "1") == "1":
+    if (
+        "tireroad.fem.collective" in sys.modules
+        and os.environ.get("OMPI_COMM_WORLD_SIZE", "1") == "1"
+    ):
         from mpi4py import MPI
 
         for comm in (MPI.COMM_WORLD, MPI.COMM_SELF):
-            sys.modules["tireroad.fem.garbage"].collect(comm)
+            sys.modules["tireroad.fem.collective"].collect(comm)
     with suppress(OSError, AttributeError):  # of glibc alone
         ctypes.CDLL("libc.so.6").malloc_trim(0)
 

@@ -137,13 +137,7 @@ TO_UNTIE = {
 }
 TO_MERGE = {
     "contact/results/relief.py",
-    "fem/decks/drawn.py",
-    "fem/decks/files/gmsh_types.py",
-    "fem/decks/named.py",
-    "fem/decks/prony.py",
-    "fem/decks/shape/mirror.py",
     "fem/static/diagnosis.py",
-    "fem/tire/surface.py",
     "runs/report/drawn.py",
     "runs/report/section_picture.py",
     "runs/report/verdicts.py",

@@ -8,8 +8,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from tireroad.fem import compat
-from tireroad.fem.tire.face_rule import Face
-from tireroad.fem.tire.plies import Laid, Plies
+from tireroad.fem.tire.plies import Face, Laid, Plies
 
 
 def cylinder(cords, laid, *, radius, height, width, counts=(8, 2, 1), sector=2 * np.pi, order=2):

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.contact.roads.under_tire import Road
-from tireroad.fem.parameters import Parameters, choice, number
-from tireroad.fem.registry import Registry
+from tireroad.fem.parameters import Parameters, Registry, choice, number
 
 Array = NDArray[np.float64]
 Extent = tuple[tuple[float, float], tuple[float, float]]

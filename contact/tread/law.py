@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.contact.tread.compliance import Influence, check_points, dense_compliance
-from tireroad.fem.parameters import Parameters
-from tireroad.fem.registry import Registry
+from tireroad.fem.parameters import Parameters, Registry
 
 Array = NDArray[np.float64]
 

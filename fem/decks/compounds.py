@@ -1,4 +1,9 @@
-"""Materials of decks as laws of the program, in SI units."""
+"""Units of a deck: Abaqus has none, so a length unit stands for a consistent system.
+
+Dynamic modulus and loss factor from a Prony series.
+
+Materials of decks as laws of the program, in SI units.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +11,74 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from tireroad.fem.decks.deck import Compound
-from tireroad.fem.decks.files.lines import Place
-from tireroad.fem.decks.prony import prony
-from tireroad.fem.decks.units import Units
+import numpy as np
+
+from tireroad.fem.decks.deck import Compound, Place
+from tireroad.fem.errors import InputError
+from tireroad.fem.sections.construction import RADII
+
+_SMALLEST, _LARGEST = RADII
+
+
+@dataclass(frozen=True)
+class Units:
+    """Factors to SI for lengths, stresses and densities; `words` names the system."""
+
+    length: float
+    stress: float
+    density: float
+    words: str
+
+
+# Consistent with the second: tonne for mm, slinch (lbf s2/in) for inches.
+SYSTEMS = {
+    "m": Units(1.0, 1.0, 1.0, "m, kg, s, N, Pa"),
+    "mm": Units(1e-3, 1e6, 1e12, "mm, t, s, N, MPa"),
+    "in": Units(0.0254, 6894.757293, 1.0686896e7, "in, lbf s²/in, s, lbf, psi"),
+}
+
+
+def check_size(radius: float, unit: str, file: str) -> None:
+    """Raise InputError with the unit that fits if the outer radius (deck's unit) is no tire's."""
+    if _SMALLEST <= radius * SYSTEMS[unit].length <= _LARGEST:
+        return
+    fitting = [name for name, of in SYSTEMS.items() if _SMALLEST <= radius * of.length <= _LARGEST]
+    fitting = fitting[:1] if radius < _LARGEST else [n for n in fitting if n == "mm"] or fitting
+    shown = f"{radius * SYSTEMS[unit].length:.4g} m"
+    if not fitting:
+        raise InputError(f"{file}: the tire has an outer radius of {shown}; 0.1 to 2.5 m is a tire")
+    raise InputError(
+        f"{file}: the tire has an outer radius of {shown}: is this deck in {fitting[0]}? Then "
+        f'tire.length_unit = "{fitting[0]}" reads it in {SYSTEMS[fitting[0]].words}'
+    )
+
+
+PRONY_FREQUENCY = 100.0  # Hz at which a series is evaluated
+
+
+def prony(parts: dict, options: Mapping[str, str], notes: list[str]) -> tuple[float, float, float]:
+    """(long-term fraction of the given moduli, dynamic over long-term modulus, loss factor)."""
+    if "VISCOELASTIC" not in parts:
+        return 1.0, 1.0, 0.0
+    given, table, place = parts["VISCOELASTIC"]
+    if given.get("TIME", "").upper() != "PRONY":
+        notes.append(f"*VISCOELASTIC other than TIME=PRONY: not used ({place})")
+        return 1.0, 1.0, 0.0
+    terms = np.array([(*row, 0.0, 0.0, 0.0)[:3] for row in table]).reshape(-1, 3)
+    share, times = terms[:, 0], terms[:, 2]
+    if (share < 0).any() or share.sum() >= 1 or (times <= 0).any():
+        raise place.error("a Prony series needs g ≥ 0 with a sum below 1, and times > 0")
+    long_term = 1 - share.sum()
+    turn = 2 * np.pi * PRONY_FREQUENCY * times
+    storage = long_term + (share * turn**2 / (1 + turn**2)).sum()
+    loss = (share * turn / (1 + turn**2)).sum()
+    notes.append(
+        f"Prony series read at {PRONY_FREQUENCY:g} Hz: dynamic modulus {storage / long_term:.3g} times the "
+        f"long-term one, loss factor {loss / storage:.3g} ({place})"
+    )
+    instant = options.get("MODULI", "LONG TERM").upper() == "INSTANTANEOUS"
+    return (long_term if instant else 1.0), storage / long_term, loss / storage
+
 
 INCOMPRESSIBLE = 0.49  # Poisson's ratio in place of 1/2: changes modes by under 0.3 %
 _MODULUS = (1e4, 1e12)  # Pa; range of any material in a tire

@@ -1,4 +1,11 @@
-"""From a mesh file to a section: the only entry point of this package."""
+"""Edges of a section by the names of surfaces and sets.
+
+Assignment of compounds to the elements of a section.
+
+A section file (docs/section-file.md), converted like other mesh files.
+
+From a mesh file to a section: the only entry point of this package.
+"""
 
 from __future__ import annotations
 
@@ -8,24 +15,175 @@ from pathlib import Path
 
 import numpy as np
 
-from tireroad.fem.decks.compounds import Rubber, cord, rubber
-from tireroad.fem.decks.deck import SCOPE, Deck
-from tireroad.fem.decks.drawn import drawn
-from tireroad.fem.decks.files import abaqus, gmsh
-from tireroad.fem.decks.named import named_edges
-from tireroad.fem.decks.regions import Regions, regions
-from tireroad.fem.decks.shape import faces
-from tireroad.fem.decks.shape.chains import ends, forward, strings, with_origin
-from tireroad.fem.decks.shape.cut import Origins
-from tireroad.fem.decks.shape.embedding import lay_all
-from tireroad.fem.decks.shape.mirror import is_half, mirrored
-from tireroad.fem.decks.shape.plies import Laid, Ply, plies
-from tireroad.fem.decks.shape.quad_split import Quads
-from tireroad.fem.decks.shape.quads import DeckEdges, build
-from tireroad.fem.decks.solids import revolved
-from tireroad.fem.decks.units import SYSTEMS, Units, check_size
+from tireroad.fem.decks import abaqus, gmsh, revolved
+from tireroad.fem.decks.compounds import SYSTEMS, Rubber, Units, check_size, cord, rubber
+from tireroad.fem.decks.deck import ALL_FACES, BOTH_SIDES, SCOPE, Block, Deck, Place, missing
+from tireroad.fem.decks.embedding import Laid, Origins, Ply, lay_all, plies
+from tireroad.fem.decks.quads import (
+    DeckEdges,
+    Quads,
+    build,
+    ends,
+    faces,
+    forward,
+    is_half,
+    mirrored,
+    on_outline,
+    one_body,
+    strings,
+    with_origin,
+)
 from tireroad.fem.errors import InputError
+from tireroad.fem.sections import section_file
+from tireroad.fem.sections.construction import Construction, CordLine
 from tireroad.fem.sections.mesh2d import SectionMesh
+
+
+def named_edges(deck: Deck, edges: DeckEdges, name: str, key: str) -> np.ndarray:
+    """Edge numbers of a surface, node set or membrane set. InputError for other names.
+
+    `key` is the scene's key, for the message."""
+    surfaces = {surface.upper(): surface for surface in deck.surfaces}
+    if name.upper() in surfaces:
+        return _of_surface(deck, edges, deck.surfaces[surfaces[name.upper()]])
+    if name in deck.node_sets:
+        labels = deck.node_sets.labels(name)
+        return edges.between(deck.rows(labels[np.isin(labels, deck.labels)]))
+    if name in deck.element_sets:
+        return membrane_edges(deck, edges, deck.element_sets.labels(name))
+    raise InputError(f"tire.{key}: {missing('surface or node set', name, deck.face_names)}")
+
+
+def _of_surface(deck: Deck, edges: DeckEdges, rows: np.ndarray) -> np.ndarray:
+    order = np.argsort(edges.labels)
+    at = np.searchsorted(edges.labels[order], rows[:, 0])
+    at = order[np.minimum(at, len(order) - 1)]
+    solid = edges.labels[at] == rows[:, 0]
+    one = solid & (rows[:, 1] >= 0) & (rows[:, 1] < 4)
+    found = [edges.faces[at[one], rows[one, 1]]]
+    every = solid & (rows[:, 1] == ALL_FACES)
+    found.append(edges.faces[at[every]].ravel())
+    membranes = rows[~solid & np.isin(rows[:, 1], (ALL_FACES, BOTH_SIDES)), 0]
+    found.append(membrane_edges(deck, edges, membranes))
+    numbers = np.concatenate(found)
+    return np.unique(numbers[numbers >= 0])
+
+
+def membrane_edges(deck: Deck, edges: DeckEdges, labels: np.ndarray) -> np.ndarray:
+    """Numbers of the edges on which membranes of the given labels lie."""
+    found = [np.empty(0, np.int64)]
+    for block in deck.blocks:
+        if block.kind.role == "membrane":
+            mine = np.isin(block.labels, labels)
+            ends = deck.rows(
+                block.nodes[mine][:, [0, -1 if block.kind.nodes == 2 else 1]], block.place
+            )
+            found.append(edges.numbers(ends))
+    numbers = np.concatenate(found)
+    return numbers[numbers >= 0]
+
+
+@dataclass(frozen=True)
+class Regions:
+    """Names of the regions, their materials in the deck (None: none), the place that defines each,
+    and the region number of every element label (`of`).
+    """
+
+    names: tuple[str, ...]
+    materials: tuple[str | None, ...]
+    places: tuple[Place, ...]
+    of: dict[int, int]
+    notes: tuple[str, ...] = ()
+
+
+def regions(deck: Deck) -> Regions:
+    """The solid sections of a deck or, if it has none, its element sets."""
+    blocks = [b for b in deck.blocks if b.kind.role == "solid" and len(b.labels)]
+    if not blocks:
+        raise InputError(
+            f"{deck.file}: no solid element in it: CGAX, CAX (sections) and C3D types are read, and "
+            "quadrilaterals, triangles, hexahedra and wedges of Gmsh"
+        )
+    labels = np.sort(np.concatenate([block.labels for block in blocks]))
+    if not deck.solids:
+        return _by_set(deck, blocks, labels)
+    names: list[str] = []
+    of: dict[int, int] = {}
+    materials, places = [], []
+    for solid in deck.solids:
+        mine = np.intersect1d(deck.element_sets.labels(solid.elements, solid.place), labels)
+        if not len(mine):
+            continue
+        twice = next((label for label in mine.tolist() if label in of), None)
+        if twice is not None:
+            raise solid.place.error(
+                f"element {twice % SCOPE} is in two solid sections, {names[of[twice]]} and {solid.elements}"
+            )
+        of.update(dict.fromkeys(mine.tolist(), len(names)))
+        names.append(solid.elements)
+        materials.append(solid.material)
+        places.append(solid.place)
+    left = np.setdiff1d(labels, np.fromiter(of, np.int64, len(of)))
+    if len(left):
+        raise InputError(
+            f"{deck.file}: {len(left)} solid elements are in no *SOLID SECTION, element {left[0] % SCOPE} for one"
+        )
+    return Regions(tuple(names), tuple(materials), tuple(places), of)
+
+
+def _by_set(deck: Deck, blocks: list[Block], labels: np.ndarray) -> Regions:
+    """One region per element set, smallest sets first, and one for the remaining elements."""
+    sets = {
+        name: np.intersect1d(deck.element_sets.labels(name), labels)
+        for name in deck.element_sets.names
+    }
+    names: list[str] = []
+    of: dict[int, int] = {}
+    for name, mine in sorted(sets.items(), key=lambda item: len(item[1])):
+        new = [label for label in mine.tolist() if label not in of]
+        if new:
+            of.update(dict.fromkeys(new, len(names)))
+            names.append(name)
+    left = [label for label in labels.tolist() if label not in of]
+    if left:
+        of.update(dict.fromkeys(left, len(names)))
+        names.append("WALL")
+    note = "no solid sections: the regions are the element sets, their materials those of the scene"
+    place = blocks[0].place
+    count = len(names)
+    return Regions(tuple(names), (None,) * count, (place,) * count, of, (note,))
+
+
+ELEMENTS = 26  # bead to bead, as in the built-in radial tire
+
+
+def drawn(path: Path) -> tuple[SectionMesh, tuple[Rubber, ...], tuple[Ply, ...]]:
+    """Mesh of order 2, compound of each region, cords. Raises InputError with the file's name."""
+    construction = section_file.read(path)
+    try:
+        mesh = construction.section(ELEMENTS)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    rubbers = tuple(_rubber(construction, name) for name in mesh.regions)
+    return mesh, rubbers, tuple(_ply(line, mesh) for line in construction.cords)
+
+
+def _rubber(construction: Construction, name: str) -> Rubber:
+    values = construction.compounds[name]
+    coefficients = {key: values[key] for key in ("youngs_modulus", "poisson_ratio")}
+    return Rubber(
+        name=name,
+        model="neo-hookean",
+        coefficients=coefficients,
+        density=values["density"],
+        dynamic=values["dynamic"],
+        loss_factor=values["loss_factor"],
+    )
+
+
+def _ply(line: CordLine, mesh: SectionMesh) -> Ply:
+    given = {key: value for key, value in vars(line).items() if key not in ("under", "to")}
+    return Ply(sides=mesh.plies[line.name], **given)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,7 +248,7 @@ def _section(deck: Deck, ring_angles: np.ndarray | None, wishes: Wishes) -> OwnS
     found = regions(deck)
     _check_radius(deck, wishes.length_unit)
     quads, edges, split = build(deck, found.of)
-    faces.one_body(quads, lambda label: f"element {label % SCOPE}")
+    one_body(quads, lambda label: f"element {label % SCOPE}")
     origins = Origins(len(edges.ends))
     quads, laid = lay_all(deck, quads, edges, origins)
     named = {
@@ -101,7 +259,7 @@ def _section(deck: Deck, ring_angles: np.ndarray | None, wishes: Wishes) -> OwnS
     laid = {name: one.mirrored() if wishes.mirror else one for name, one in laid.items()}
     rim, inner, tread = (_sides(quads, named[key], key) for key in ("rim", "inner", "tread"))
     assert rim is not None, "_names() refuses a deck without a rim"
-    shape = faces.faces(quads, rim, inner, tread)
+    shape = faces(quads, rim, inner, tread)
     layers = _cords(deck, quads, laid, units)
     lines = {ply.name: ply.sides for ply in layers} | _lines(deck, quads, edges, origins, wishes)
     compounds = _rubbers(deck, found, units, wishes)
@@ -176,7 +334,7 @@ def _sides(quads: Quads, numbers: list[np.ndarray], key: str) -> np.ndarray | No
     """The sides of the outline that lie on the named edges; None if nothing was named."""
     if not numbers:
         return None
-    sides = faces.on_outline(quads, with_origin(quads, np.concatenate(numbers)))
+    sides = on_outline(quads, with_origin(quads, np.concatenate(numbers)))
     if not len(sides):
         raise InputError(f"tire.{key}: what it names has no side on the outline of the section")
     return sides
@@ -207,7 +365,7 @@ def _lines(deck: Deck, quads: Quads, edges: DeckEdges, origins: Origins, wishes:
     for name in deck.lines:
         numbers = origins.with_parts(named_edges(deck, edges, name, "cords"))
         sides = with_origin(quads, numbers)
-        if name.upper() in faces_named or len(faces.on_outline(quads, sides)) == len(sides):
+        if name.upper() in faces_named or len(on_outline(quads, sides)) == len(sides):
             continue
         for n, line in enumerate(strings(ends(quads, sides))[0]):
             found[name if n == 0 else f"{name} ({n + 1})"] = forward(quads, sides[line])

@@ -1,4 +1,20 @@
-"""Matrices of small motions about a static state, on the unknowns that its support leaves free.
+"""Support of the tire in small motions: rim fixed or free, road absent or holding its nodes.
+
+A free rim is an unsupported rigid body without mass of its own. On its nodes
+
+    u_i = a + theta x x_i,   six unknowns R eta with R^T M R = 1,
+
+so that the diagonal mass stays diagonal. The static state is that of the clamped rim. The wheel
+still carries the rim's static forces r, which rotate with it, and a constant force at the axle's
+centre. The second-order work of rotating forces adds to K, on the rotations,
+
+    W_ab = sum_i (r_a x_b + r_b x_a) / 2 - delta_ab r . x.
+
+A free tire without a road then has its six rigid modes at any inflation (a uniform pressure on the
+two equal bead circles of a rigid rim has no resultant), and K is symmetric. Mass-proportional
+damping then acts against the ground, as there is no wheel on an axle.
+
+Matrices of small motions about a static state, on the unknowns that its support leaves free.
 
 For basis functions phi on the undeformed mesh and w = e_y x X (Omega factored out). K is the
 tangent stiffness with its geometric and follower-pressure parts, the rubber's material part with
@@ -12,6 +28,7 @@ dynamic moduli:
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -22,8 +39,7 @@ from scipy import sparse
 from ufl.core.expr import Expr
 
 from tireroad.fem import compat
-from tireroad.fem.matrices.local_rows import from_local_rows
-from tireroad.fem.matrices.support import FIXED, Rim, Support, Unknowns
+from tireroad.fem.collective import from_local_rows, summed
 from tireroad.fem.static.virtual_work import (
     AT_REST,
     Rolling,
@@ -36,6 +52,173 @@ from tireroad.fem.static.virtual_work import (
     tangent,
 )
 from tireroad.fem.tire.body import Body
+
+TURN = 3  # components 3, 4, 5 of an unknown: rotations about x, y, z
+
+
+@dataclass(frozen=True)
+class Support:
+    """`rim` "fixed" or "free"; `held`: own nodes whose vertical motion the road holds."""
+
+    rim: str = "fixed"
+    held: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
+
+
+FIXED = Support()
+
+
+class Unknowns:
+    """Unknowns of a supported body and the map T from them to its nodes. Collective to make.
+
+    `free` (k,): this process's nodal dofs that are unknowns; the six of a free rim follow on the
+    last process. For own unknowns: `mass` (n,) kg, the diagonal of T^T M T; `place` (n, 3) m,
+    undeformed; `component` (n,): 0, 1, 2 for x, y, z and 3, 4, 5 for rotations; `carried` (3, n)
+    kg: momentum per unit rate.
+    """
+
+    def __init__(self, body: Body, support: Support) -> None:
+        self._body = body
+        rim = body.rim[body.rim < body.nodes]
+        known = np.zeros((body.nodes, 3), bool)
+        known[rim] = True
+        known[support.held, 2] = True
+        self.free = np.flatnonzero(~known)
+        nodal = body.nodal_mass()
+        self.rim = Rim(body, rim, nodal.reshape(-1, 3)[rim, 0]) if support.rim == "free" else None
+        points = body.lattice.points(body.ids)
+        self.mass, self.place = nodal[self.free], points[self.free // 3]
+        self.component = self.free % 3
+        self.carried = self.mass * (self.component == np.arange(3)[:, None])
+        if self.rim and self.rim.mine:
+            self.mass = np.append(self.mass, np.ones(6))
+            self.place = np.vstack([self.place, np.zeros((6, 3))])
+            self.component = np.append(self.component, np.arange(6))
+        if self.rim:
+            moved = self.rim.momentum()
+            self.carried = np.hstack([self.carried, moved[:, : 6 if self.rim.mine else 0]])
+        self._prolongation = self._make_prolongation(self.rim) if self.rim else None
+        first = 3 * body.space.dofmap.index_map.local_range[0]
+        self._rows = PETSc.IS().createGeneral(
+            (self.free + first).astype(PETSc.IntType), comm=body.comm
+        )
+
+    def _make_prolongation(self, rim: Rim) -> PETSc.Mat:
+        """T as a distributed matrix. Collective."""
+        comm, rows = self._body.comm, 3 * self._body.nodes
+        own = len(self.mass)
+        last = comm.allreduce(own)
+        first = comm.exscan(own) or 0
+        unit = sparse.csr_matrix(
+            (np.ones(len(self.free)), (self.free, first + np.arange(len(self.free)))), (rows, last)
+        )
+        columns = np.tile(np.arange(last - 6, last), len(rim.dofs))
+        values = (rim.shape.ravel(), (np.repeat(rim.dofs, 6), columns))
+        csr = sparse.csr_matrix(unit + sparse.csr_matrix(values, (rows, last)))
+        sizes = ((rows, PETSc.DETERMINE), (own, PETSc.DETERMINE))
+        return from_local_rows(csr, sizes, comm)
+
+    def reduced(self, matrix: PETSc.Mat) -> PETSc.Mat:
+        """T^T X T for a matrix X over all dofs of the body. Collective."""
+        if self._prolongation is None:
+            return matrix.createSubMatrix(self._rows, self._rows)
+        return matrix.ptap(self._prolongation)
+
+    def spread(self, values: np.ndarray) -> np.ndarray:
+        """Owned nodal values (nodes, 3, ...) from own unknowns (n, ...). Collective."""
+        out = np.zeros((3 * self._body.nodes, *values.shape[1:]))
+        out[self.free] = values[: len(self.free)]
+        if self.rim:
+            out[self.rim.dofs] = self.rim.shape @ self.rim.shared(values[len(self.free) :])
+        return out.reshape(self._body.nodes, 3, *values.shape[1:])
+
+    def restrict(self, nodal: np.ndarray) -> np.ndarray:
+        """Own unknowns (n, ...) from owned nodal values (nodes, 3, ...) of an admissible motion.
+        Collective."""
+        flat = nodal.reshape(-1, *nodal.shape[2:])
+        own = flat[self.free]
+        if self.rim is None:
+            return own
+        on_rim = self.rim.unknowns(flat[self.rim.dofs])
+        return np.concatenate([own, on_rim]) if self.rim.mine else own
+
+    def rim_motion(self, values: np.ndarray) -> np.ndarray:
+        """Translation and rotation of the free rim (6, ...), on every process. Collective."""
+        assert self.rim is not None, "only a free rim moves"
+        return self.rim.coordinates @ self.rim.shared(values[len(self.free) :])
+
+    def loads(
+        self, nodal: sparse.csr_matrix, on_rim: np.ndarray | None = None
+    ) -> sparse.csr_matrix:
+        """T^T of forces on own nodal dofs (3 nodes, k), plus forces and moments (6, k) on the rim.
+        Collective."""
+        nodal = nodal.tocsr()
+        own = nodal[self.free]
+        if self.rim is None:
+            return own
+        taken = summed(self._body.comm, self.rim.shape.T @ nodal[self.rim.dofs].toarray())
+        if on_rim is not None:
+            taken = taken + self.rim.coordinates.T @ on_rim
+        return (
+            sparse.vstack([own, sparse.csr_matrix(taken)], format="csr") if self.rim.mine else own
+        )
+
+
+class Rim:
+    """The bead faces as one rigid body.
+
+    Own `dofs` (d,); `shape` (d, 6): their motion per unknown; `coordinates` (6, 6): translation and
+    rotation per unknown; `mine`: whether this process owns the unknowns.
+    """
+
+    def __init__(self, body: Body, nodes: np.ndarray, mass: np.ndarray) -> None:
+        self._comm = body.comm
+        self._points = body.lattice.points(body.ids[nodes])
+        self._mass = np.repeat(mass, 3)
+        self.dofs = (3 * nodes[:, None] + np.arange(3)).ravel()
+        self.mine = body.comm.rank == body.comm.size - 1
+        motions = rigid_motions(self._points)
+        inertia = body.comm.allreduce(motions.T @ (self._mass[:, None] * motions))
+        # With the Cholesky factor each unknown combines only its own and earlier motions, which
+        # preserves mirror symmetries.
+        self.coordinates = np.linalg.inv(np.linalg.cholesky(inertia)).T
+        self.shape = motions @ self.coordinates
+
+    def shared(self, values: np.ndarray) -> np.ndarray:
+        """The owner's values (6, ...) on every process. Collective."""
+        return self._comm.bcast(values if self.mine else None, root=self._comm.size - 1)
+
+    def unknowns(self, motion: np.ndarray) -> np.ndarray:
+        """The six unknowns (6, ...) of a rigid motion given on the rim's own dofs (d, ...).
+        Collective."""
+        weighted = self._mass.reshape(-1, *[1] * (motion.ndim - 1)) * motion
+        return summed(self._comm, self.shape.T @ weighted)
+
+    def momentum(self) -> np.ndarray:
+        """Momentum (3, 6) kg per unit rate of the six unknowns. Collective."""
+        weighted = self._mass[:, None] * self.shape
+        return summed(self._comm, np.stack([weighted[d::3].sum(axis=0) for d in range(3)]))
+
+    def turning_stiffness(self, force: np.ndarray) -> np.ndarray:
+        """W (6, 6) of static forces (d,) N on the rim's dofs that rotate with it. Collective."""
+        product = summed(self._comm, force.reshape(-1, 3).T @ self._points)
+        whole = np.zeros((6, 6))
+        whole[TURN:, TURN:] = turning_moments(product)
+        return self.coordinates.T @ whole @ self.coordinates
+
+
+def turning_moments(product: np.ndarray) -> np.ndarray:
+    """W_ab (3, 3) N m/rad of forces that rotate with the rim, from sum_i r_a x_b N m."""
+    return (product + product.T) / 2 - np.trace(product) * np.eye(3)
+
+
+def rigid_motions(points: np.ndarray) -> np.ndarray:
+    """Translations and rotations about the origin, (3 k, 6), of points (k, 3) m."""
+    out = np.zeros((len(points), 3, 6))
+    out[:, :, :3] = np.eye(3)
+    for axis, unit in enumerate(np.eye(3)):
+        out[:, :, TURN + axis] = np.cross(unit, points)
+    return out.reshape(-1, 6)
+
 
 ROTATION = ("gyroscopic", "convective", "body", "body_convective")
 

@@ -6,7 +6,7 @@ import numpy as np
 from scipy import sparse
 
 from tireroad.fem.errors import InputError
-from tireroad.fem.sections.reference import line
+from tireroad.fem.sections.mesh2d import line
 from tireroad.fem.tire.mesh import Lattice
 
 _POINTS = 6  # Gauss points per direction in each element under a distributed load

@@ -19,7 +19,7 @@ from petsc4py import PETSc
 from tireroad.fem import compat
 from tireroad.fem.axle import Axle
 from tireroad.fem.collective import summed
-from tireroad.fem.matrices.support import FIXED, TURN, Unknowns, rigid_motions, turning_moments
+from tireroad.fem.matrices.operators import FIXED, TURN, Unknowns, rigid_motions, turning_moments
 from tireroad.fem.static.virtual_work import (
     AT_REST,
     Rolling,

@@ -1,4 +1,9 @@
-"""The cross-section of a tire as curved quadrilaterals in the meridian half plane."""
+"""The reference quadrilateral [0, 1] x [0, 1]: tensor-product Lagrange functions and sides.
+
+The cross-section of a tire as curved quadrilaterals in the meridian half plane.
+
+Validity checks of a section mesh; each error names the fault and its position.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +11,57 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
-from tireroad.fem.sections import reference
+from tireroad.fem.errors import InputError
+
+SIDES = ("xi = 0", "xi = 1", "eta = 0", "eta = 1")
+
+
+def equispaced(order: int) -> np.ndarray:
+    """Equispaced nodes of one edge of the reference element, (order + 1,), 0 and 1 included."""
+    return np.linspace(0.0, 1.0, order + 1)
+
+
+def line(nodes: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Lagrange functions (k, n) of the nodes (n,) at points t (k,)."""
+    values = np.empty((len(t), len(nodes)))
+    for a in range(len(nodes)):
+        others = np.delete(nodes, a)
+        values[:, a] = np.prod((t[:, None] - others) / (nodes[a] - others), axis=1)
+    return values
+
+
+def line_slope(nodes: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Derivatives (k, n) of the Lagrange functions of the nodes (n,) at points t (k,)."""
+    slopes = np.zeros((len(t), len(nodes)))
+    for a in range(len(nodes)):
+        others = np.delete(nodes, a)
+        for b in range(len(others)):
+            rest = np.delete(others, b)
+            slopes[:, a] += np.prod(t[:, None] - rest, axis=1)
+        slopes[:, a] /= np.prod(nodes[a] - others)
+    return slopes
+
+
+def tensor(xi: np.ndarray, eta: np.ndarray) -> np.ndarray:
+    """Products (k, n * n) of values (k, n) along xi and along eta, local (i, j) at i * n + j."""
+    return (xi[:, :, None] * eta[:, None, :]).reshape(len(xi), -1)
+
+
+def side_nodes(order: int) -> np.ndarray:
+    """Local nodes (4, order + 1) of the sides xi = 0, xi = 1, eta = 0, eta = 1, each ascending."""
+    grid = np.arange((order + 1) ** 2).reshape(order + 1, order + 1)
+    return np.stack([grid[0], grid[-1], grid[:, 0], grid[:, -1]])
+
+
+def grid_points(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """xi and eta (n * n,) of all nodes of an element with the given nodes (n,) on an edge."""
+    xi, eta = np.meshgrid(nodes, nodes, indexing="ij")
+    return xi.ravel(), eta.ravel()
+
 
 Position = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 
@@ -52,16 +106,14 @@ class SectionMesh:
     position: Position | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        from tireroad.fem.sections.checks import check
-
         check(self)
 
     def at(self, cells: np.ndarray, xi: np.ndarray, eta: np.ndarray) -> np.ndarray:
         """Positions (k, 2) m at reference coordinates in cells, (k,) each."""
         if self.position is not None:
             return self.position(cells, xi, eta)
-        edge = reference.equispaced(self.order)
-        shape = reference.tensor(reference.line(edge, xi), reference.line(edge, eta))
+        edge = equispaced(self.order)
+        shape = tensor(line(edge, xi), line(edge, eta))
         return np.einsum("ka,kax->kx", shape, self.nodes[self.cells[cells]])
 
     def on_nodes(self, order: int, edge: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -73,14 +125,14 @@ class SectionMesh:
         cells = self.cells if order == self.order else self._numbered(order)
         count = cells.max() + 1
         owner, local = _first_use(cells, count)
-        xi, eta = (part[local] for part in reference.grid_points(edge))
+        xi, eta = (part[local] for part in grid_points(edge))
         return self.at(owner, xi, eta), cells
 
     def of_order(self, order: int) -> SectionMesh:
         """The same section with elements of another order; raising the order keeps the shape."""
         if order == self.order:
             return self
-        nodes, cells = self.on_nodes(order, reference.equispaced(order))
+        nodes, cells = self.on_nodes(order, equispaced(order))
         return replace(self, order=order, nodes=nodes, cells=cells)
 
     def moved(self, place: Callable[[np.ndarray], np.ndarray]) -> SectionMesh:
@@ -92,7 +144,7 @@ class SectionMesh:
     def side(self, edges: np.ndarray) -> np.ndarray:
         """Nodes (k, order + 1) of edges (k, 2), in ascending xi or eta."""
         cell, side = edges.T
-        return self.cells[cell[:, None], reference.side_nodes(self.order)[side]]
+        return self.cells[cell[:, None], side_nodes(self.order)[side]]
 
     def chain(self, edges: np.ndarray) -> np.ndarray:
         """Nodes (k * order + 1,) along a chain of edges (k, 2); empty if it is not a chain."""
@@ -109,7 +161,7 @@ class SectionMesh:
         edges, number = np.unique(np.sort(ends, axis=2).reshape(-1, 2), axis=0, return_inverse=True)
         number = number.reshape(-1, 4)
         inner = np.arange(order - 1)
-        for side, local in enumerate(reference.side_nodes(order)):
+        for side, local in enumerate(side_nodes(order)):
             turned = (ends[:, side, 0] > ends[:, side, 1])[:, None]
             step = np.where(turned, inner[::-1], inner)
             cells[:, local[1:-1]] = len(used) + number[:, side, None] * (order - 1) + step
@@ -138,3 +190,170 @@ def _joined(sides: np.ndarray) -> np.ndarray:
         if edge[0] != before[-1]:
             return np.zeros(0, int)
     return np.append(sides[:, :-1].ravel(), sides[-1, -1])
+
+
+_SAME = 1e-9  # of the section's size: nodes closer than this coincide
+_GAUSS = 4  # points per direction at which the Jacobian is checked, besides the corners
+
+
+def check(mesh: SectionMesh) -> None:
+    """Raise InputError for the first rule of `SectionMesh` that is violated."""
+    _arrays(mesh)
+    _nodes(mesh)
+    _jacobians(mesh)
+    _one_body(mesh)
+    edges = _edges(mesh)
+    for name in ("outer", "tread", "inner", "rim"):
+        _on_boundary(mesh, name, edges)
+    _outer(mesh)
+    _inner(mesh)
+    _plies(mesh, edges)
+
+
+def _arrays(mesh: SectionMesh) -> None:
+    if mesh.order not in (1, 2, 3):
+        raise InputError(f"section: elements of order {mesh.order}; 1, 2 and 3 are available")
+    shapes = {
+        "nodes": mesh.nodes.ndim == 2 and mesh.nodes.shape[1] == 2,
+        "cells": mesh.cells.ndim == 2 and mesh.cells.shape[1] == (mesh.order + 1) ** 2,
+        "region": mesh.region.shape == mesh.cells.shape[:1],
+    }
+    for name, right in shapes.items():
+        if not right:
+            raise InputError(f"section: {name} has shape {getattr(mesh, name).shape}")
+    if not len(mesh.cells):
+        raise InputError("section: no element in it")
+    if not np.isfinite(mesh.nodes).all():
+        raise InputError("section: a coordinate is not a number")
+    if not ((mesh.region >= 0) & (mesh.region < len(mesh.regions))).all():
+        raise InputError("section: an element has no region")
+
+
+def _place(point: np.ndarray) -> str:
+    return f"r = {point[0]:.5g} m, y = {point[1]:.5g} m"
+
+
+def _nodes(mesh: SectionMesh) -> None:
+    if mesh.nodes[:, 0].min() <= 0:
+        worst = mesh.nodes[mesh.nodes[:, 0].argmin()]
+        raise InputError(
+            f"section: a node at {_place(worst)}: the axle is r = 0, all lies above it"
+        )
+    unused = np.setdiff1d(np.arange(len(mesh.nodes)), mesh.cells)
+    if len(unused):
+        raise InputError(
+            f"section: node {unused[0]} at {_place(mesh.nodes[unused[0]])} has no element"
+        )
+    pairs = cKDTree(mesh.nodes).query_pairs(_SAME * np.ptp(mesh.nodes, axis=0).max())
+    if pairs:
+        a, b = min(pairs)
+        raise InputError(
+            f"section: nodes {a} and {b} are both at {_place(mesh.nodes[a])}: two bodies, or elements "
+            "that should share a node"
+        )
+
+
+def _jacobians(mesh: SectionMesh) -> None:
+    """Positive at Gauss points and at the corners of every element."""
+    edge = equispaced(mesh.order)
+    t = np.polynomial.legendre.leggauss(_GAUSS)[0] / 2 + 0.5
+    xi, eta = grid_points(np.concatenate([[0.0], t, [1.0]]))
+    value = [line(edge, x) for x in (xi, eta)]
+    slope = [line_slope(edge, x) for x in (xi, eta)]
+    points = mesh.nodes[mesh.cells]
+    along_xi = np.einsum("ka,cax->ckx", tensor(slope[0], value[1]), points)
+    along_eta = np.einsum("ka,cax->ckx", tensor(value[0], slope[1]), points)
+    area = along_xi[..., 0] * along_eta[..., 1] - along_xi[..., 1] * along_eta[..., 0]
+    low, high = area.min(axis=1), area.max(axis=1)
+    bad = np.flatnonzero(~(low > 1e-6 * np.abs(area).max(axis=1)))
+    if len(bad):
+        middle = points[bad[0]].mean(axis=0)
+        what = "is inside out" if high[bad[0]] <= 0 else "is folded or has no angle at a corner"
+        raise InputError(
+            f"section: element {bad[0]} at {_place(middle)} {what} ({len(bad)} of {len(mesh.cells)})"
+        )
+
+
+def _one_body(mesh: SectionMesh) -> None:
+    count = mesh.cells.shape[1]
+    rows = np.repeat(np.arange(len(mesh.cells)), count)
+    table = coo_matrix((np.ones(rows.size), (rows, mesh.cells.ravel()))).tocsr()
+    bodies, which = connected_components(table @ table.T, directed=False)
+    if bodies > 1:
+        apart = mesh.nodes[mesh.cells[np.flatnonzero(which == 1)[0]]].mean(axis=0)
+        raise InputError(
+            f"section: {bodies} bodies that share no node; one lies at {_place(apart)}"
+        )
+
+
+def _edges(mesh: SectionMesh) -> np.ndarray:
+    """Number of cells that share each side of each cell, (c, 4)."""
+    sides = np.sort(mesh.cells[:, side_nodes(mesh.order)], axis=2)
+    _, inverse, count = np.unique(
+        sides.reshape(-1, mesh.order + 1), axis=0, return_inverse=True, return_counts=True
+    )
+    count = count[inverse.ravel()].reshape(-1, 4)
+    if count.max() > 2:
+        cell = np.argwhere(count > 2)[0][0]
+        raise InputError(f"section: an edge of element {cell} belongs to more than two elements")
+    return count
+
+
+def _in_range(mesh: SectionMesh, name: str, edges: np.ndarray) -> None:
+    if edges.ndim != 2 or edges.shape[1] != 2:
+        raise InputError(f"section: {name} has shape {edges.shape}, not (edges, 2)")
+    cell, side = edges.T
+    if not ((cell >= 0) & (cell < len(mesh.cells)) & (side >= 0) & (side < 4)).all():
+        raise InputError(f"section: {name} names an edge of no element")
+
+
+def _on_boundary(mesh: SectionMesh, name: str, count: np.ndarray) -> None:
+    edges = getattr(mesh, name)
+    _in_range(mesh, name, edges)
+    if not len(edges):
+        raise InputError(f"section: no edge is {name}")
+    inside = count[edges[:, 0], edges[:, 1]] > 1
+    if inside.any():
+        middle = mesh.nodes[mesh.side(edges[inside][:1])[0]].mean(axis=0)
+        raise InputError(f"section: {name} has an edge inside the body, at {_place(middle)}")
+
+
+def _outer(mesh: SectionMesh) -> None:
+    chain = mesh.chain(mesh.outer)
+    if not len(chain):
+        raise InputError("section: the outer face is not one chain in order, bead to bead")
+    if mesh.nodes[chain[0], 1] >= mesh.nodes[chain[-1], 1]:
+        raise InputError("section: the outer face runs from the higher y to the lower")
+    keys = {tuple(edge) for edge in mesh.outer.tolist()}
+    for edge in mesh.tread.tolist():
+        if tuple(edge) not in keys:
+            middle = mesh.nodes[mesh.side(np.array([edge]))[0]].mean(axis=0)
+            raise InputError(f"section: the tread at {_place(middle)} is not of the outer face")
+
+
+def _inner(mesh: SectionMesh) -> None:
+    """The inner face is one path whose two ends lie on the rim or at the ends of the outer face."""
+    ends = mesh.side(mesh.inner)[:, [0, -1]]
+    nodes, uses = np.unique(ends, return_counts=True)
+    loose = nodes[uses == 1]
+    if len(loose) != 2 or uses.max() > 2:
+        where = "; ".join(_place(mesh.nodes[n]) for n in loose[:4])
+        raise InputError(
+            f"section: the inner face is not one unbroken line, it ends {len(loose)} times: {where}"
+        )
+    held = np.union1d(mesh.side(mesh.rim), mesh.chain(mesh.outer)[[0, -1]])
+    for node in loose:
+        if node not in held:
+            raise InputError(f"section: the inner face is open at {_place(mesh.nodes[node])}")
+
+
+def _plies(mesh: SectionMesh, count: np.ndarray) -> None:
+    for name, edges in mesh.plies.items():
+        _in_range(mesh, f"ply {name!r}", edges)
+        if not len(edges):
+            raise InputError(f"section: ply {name!r} has no edge")
+        chain = mesh.chain(edges)
+        if not len(chain):
+            raise InputError(f"section: ply {name!r} is not one chain of element edges in order")
+        if len(np.unique(chain)) != len(chain):
+            raise InputError(f"section: ply {name!r} meets itself")

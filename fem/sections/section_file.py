@@ -10,8 +10,15 @@ from typing import Any
 import numpy as np
 
 from tireroad.fem.errors import InputError
-from tireroad.fem.sections.construction import Construction, CordLine, Layer, Part
-from tireroad.fem.sections.outline import RADII, Outline, arcs
+from tireroad.fem.sections.construction import (
+    RADII,
+    Construction,
+    CordLine,
+    Layer,
+    Outline,
+    Part,
+    arcs,
+)
 
 UNITS = {"m": 1.0, "mm": 1e-3}
 LARGEST = 1_000_000  # bytes

@@ -1,17 +1,80 @@
-"""Local refinement: strips of a section's cells and segments of a ring are split in two."""
+"""Location of points in a section: cell, reference coordinates and shape functions.
+
+Local refinement: strips of a section's cells and segments of a ring are split in two.
+"""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
+from scipy import sparse
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from tireroad.fem.sections import reference
+from tireroad.fem.sections import mesh2d
 from tireroad.fem.sections.mesh2d import SectionMesh
 from tireroad.fem.sections.ring import Ring
+
+_CANDIDATES = 9  # cells whose centres are nearest to a point: one of them contains it
+_NEWTON = 12
+_OUTSIDE = 0.2  # of an element: limit of the reference coordinates for points off the mesh
+
+
+def locate(
+    nodes: np.ndarray, cells: np.ndarray, order: int, points: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Cell, xi and eta, (k,) each, of points (k, 2) m in cells (c, n) of equispaced nodes.
+
+    Newton's method in the nearest cells; a point outside all of them gets the best fit.
+    """
+    near = min(_CANDIDATES, len(cells))
+    _, candidates = cKDTree(nodes[cells].mean(axis=1)).query(points, k=near)
+    candidates = candidates.reshape(len(points), near)
+    best = np.full(len(points), np.inf)
+    found = np.zeros((len(points), 3))
+    for cell in candidates.T:
+        place = _inverse(nodes[cells[cell]], order, points)
+        # Any cell that contains the point will do; otherwise the nearest.
+        excess = np.abs(place - 0.5).max(axis=1)
+        better = excess < best - 1e-9
+        best[better] = excess[better]
+        found[better] = np.column_stack([cell, place])[better]
+    return found[:, 0].astype(int), found[:, 1], found[:, 2]
+
+
+def _inverse(corners: np.ndarray, order: int, points: np.ndarray) -> np.ndarray:
+    """Reference coordinates (k, 2) of points (k, 2) in cells with nodes (k, n, 2)."""
+    edge = mesh2d.equispaced(order)
+    place = np.full(points.shape, 0.5)
+    for _ in range(_NEWTON):
+        xi, eta = place.T
+        value = mesh2d.line(edge, xi), mesh2d.line(edge, eta)
+        slope = mesh2d.line_slope(edge, xi), mesh2d.line_slope(edge, eta)
+        defect = np.einsum("ka,kax->kx", mesh2d.tensor(*value), corners) - points
+        rates = [
+            np.einsum("ka,kax->kx", mesh2d.tensor(*pair), corners)
+            for pair in ((slope[0], value[1]), (value[0], slope[1]))
+        ]
+        step = np.linalg.solve(np.stack(rates, axis=-1), defect[:, :, None])[:, :, 0]
+        place = np.clip(place - np.clip(step, -0.5, 0.5), -_OUTSIDE, 1 + _OUTSIDE)
+    return place
+
+
+def interpolation(
+    cells: np.ndarray,
+    edge: np.ndarray,
+    count: int,
+    place: tuple[np.ndarray, np.ndarray, np.ndarray],
+) -> sparse.csr_matrix:
+    """Shape functions (k, count) at (cell, xi, eta) on cells (c, n) with nodes at `edge`."""
+    cell, xi, eta = place
+    shape = mesh2d.tensor(mesh2d.line(edge, xi), mesh2d.line(edge, eta))
+    rows = np.repeat(np.arange(len(cell)), shape.shape[1])
+    entries = shape.ravel(), (rows, cells[cell].ravel())
+    return sparse.csr_matrix(entries, shape=(len(cell), count))
+
 
 _SAME = 1e-7  # of the section's size: nodes of two cells closer than this are merged
 
@@ -42,7 +105,7 @@ def split_section(section: SectionMesh, along: np.ndarray) -> SectionMesh:
     """
     children = _Children(_strips(section, section.outer[along]))
     order = section.order
-    xi, eta = reference.grid_points(reference.equispaced(order))
+    xi, eta = mesh2d.grid_points(mesh2d.equispaced(order))
 
     def position(cells: np.ndarray, xi: np.ndarray, eta: np.ndarray) -> np.ndarray:
         return section.at(*children.in_parent(cells, xi, eta))
@@ -66,7 +129,7 @@ def split_section(section: SectionMesh, along: np.ndarray) -> SectionMesh:
 
 def _strips(section: SectionMesh, starts: np.ndarray) -> np.ndarray:
     """Reference coordinates along which each cell is split, (cells, 2) bool."""
-    sides = section.cells[:, reference.side_nodes(section.order)][..., [0, -1]]
+    sides = section.cells[:, mesh2d.side_nodes(section.order)][..., [0, -1]]
     across: dict[tuple[int, int], list[tuple[int, int]]] = {}
     for cell, side in np.ndindex(sides.shape[:2]):
         across.setdefault(tuple(sorted(sides[cell, side])), []).append((cell, side))

@@ -9,13 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tireroad.fem.errors import InputError
-from tireroad.fem.keys import Limits, finite, whole
-from tireroad.fem.parameters import ParameterError
-from tireroad.fem.sections import bead
-from tireroad.fem.sections.footprint import ARC_NEAR, SIZE, near_road, ring_corners
+from tireroad.fem.parameters import Limits, ParameterError, finite, whole
+from tireroad.fem.sections import grid
 from tireroad.fem.sections.grid import Patch, PlyLine, corners, product
 from tireroad.fem.sections.mesh2d import SectionMesh
-from tireroad.fem.sections.ring import Ring
+from tireroad.fem.sections.ring import ARC_NEAR, SIZE, Ring, near_road, ring_corners
 
 LEAST = (6, 2)  # elements around and along: minimum for a tire
 # What a section can be made of; those of a scene's tire are narrower.
@@ -104,8 +102,8 @@ class Torus:
             return near
         edge = self.half_angle - np.abs(arc)
         length = 2 * self.half_angle
-        floor = bead.LEAST * self.thickness / self.minor_radius / self.elements_arc
-        return near * bead.size(edge, length, self.elements_arc, floor)
+        floor = grid.LEAST * self.thickness / self.minor_radius / self.elements_arc
+        return near * grid.size(edge, length, self.elements_arc, floor)
 
     def section(self, patches: Sequence[Patch] = (), plies: Sequence[PlyLine] = ()) -> SectionMesh:
         """The section mesh, with edges exactly on the boundaries of patches and on plies."""

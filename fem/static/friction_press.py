@@ -36,8 +36,8 @@ from petsc4py import PETSc
 from scipy import sparse
 from scipy.optimize import root_scalar
 
+from tireroad.fem.collective import from_local_rows
 from tireroad.fem.errors import ConvergenceError, InputError, LoadingStopped
-from tireroad.fem.matrices.local_rows import from_local_rows
 from tireroad.fem.static.equilibrium import Equilibrium, Step
 from tireroad.fem.static.friction_road import Passing, RubbingRoad, Sliding, Standing
 from tireroad.fem.static.load_steps import Loader, Show, march

@@ -27,9 +27,8 @@ import numpy as np
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.matrices import probe
-from tireroad.fem.sections.locate import interpolation, locate
 from tireroad.fem.sections.ring import Ring
-from tireroad.fem.sections.split import split_ring
+from tireroad.fem.sections.split import interpolation, locate, split_ring
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.footprint import Footprint, footprint, nodal_area
 from tireroad.fem.static.half_model import HalfTurnEquilibrium, looks_the_same

@@ -43,7 +43,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import sparse
 
-from tireroad.fem.matrices.local_rows import from_local_rows
+from tireroad.fem.collective import from_local_rows
 from tireroad.fem.tire.body import Body
 
 Array = np.ndarray

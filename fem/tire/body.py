@@ -1,4 +1,7 @@
-"""The tire as a discretised body: mesh, displacement field, clamped rim, integration measures."""
+"""Gathering of nodal values on every process.
+
+The tire as a discretised body: mesh, displacement field, clamped rim, integration measures.
+"""
 
 from __future__ import annotations
 
@@ -12,15 +15,37 @@ from petsc4py import PETSc
 from ufl.core.expr import Expr
 
 from tireroad.fem import compat
-from tireroad.fem.garbage import collect, watch
+from tireroad.fem.collective import collect, watch
 from tireroad.fem.sections.ring import Ring
 from tireroad.fem.sections.torus import Torus
 from tireroad.fem.tire.cords import Cords
 from tireroad.fem.tire.material import Material
-from tireroad.fem.tire.mesh import INNER, RIM, TREAD, build
+from tireroad.fem.tire.mesh import INNER, RIM, TREAD, Region, Wall, build, compounds
 from tireroad.fem.tire.plies import Plies, laid_on
-from tireroad.fem.tire.surface import Gather
-from tireroad.fem.tire.wall import Region, Wall, compounds
+
+
+class Gather:
+    """Gathers values at chosen lattice nodes on every process, in the order of `wanted`.
+
+    `owned`: ids of this process's owned nodes; `wanted`: ids to gather, the same on all
+    processes.
+    """
+
+    def __init__(self, comm: MPI.Comm, owned: np.ndarray, wanted: np.ndarray) -> None:
+        self.comm = comm
+        self.ids = wanted
+        self.local = np.flatnonzero(np.isin(owned, wanted))  # owned blocks that are wanted
+        order = np.argsort(wanted, kind="stable")
+        # Their indices in `wanted`.
+        self.place = order[np.searchsorted(wanted, owned[self.local], sorter=order)]
+
+    def __call__(self, owned: np.ndarray) -> np.ndarray:
+        """Values (nodes, ...) on every process from those at the owned nodes (owned, ...).
+        Collective."""
+        out = np.zeros((len(self.ids), *owned.shape[1:]))
+        out[self.place] = owned[self.local]
+        self.comm.Allreduce(MPI.IN_PLACE, out)
+        return out
 
 
 class Body:

@@ -17,12 +17,11 @@ import ufl
 from mpi4py import MPI
 
 from tireroad.fem import compat, kinematics
-from tireroad.fem.sections import reference
+from tireroad.fem.sections import mesh2d
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.cords import TAUT
-from tireroad.fem.tire.face_rule import edge_rule, face_points
 from tireroad.fem.tire.mesh import position
-from tireroad.fem.tire.plies import RULE, Sheet
+from tireroad.fem.tire.plies import RULE, Sheet, edge_rule, face_points
 
 
 @dataclass(frozen=True)
@@ -109,8 +108,8 @@ def _points(body: Body, chain: np.ndarray) -> np.ndarray:
     fixed = (side % 2).astype(float)
     xi = np.where(side < 2, fixed, t.ravel())
     eta = np.where(side < 2, t.ravel(), fixed)
-    edge = reference.equispaced(ring.order)
-    shape = reference.tensor(reference.line(edge, xi), reference.line(edge, eta))
+    edge = mesh2d.equispaced(ring.order)
+    shape = mesh2d.tensor(mesh2d.line(edge, xi), mesh2d.line(edge, eta))
     section = ring.section
     place = np.einsum("ka,kax->kx", shape, section.nodes[section.cells[cell]])
     both = np.repeat(angle, len(place)), np.tile(place, (len(angle), 1))

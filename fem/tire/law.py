@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar
 
-from tireroad.fem.parameters import Parameters
-from tireroad.fem.registry import Registry
+from tireroad.fem.parameters import Parameters, Registry
 
 if TYPE_CHECKING:
     from ufl.core.expr import Expr

@@ -1,19 +1,29 @@
-"""From a section to a ring of curved hexahedra: geometry, node lattice and boundary tags."""
+"""From a section to a ring of curved hexahedra: geometry, node lattice and boundary tags.
+
+Materials of the wall by region of the section: one value per cell for each coefficient.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import dolfinx.mesh as dmesh
 import numpy as np
+from dolfinx import fem
 from mpi4py import MPI
 from scipy.spatial import cKDTree
+from ufl.core.expr import Expr
 
 from tireroad.fem import compat
-from tireroad.fem.sections import reference
+from tireroad.fem.errors import InputError
+from tireroad.fem.sections import mesh2d
+from tireroad.fem.sections.grid import Patch
 from tireroad.fem.sections.ring import Ring
 from tireroad.fem.sections.torus import Torus
+from tireroad.fem.tire.law import MATERIALS, MaterialLaw
+from tireroad.fem.tire.material import Material
 
 __all__ = ["INNER", "RIM", "TREAD", "Lattice", "TireMesh", "Torus", "build", "field_lattice"]
 
@@ -155,7 +165,7 @@ def _tag(mesh: dmesh.Mesh, ring: Ring, section_cell: np.ndarray) -> dmesh.MeshTa
     found: dict[int, int] = {}
     # An edge in two sets belongs to the later one: a face held by the wheel is no free face.
     for tag, edges in ((INNER, section.inner), (TREAD, section.tread), (RIM, section.rim)):
-        for side in range(len(reference.SIDES)):
+        for side in range(len(mesh2d.SIDES)):
             marked = np.zeros(len(section.cells), bool)
             marked[edges[edges[:, 1] == side, 0]] = True
             facets = facet_of[marked[section_cell], _HEX_FACE[1 + side // 2, side % 2]]
@@ -167,3 +177,78 @@ def _tag(mesh: dmesh.Mesh, ring: Ring, section_cell: np.ndarray) -> dmesh.MeshTa
 # Facet of the reference hexahedron where coordinate 0, 1, 2 is 0 or 1 (basix: z = 0, y = 0, x = 0,
 # x = 1, ...).
 _HEX_FACE = np.array([[2, 3], [1, 4], [0, 5]])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Region:
+    """A part of a torus's section with a material of its own; its boundary lies on element edges.
+
+    `arc` (from, to) in rad from the crown, on the sides named: "both", "left" (y < 0) or "right";
+    `depth` (from, to) through the wall: 0 inner, 1 outer face.
+    """
+
+    material: Material
+    arc: tuple[float, float]
+    depth: tuple[float, float] = (0.0, 1.0)
+    side: str = "both"
+
+    def patch(self, number: int) -> Patch:
+        """The part of the section, named after its number in the scene."""
+        low, high = self.arc
+        right, left = (low, high), (-high, -low)
+        arcs = {"both": (right, left), "left": (left,), "right": (right,)}[self.side]
+        return Patch(f"tire.region {number}", arcs, self.depth)
+
+
+def compounds(material: Material, regions: tuple[Region, ...]) -> dict[str, Material]:
+    """The materials of a torus by the names of its section's regions."""
+    return {"wall": material} | {r.patch(i).name: r.material for i, r in enumerate(regions)}
+
+
+class Wall:
+    """Density and coefficients of all laws in use, as fields constant in each cell.
+
+    They are data of the compiled forms, so another modulus needs no recompilation and regions cost
+    nothing. `materials` by name of the section's regions. Raises InputError for a region without a
+    material. Collective to make.
+    """
+
+    def __init__(self, tire: TireMesh, materials: Mapping[str, Material]) -> None:
+        self._space = compat.cell_space(tire.mesh)
+        section = tire.ring.section
+        missing = [name for name in section.regions if name not in materials]
+        if missing:
+            raise InputError(f"section: no material for region {missing[0]!r}")
+        self._owner = section.region[tire.section_cell]  # region number of each cell
+        self._materials = [materials[name] for name in section.regions]
+        self.density = self._by_cell([m.density for m in self._materials])
+        self.stiffens = any(m.dynamic != 1 for m in self._materials)
+        self.loses = any(m.loss_factor for m in self._materials)
+        self._laws = [
+            (law.energy, [self._coefficient(name, law) for name in law.coefficients])
+            for law in map(MATERIALS.__getitem__, MATERIALS)
+            if any(type(m.law) is law for m in self._materials)
+        ]
+
+    def _coefficient(self, name: str, law: type[MaterialLaw]) -> fem.Function:
+        """A coefficient of the law by cell; 0 where the material follows another law."""
+        own = [m.law for m in self._materials]
+        return self._by_cell([getattr(one, name) if type(one) is law else 0.0 for one in own])
+
+    def _by_cell(self, values: Sequence[float]) -> fem.Function:
+        field = fem.Function(self._space)
+        field.x.array[:] = np.array(values)[self._owner]
+        return field
+
+    def stiffening(self) -> fem.Function:
+        """Excess of the dynamic modulus over the static one, as a fraction of it: dynamic - 1."""
+        return self._by_cell([m.dynamic - 1 for m in self._materials])
+
+    def losses(self) -> fem.Function:
+        """Loss modulus of small motions as a fraction of the static modulus."""
+        return self._by_cell([m.dynamic * m.loss_factor for m in self._materials])
+
+    def energy(self, C: Expr) -> tuple[Expr, Expr]:
+        """Strain energy density as (distortion, dilatation), J/m3, in UFL."""
+        parts = [energy(C, *coefficients) for energy, coefficients in self._laws]
+        return sum(part[0] for part in parts), sum(part[1] for part in parts)

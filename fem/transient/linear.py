@@ -1,4 +1,36 @@
-"""Full finite elements in time about a static state, in the non-rotating frame: the reference.
+"""Modal damping in the full finite-element model: a low-rank matrix in addition to the sparse ones.
+
+    D_x = M Phi diag(e) Phi^T M,   and in the rolling pencil
+    K_x = Omega D_x M^-1 B = Omega M Phi diag(e) Phi^T B,
+
+e_k being the damping rate of mode k in excess of the sparse matrices' uniform one. A system A + c
+D_x + K_x is solved with A's factorisation and a small matrix (Sherman, Morrison and Woodbury).
+
+The cavity's air in an implicit step of the full finite elements, eliminated.
+
+    [A + E E^T    -E' w ] [u]   [r]
+    [ -w E'^T       Z   ] [g] = [q],    Z = c2 + c1 D_a + K_a,
+
+A being the tire's matrix of the step, E = e^T, the rest as in fem.cavity.column. The air's unknowns
+follow the tire's on the last process.
+
+A moving wheel in an implicit step of the full finite elements, eliminated.
+
+Small motions w of the tire relative to its rim, and xi of rim and body, have the blocks of
+modal.corner with the unit matrix in place of modes:
+
+    X_ww, X_wr = X R, X_rw = +-(X R)^T, X_rr    of mass, damping and stiffness.
+
+The unknowns are the tire's whole motion u = w + R xi, and x with xi = L^-T x, L L^T being the
+inertia of rim, wheel and body alone. The mass is then diagonal, and contact and loads involve u
+only. With T = (1, -R; 0, L^-T), X' = T^T X T, a step solves
+
+    [A   B] [u]   [r]
+    [C^T Z] [x] = [s].
+
+The wheel's unknowns follow the tire's on the last process.
+
+Full finite elements in time about a static state, in the non-rotating frame: the reference.
 
     M u'' + (D + 2 Omega G) u' + K_Omega u = W^T f,   D = gamma1 M + gamma2 K,
 
@@ -11,6 +43,8 @@ rho = 0 does not chatter. One factorisation in total, and one pair of triangular
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from petsc4py import PETSc
 from scipy import sparse
@@ -20,12 +54,211 @@ from tireroad.fem.cavity.column import Column
 from tireroad.fem.collective import summed
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.compliance import on_own_rows, rotating_damping, rotating_stiffness
-from tireroad.fem.matrices.direct import factorise, solve_columns
+from tireroad.fem.matrices.direct import factorise, multiply, solve_columns
 from tireroad.fem.matrices.operators import Operators, Rotation
-from tireroad.fem.matrices.rim_motion import RimMotion
-from tireroad.fem.transient.air_step import AirStep
-from tireroad.fem.transient.modal_damping import ModalDamping
-from tireroad.fem.transient.wheel_step import Wheel, WheelStep
+from tireroad.fem.matrices.rim_motion import RimMotion, carried_pencil
+
+
+class ModalDamping:
+    """`fields`: own rows (n, m) of M-orthonormal modes, kg^-1/2; `excess` (m,) 1/s. Collective.
+
+    `body`: the matrix B of a wheel that rotates at `speed` (rad/s), None if standing.
+    """
+
+    def __init__(
+        self,
+        operators: Operators,
+        fields: np.ndarray,
+        excess: np.ndarray,
+        body: PETSc.Mat | None = None,
+        speed: float = 0.0,
+    ) -> None:
+        self._comm, self._fields = operators.body.comm, fields
+        self._weighted = operators.mass[:, None] * fields
+        self._push = self._weighted * excess
+        # Phi^T B = -(B Phi)^T: B is skew.
+        self._turned = 0.0 if body is None else -speed * multiply(body, fields)
+
+    def force(self, rate: np.ndarray) -> np.ndarray:
+        """D_x rate, own rows, N, for velocities (n,) m/s. Collective."""
+        return self._push @ summed(self._comm, self._weighted.T @ rate)
+
+    def joined(
+        self, solve: Callable[[np.ndarray], np.ndarray], share: float
+    ) -> Callable[[np.ndarray], np.ndarray]:
+        """Solver of A + share D_x + K_x, own rows (n, k), from `solve`, that of A. Collective."""
+        reading = share * self._weighted + self._turned
+        through = solve(self._push)
+        small = np.eye(through.shape[1]) + summed(self._comm, reading.T @ through)
+
+        def whole(right: np.ndarray) -> np.ndarray:
+            first = solve(right)
+            return first - through @ np.linalg.solve(small, summed(self._comm, reading.T @ first))
+
+        return whole
+
+
+class AirStep:
+    """`solve` maps own rows (n, k) to own rows of A^-1 times them; `weights` are (c1 1/s, c2 1/s2).
+    Creation and all methods are collective.
+    """
+
+    def __init__(
+        self,
+        air: Column,
+        solve: Callable[[np.ndarray], np.ndarray],
+        weights: tuple[float, float],
+    ) -> None:
+        self._air, self._comm = air, air.comm
+        self.mine = air.comm.rank == air.comm.size - 1
+        self.count = len(air.duct.circular)
+        self._drag, stiffness = air.duct.pencil(air.speed)
+        first, second = weights
+        own = second * np.eye(self.count) + first * self._drag + stiffness
+        self._inverse = np.linalg.inv(own)
+        self._driven = air.duct.circular
+        weight = np.eye(1 + self.count)
+        weight[1:, 1:] -= self._driven[:, None] * self._inverse * self._driven
+        self._columns = solve(air.pushed.toarray())
+        core = np.eye(1 + self.count) + air.coupling(self._columns) @ weight
+        self._mend = weight @ np.linalg.inv(core)
+
+    @property
+    def rows(self) -> int:
+        """Number of the air's unknowns on this process."""
+        return self.count if self.mine else 0
+
+    def shared(self, own: np.ndarray) -> np.ndarray:
+        """The air's values (a, ...) on every process, from the owner's."""
+        return self._comm.bcast(own if self.mine else None, root=self._comm.size - 1)
+
+    def right(self, own: np.ndarray, air: np.ndarray) -> np.ndarray:
+        """Own rows (n,) of the tire's right-hand side, with forces (a,) on the air eliminated."""
+        return own + self._air.pushed[:, 1:] @ (self._driven * (self._inverse @ air))
+
+    def complete(self, free: np.ndarray, air: np.ndarray) -> np.ndarray:
+        """Own rows (n + rows, ...) of u and g, from A^-1 right (n, ...), air forces (a, ...)."""
+        u = free - self._columns @ (self._mend @ self._air.coupling(free))
+        moved = self._air.coupling(u)[1:]
+        g = self._inverse @ (air + (self._driven * moved.T).T)
+        return np.concatenate([u, g]) if self.mine else u
+
+    def dragged(self, tire: np.ndarray, rates: np.ndarray) -> tuple[float, np.ndarray]:
+        """Damping forces: none on the tire's rows, D_a g' (rows,) on the air's."""
+        return 0.0, self._drag @ rates if self.mine else rates
+
+    def momentum(self) -> np.ndarray:
+        """Momentum (3, rows) kg^1/2 per unit rate."""
+        return self._air.duct.momentum[:, : self.rows]
+
+
+Array = np.ndarray
+
+
+class Wheel:
+    """Matrices of the moving wheel. Collective to make.
+
+    `operators` have a fixed rim; `rim`: products with the rim's motions; `axle`: suspension; `drag`
+    and `stiffness`: the tire's matrices as it rolls. For damping (1) and stiffness (0): `columns`
+    and `rows` (n, c) on the tire's own unknowns and `own` (c, c); `carried` (3, c) kg^1/2: momentum
+    per unit rate; `shown` (7, c): motions of rim and body per x.
+    """
+
+    def __init__(
+        self,
+        operators: Operators,
+        rim: RimMotion,
+        axle: Axle,
+        speed: float,
+        drag: PETSc.Mat,
+        stiffness: PETSc.Mat,
+    ) -> None:
+        self.comm = operators.body.comm
+        part = axle.taking_part
+        motion = rim.rows["mass"] / operators.mass[:, None]
+        mass, own_drag, own_stiffness = carried_pencil(axle, rim.whole, speed)
+        mass[:6, :6] -= summed(self.comm, motion.T @ rim.rows["mass"])
+        lower = np.linalg.inv(np.linalg.cholesky(mass[np.ix_(part, part)]))
+        self.shown = np.zeros((7, len(part)))
+        self.shown[part] = lower.T
+        self.carried = mass[:3] @ self.shown
+        turning = 2 * speed * rim.rows["gyroscopic"] if speed else np.zeros_like(motion)
+        static = rim.rows["stiffness"] + (speed**2 * rim.rows["convective"] if speed else 0.0)
+        self.columns, self.rows, self.own = {}, {}, {}
+        for order, matrix, across, sign, own in (
+            (1, drag, turning, -1, own_drag),
+            (0, stiffness, static, 1, own_stiffness),
+        ):
+            along, back = multiply(matrix, motion), _transposed(matrix, motion)
+            whole = own.copy()
+            whole[:6, :6] += summed(
+                self.comm,
+                motion.T @ along - motion.T @ across - sign * across.T @ motion,
+            )
+            self.columns[order] = (across - along) @ self.shown[:6]
+            self.rows[order] = (sign * across - back) @ self.shown[:6]
+            self.own[order] = self.shown.T @ whole @ self.shown
+
+
+def _transposed(matrix: PETSc.Mat, vectors: Array) -> Array:
+    """X^T v, own rows (n, k). Collective."""
+    before, after = matrix.createVecs()
+    out = np.empty_like(vectors)
+    for k, vector in enumerate(vectors.T):
+        after.array[:] = vector
+        matrix.multTranspose(after, before)
+        out[:, k] = before.array_r
+    before.destroy()
+    after.destroy()
+    return out
+
+
+class WheelStep:
+    """AirStep's counterpart for the `wheel`; `weights` (c1 1/s, c2 1/s2). All is collective."""
+
+    def __init__(
+        self, wheel: Wheel, solve: Callable[[Array], Array], weights: tuple[float, float]
+    ) -> None:
+        self._wheel, self._comm = wheel, wheel.comm
+        self.mine = wheel.comm.rank == wheel.comm.size - 1
+        self.count = wheel.own[0].shape[0]
+        first, second = weights
+        columns = first * wheel.columns[1] + wheel.columns[0]
+        self._rows = first * wheel.rows[1] + wheel.rows[0]
+        own = second * np.eye(self.count) + first * wheel.own[1] + wheel.own[0]
+        self._columns = solve(columns)
+        self._inverse = np.linalg.inv(own - summed(self._comm, self._rows.T @ self._columns))
+
+    @property
+    def rows(self) -> int:
+        """Number of the wheel's unknowns on this process."""
+        return self.count if self.mine else 0
+
+    def shared(self, own: Array) -> Array:
+        """The wheel's values (c, ...) on every process, from the owner's."""
+        return self._comm.bcast(own if self.mine else None, root=self._comm.size - 1)
+
+    def right(self, own: Array, wheel: Array) -> Array:
+        """Own rows of the tire's right-hand side; forces on the wheel do not contribute."""
+        return own
+
+    def complete(self, free: Array, wheel: Array) -> Array:
+        """Own rows (n + rows, ...) of u and x, from A^-1 right (n, ...), wheel forces (c, ...)."""
+        x = self._inverse @ (wheel - summed(self._comm, self._rows.T @ free))
+        u = free - self._columns @ x
+        return np.concatenate([u, x]) if self.mine else u
+
+    def dragged(self, tire: Array, rates: Array) -> tuple[Array, Array]:
+        """Damping forces on the tire's own rows (n,) and the wheel's (rows,), from the velocities
+        of both. On the tire only those due to the wheel's velocity."""
+        x = self.shared(rates)
+        back = summed(self._comm, self._wheel.rows[1].T @ tire) + self._wheel.own[1] @ x
+        return self._wheel.columns[1] @ x, back if self.mine else rates
+
+    def momentum(self) -> Array:
+        """Momentum (3, rows) kg^1/2 per unit rate."""
+        return self._wheel.carried[:, : self.rows]
+
 
 # State carried from step to step; `balanced` is the mean of two accelerations that satisfies
 # equilibrium at the end of the step.

@@ -32,8 +32,7 @@ from tireroad.fem.static.virtual_work import (
     static_residual,
 )
 from tireroad.fem.tire.body import Body
-from tireroad.fem.transient.linear import FullTire
-from tireroad.fem.transient.modal_damping import ModalDamping
+from tireroad.fem.transient.linear import FullTire, ModalDamping
 
 TOLERANCE = 1e-9  # of the largest displacement
 _FLOOR = 1e-11  # of the wall's thickness: rounding of F

@@ -12,8 +12,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import sparse
 
-from tireroad.fem.collective import summed
-from tireroad.fem.matrices.local_rows import from_local_rows
+from tireroad.fem.collective import from_local_rows, summed
 from tireroad.modal.solver.slicing import Modes, Part, Slice, Team
 
 

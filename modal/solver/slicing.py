@@ -40,10 +40,9 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import linalg, sparse
 
-from tireroad.fem.collective import summed
+from tireroad.fem.collective import from_local_rows, summed
 from tireroad.fem.errors import ConvergenceError
-from tireroad.fem.matrices.inertia_relief import RIGID
-from tireroad.fem.matrices.local_rows import from_local_rows
+from tireroad.fem.matrices.compliance import RIGID
 from tireroad.fem.static.checkpoint import Entry, Journal
 
 

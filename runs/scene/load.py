@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from tireroad.fem.errors import InputError
-from tireroad.fem.keys import Key, described
-from tireroad.fem.parameters import ParameterError
+from tireroad.fem.parameters import Key, ParameterError, described
 from tireroad.runs.scene import derived
 from tireroad.runs.scene.chosen import drop_unused
 from tireroad.runs.scene.plan import meets_road

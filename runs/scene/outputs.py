@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from tireroad.fem.errors import InputError
-from tireroad.fem.parameters import Parameters
-from tireroad.fem.registry import Registry
+from tireroad.fem.parameters import Parameters, Registry
 
 if TYPE_CHECKING:
     from tireroad.runs.scene.tables.scene import Scene

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import Field, fields
 from pathlib import Path
 
-from tireroad.fem.keys import Key
+from tireroad.fem.parameters import Key
 from tireroad.runs.scene.resolved import literal
 from tireroad.runs.scene.schema import Variant, fields_of, key_of, table_of, variant_of
 from tireroad.runs.scene.tables.scene import Scene

@@ -4,7 +4,7 @@ import json
 from math import isfinite
 from typing import Any
 
-from tireroad.fem.keys import Key
+from tireroad.fem.parameters import Key
 from tireroad.runs.scene.schema import Pitch, key_of, table_of
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.scene.walk import applies, entries

@@ -14,18 +14,22 @@ from collections.abc import Iterator
 from dataclasses import Field, dataclass, field, fields
 from typing import Any, TypeVar
 
-from tireroad.fem.keys import Key, Limits, described, finite, key_of
 from tireroad.fem.parameters import (
+    Key,
+    Limits,
     Parameters,
+    Registry,
     choice,
+    described,
+    finite,
     flag,
     integer,
+    key_of,
     number,
     parameter,
     text,
     vector,
 )
-from tireroad.fem.registry import Registry
 
 P = TypeVar("P", bound=Parameters)
 

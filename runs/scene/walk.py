@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import Field, fields
 from typing import Any
 
-from tireroad.fem.keys import Key, key_of
+from tireroad.fem.parameters import Key, key_of
 from tireroad.runs.scene.schema import fields_of, table_of, variant_of
 
 

@@ -7,8 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from tireroad.fem.collective import collect
 from tireroad.fem.errors import ConvergenceError
-from tireroad.fem.garbage import collect
 from tireroad.fem.static.diagnosis import with_cause
 from tireroad.fem.static.equilibrium import Equilibrium, History
 from tireroad.fem.static.footprint import Footprint

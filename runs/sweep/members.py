@@ -16,7 +16,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from tireroad.fem.errors import InputError
-from tireroad.fem.keys import described, finite
+from tireroad.fem.parameters import described, finite
 from tireroad.runs.scene.resolved import literal
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.scene.walk import walk

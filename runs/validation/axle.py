@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from scipy import sparse
 
-from tireroad.fem.matrices.receptance import receptance
+from tireroad.fem.matrices.compliance import receptance
 from tireroad.fem.model import SmallMotions
 from tireroad.greens.coupling import wheel_of
 from tireroad.greens.outputs import by_free_rim, by_momentum, from_moment

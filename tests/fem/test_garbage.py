@@ -8,7 +8,7 @@ import pytest
 from mpi4py import MPI
 
 import tireroad
-from tireroad.fem.garbage import collect
+from tireroad.fem.collective import collect
 from tireroad.fem.matrices.operators import ROTATION
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.static.checkpoint import Journal

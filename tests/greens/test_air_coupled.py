@@ -9,9 +9,8 @@ from scipy import sparse
 
 from tireroad.fem.cavity.column import make_column
 from tireroad.fem.matrices import probe
-from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.matrices.operators import Operators, Support
 from tireroad.fem.matrices.rim_motion import rim_motion
-from tireroad.fem.matrices.support import Support
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.load_steps import Loader
 from tireroad.fem.static.virtual_work import Rolling

@@ -10,12 +10,10 @@ from scipy import sparse
 
 from tireroad.fem.collective import summed
 from tireroad.fem.matrices import probe
-from tireroad.fem.matrices.compliance import on_own_rows
+from tireroad.fem.matrices.compliance import on_own_rows, relieved, rigid_space
 from tireroad.fem.matrices.direct import multiply
-from tireroad.fem.matrices.inertia_relief import relieved, rigid_space
-from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.matrices.operators import Operators, Support
 from tireroad.fem.matrices.rim_motion import RimMotion, rim_motion
-from tireroad.fem.matrices.support import Support
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.load_steps import Loader
 from tireroad.fem.static.virtual_work import Rolling

@@ -10,8 +10,8 @@ from scipy import sparse
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices import probe
+from tireroad.fem.matrices.compliance import receptance
 from tireroad.fem.matrices.operators import Operators
-from tireroad.fem.matrices.receptance import receptance
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.load_steps import Loader
 from tireroad.fem.tire.body import Body

@@ -14,9 +14,8 @@ from tireroad.fem.matrices.probe import nodes
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
-from tireroad.fem.tire.wall import Region
-from tireroad.fem.transient.linear import FullTire
-from tireroad.fem.transient.modal_damping import ModalDamping
+from tireroad.fem.tire.mesh import Region
+from tireroad.fem.transient.linear import FullTire, ModalDamping
 from tireroad.greens.coupling import Basis, Wheel
 from tireroad.modal.basis import project
 from tireroad.modal.damping import StrainEnergy, beyond, rates

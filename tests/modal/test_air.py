@@ -5,7 +5,7 @@ import pytest
 from scipy import linalg
 
 from tireroad.fem.cavity import duct
-from tireroad.fem.cavity.gas import Gas, inflated
+from tireroad.fem.cavity.duct import Gas, inflated
 from tireroad.modal.basis import Air
 from tireroad.modal.rotating import checks, rotating
 

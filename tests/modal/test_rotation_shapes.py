@@ -18,7 +18,7 @@ from tireroad.fem.static.load_steps import Loader
 from tireroad.fem.static.state import static_state
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
-from tireroad.fem.tire.wall import compounds
+from tireroad.fem.tire.mesh import compounds
 from tireroad.fem.turning import Turning
 from tireroad.greens.basis import Basis
 from tireroad.greens.coupling import wheel_of

@@ -18,7 +18,7 @@ from tireroad.fem.static.state import static_state
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
-from tireroad.fem.tire.wall import Region
+from tireroad.fem.tire.mesh import Region
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.build.tire import make_body
 from tireroad.runs.validation.cases import thesis_torus

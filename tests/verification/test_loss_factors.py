@@ -14,7 +14,7 @@ from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.cords import Cords
 from tireroad.fem.tire.material import compound
-from tireroad.fem.tire.wall import Region, compounds
+from tireroad.fem.tire.mesh import Region, compounds
 from tireroad.modal.basis import project
 from tireroad.modal.damping import Proportional, StrainEnergy, beyond, rates
 from tireroad.modal.rotating import matrices, standing

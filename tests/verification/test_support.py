@@ -7,8 +7,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from tireroad.fem.errors import ConvergenceError
-from tireroad.fem.matrices.operators import Operators
-from tireroad.fem.matrices.support import Support
+from tireroad.fem.matrices.operators import Operators, Support
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.load_steps import Loader
 from tireroad.fem.static.virtual_work import Rolling

@@ -13,8 +13,7 @@ from tireroad.contact.roads.texture.random_surface import (
     textured,
     tile_places,
 )
-from tireroad.fem.keys import Limits
-from tireroad.fem.parameters import ParameterError, choice, integer, number, numbers
+from tireroad.fem.parameters import Limits, ParameterError, choice, integer, number, numbers
 
 # A typical stone mastic asphalt of 11 mm (chosen within the 38 to 48 dB at 5 mm of asphalts; at
 # 0.5 m the level of ISO 8608 class A, so that the two meet).

@@ -7,8 +7,7 @@ from tireroad.contact.tread.compliance import Influence
 from tireroad.contact.tread.law import tread_law
 from tireroad.contact.tread.laws.elastic import Elastic, HalfSpace, Layer
 from tireroad.fem.errors import InputError
-from tireroad.fem.keys import Limits
-from tireroad.fem.parameters import ParameterError, number, numbers
+from tireroad.fem.parameters import Limits, ParameterError, number, numbers
 
 Array = NDArray[np.float64]
 _TERMS = 3

@@ -9,8 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Self
 
-from tireroad.fem.parameters import Parameters
-from tireroad.fem.registry import Registry
+from tireroad.fem.parameters import Parameters, Registry
 from tireroad.runs.scene.source import Source
 
 if TYPE_CHECKING:

@@ -10,8 +10,7 @@ import numpy as np
 
 from tireroad.fem.axle import DIRECTIONS, Axle
 from tireroad.fem.errors import InputError
-from tireroad.fem.keys import Key, Limits, OnlyFor, described, finite
-from tireroad.fem.parameters import parameter
+from tireroad.fem.parameters import Key, Limits, OnlyFor, described, finite, parameter
 from tireroad.runs.scene.schema import choice, number, vector
 
 if TYPE_CHECKING:

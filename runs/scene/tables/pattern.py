@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from tireroad.fem.errors import InputError
-from tireroad.fem.keys import Limits
-from tireroad.fem.parameters import filename, numbers
+from tireroad.fem.parameters import Limits, filename, numbers
 from tireroad.runs.scene.schema import choice, integer, number, tables, vector
 
 if TYPE_CHECKING:

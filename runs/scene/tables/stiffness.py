@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tireroad.fem.errors import InputError
-from tireroad.fem.keys import Key, Limits, described, finite
-from tireroad.fem.parameters import parameter
+from tireroad.fem.parameters import Key, Limits, described, finite, parameter
 from tireroad.runs.scene.schema import choice, integer, number
 
 if TYPE_CHECKING:

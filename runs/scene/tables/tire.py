@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from tireroad.fem.sections.footprint import SIZE
+from tireroad.fem.sections.ring import SIZE
 from tireroad.fem.tire.law import MATERIALS, MaterialLaw
 from tireroad.runs.scene.schema import (
     Variants,

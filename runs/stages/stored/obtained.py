@@ -6,8 +6,8 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
+from tireroad.fem.collective import collect
 from tireroad.fem.errors import ConvergenceError
-from tireroad.fem.garbage import collect
 from tireroad.runs.files import store
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root

@@ -16,7 +16,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import eigsh
 
-from tireroad.fem.sections import reference
+from tireroad.fem.sections import mesh2d
 from tireroad.fem.sections.mesh2d import SectionMesh
 
 
@@ -74,13 +74,13 @@ def _rule(order: int) -> tuple[np.ndarray, np.ndarray]:
 
 def _solid(section: SectionMesh, rubbers: Mapping[str, Rubber], n: int):
     """K_n and M of the rubber, over one radian."""
-    edge, (t, w) = reference.equispaced(section.order), _rule(section.order)
-    xi, eta = reference.grid_points(t)
+    edge, (t, w) = mesh2d.equispaced(section.order), _rule(section.order)
+    xi, eta = mesh2d.grid_points(t)
     weight = np.outer(w, w).ravel()
-    value = [reference.line(edge, x) for x in (xi, eta)]
-    slope = [reference.line_slope(edge, x) for x in (xi, eta)]
-    N = reference.tensor(*value)
-    dN = np.stack([reference.tensor(slope[0], value[1]), reference.tensor(value[0], slope[1])])
+    value = [mesh2d.line(edge, x) for x in (xi, eta)]
+    slope = [mesh2d.line_slope(edge, x) for x in (xi, eta)]
+    N = mesh2d.tensor(*value)
+    dN = np.stack([mesh2d.tensor(slope[0], value[1]), mesh2d.tensor(value[0], slope[1])])
     points = section.nodes[section.cells]
     J = np.einsum("dqa,cax->cqxd", dN, points)
     r = np.einsum("qa,ca->cq", N, points[..., 0])
@@ -122,8 +122,8 @@ def _cords(section: SectionMesh, edges: np.ndarray, cords: Membrane, n: int):
     chain = section.chain(edges)
     order = section.order
     line = chain[order * np.arange(len(edges))[:, None] + np.arange(order + 1)]
-    edge, (t, w) = reference.equispaced(order), _rule(order)
-    N, slope = reference.line(edge, t), reference.line_slope(edge, t)
+    edge, (t, w) = mesh2d.equispaced(order), _rule(order)
+    N, slope = mesh2d.line(edge, t), mesh2d.line_slope(edge, t)
     points = section.nodes[line]
     r = np.einsum("qa,ca->cq", N, points[..., 0])
     tangent = np.einsum("qa,cax->cqx", slope, points)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tireroad.fem.sections import reference
+from tireroad.fem.sections import mesh2d
 from tireroad.fem.sections.construction import CordLine
 from tireroad.fem.sections.mesh2d import SectionMesh
 
@@ -15,13 +15,11 @@ class Rule:
     """Gauss points of the cells: shapes N (q, a), slopes, radius, volume (c, q) per radian."""
 
     def __init__(self, section: SectionMesh, points: int):
-        edge, (t, w) = reference.equispaced(section.order), _gauss(points)
-        at = reference.grid_points(t)
-        value, slope = (
-            [shape(edge, x) for x in at] for shape in (reference.line, reference.line_slope)
-        )
-        self.N = reference.tensor(*value)
-        dN = np.stack([reference.tensor(slope[0], value[1]), reference.tensor(value[0], slope[1])])
+        edge, (t, w) = mesh2d.equispaced(section.order), _gauss(points)
+        at = mesh2d.grid_points(t)
+        value, slope = ([shape(edge, x) for x in at] for shape in (mesh2d.line, mesh2d.line_slope))
+        self.N = mesh2d.tensor(*value)
+        dN = np.stack([mesh2d.tensor(slope[0], value[1]), mesh2d.tensor(value[0], slope[1])])
         places = section.nodes[section.cells]
         J = np.einsum("dqa,cax->cqxd", dN, places)
         self.radius = np.einsum("qa,ca->cq", self.N, places[..., 0])
@@ -47,8 +45,8 @@ class Line:
     def __init__(self, section: SectionMesh, edges: np.ndarray, cords: CordLine, points: int):
         order, chain = section.order, section.chain(edges)
         self.nodes = chain[order * np.arange(len(edges))[:, None] + np.arange(order + 1)]
-        edge, (t, w) = reference.equispaced(order), _gauss(points)
-        self.N, slope = reference.line(edge, t), reference.line_slope(edge, t)
+        edge, (t, w) = mesh2d.equispaced(order), _gauss(points)
+        self.N, slope = mesh2d.line(edge, t), mesh2d.line_slope(edge, t)
         places = section.nodes[self.nodes]
         tangent = np.einsum("qa,cax->cqx", slope, places)
         length = np.linalg.norm(tangent, axis=2)
@@ -90,8 +88,8 @@ class Face:
 
     def __init__(self, section: SectionMesh, displacement: np.ndarray):
         self.nodes = section.side(section.inner)
-        edge, (t, self._w) = reference.equispaced(section.order), _gauss(section.order + 2)
-        self._N, self._slope = reference.line(edge, t), reference.line_slope(edge, t)
+        edge, (t, self._w) = mesh2d.equispaced(section.order), _gauss(section.order + 2)
+        self._N, self._slope = mesh2d.line(edge, t), mesh2d.line_slope(edge, t)
         r, y = section.nodes[self.nodes].transpose(2, 0, 1)
         place = np.stack([r, 0 * r, y], axis=-1) + displacement[self.nodes]
         x = np.einsum("qa,cak->cqk", self._N, place)

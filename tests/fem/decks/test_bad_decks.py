@@ -8,7 +8,7 @@ from good_decks import BELTED, GOOD, TORUS
 from ring_decks import solids
 from torus_decks import BELT, CORDS, Torus, membranes, plain
 
-from tireroad.fem.decks.files import lines
+from tireroad.fem.decks import deck
 from tireroad.fem.decks.own import read
 from tireroad.fem.errors import InputError
 
@@ -223,7 +223,7 @@ def test_pieces_change_nothing(own, monkeypatch):
         "*ELEMENT, TYPE=CGAX8H, ELSET=WALL", "*ELEMENT,\nTYPE=CGAX8H,\nELSET=WALL"
     )
     whole = own(text)
-    monkeypatch.setattr(lines, "PIECE", 512)
+    monkeypatch.setattr(deck, "PIECE", 512)
     parts = own(text)
     assert np.array_equal(whole.mesh.nodes, parts.mesh.nodes)
     assert whole.unused == parts.unused

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from torus_decks import CENTRE, RUBBER, Torus, listed, place, plain
 
-from tireroad.fem.decks.files import abaqus, generation
+from tireroad.fem.decks import abaqus, abaqus_generation
 from tireroad.fem.errors import InputError
 
 BASE = "*HEADING\n"
@@ -198,7 +198,7 @@ def test_what_cannot_be_made_is_told_by_line(deck, text):
 
 
 def test_no_deck_makes_more_than_memory_holds(deck, monkeypatch):
-    monkeypatch.setattr(generation, "MOST", 10)
+    monkeypatch.setattr(abaqus_generation, "MOST", 10)
     ends = "*NODE\n1, 0.\n{0}, 1.\n*NGEN\n1, {0}\n"
     assert len(deck(ends.format(11)).labels) == 11
     with pytest.raises(InputError, match="line 5: more than 10 nodes"):

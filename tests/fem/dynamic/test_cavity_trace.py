@@ -8,10 +8,9 @@ import pytest
 from mpi4py import MPI
 
 from tireroad.fem.cavity import duct
-from tireroad.fem.cavity.gas import inflated
-from tireroad.fem.cavity.trace import CavityTrace, _bead_ends, rim_cone
-from tireroad.fem.matrices.operators import Operators
-from tireroad.fem.matrices.support import Support, rigid_motions
+from tireroad.fem.cavity.column import CavityTrace, _bead_ends, rim_cone
+from tireroad.fem.cavity.duct import inflated
+from tireroad.fem.matrices.operators import Operators, Support, rigid_motions
 
 R, B, HALF = 0.22, 0.088, np.radians(120)  # centre circle and inner radius of the torus of conftest
 AIR = inflated(2e5, 293.15)

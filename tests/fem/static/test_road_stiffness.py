@@ -7,9 +7,8 @@ from scipy import sparse
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.direct import solve_all
-from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.matrices.operators import Operators, rigid_motions
 from tireroad.fem.matrices.road_stiffness import road_stiffness
-from tireroad.fem.matrices.support import rigid_motions
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.load_curve import load_curve, slopes
 from tireroad.fem.static.load_steps import Loader

@@ -19,7 +19,7 @@ from tireroad.fem.sections.grid import PlyLine
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.virtual_work import Rolling, static_residual, tangent
 from tireroad.fem.tire.cord_forces import cord_forces
-from tireroad.fem.tire.face_rule import Face
+from tireroad.fem.tire.plies import Face
 
 
 def stored(body) -> float:

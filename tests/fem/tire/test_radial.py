@@ -7,10 +7,9 @@ import pytest
 from scipy.spatial import cKDTree
 
 from tireroad.fem.errors import InputError
-from tireroad.fem.sections.outline import Outline, arcs
-from tireroad.fem.sections.radial import radial
+from tireroad.fem.sections.construction import Outline, arcs
+from tireroad.fem.sections.radial import radial, size
 from tireroad.fem.sections.section_file import read
-from tireroad.fem.sections.tire_size import size
 
 FILE = """
 unit = "mm"

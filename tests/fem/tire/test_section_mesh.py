@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tireroad.fem.errors import InputError
-from tireroad.fem.sections import reference
+from tireroad.fem.sections import mesh2d
 from tireroad.fem.sections.grid import Patch, PlyLine, corners
 from tireroad.fem.sections.torus import Torus
 from tireroad.runs.validation.cases import thesis_torus
@@ -23,12 +23,12 @@ def area(mesh, region=None) -> float:
     """Area of a region in the meridian plane, m2, by Gauss points on the nodes' interpolation."""
     points, weights = np.polynomial.legendre.leggauss(5)
     t, w = points / 2 + 0.5, weights / 2
-    edge = reference.equispaced(mesh.order)
-    xi, eta = reference.grid_points(t)
-    shape, slope = ([f(edge, x) for x in (xi, eta)] for f in (reference.line, reference.line_slope))
+    edge = mesh2d.equispaced(mesh.order)
+    xi, eta = mesh2d.grid_points(t)
+    shape, slope = ([f(edge, x) for x in (xi, eta)] for f in (mesh2d.line, mesh2d.line_slope))
     nodes = mesh.nodes[mesh.cells if region is None else mesh.cells[mesh.region == region]]
-    a = np.einsum("ka,cax->ckx", reference.tensor(slope[0], shape[1]), nodes)
-    b = np.einsum("ka,cax->ckx", reference.tensor(shape[0], slope[1]), nodes)
+    a = np.einsum("ka,cax->ckx", mesh2d.tensor(slope[0], shape[1]), nodes)
+    b = np.einsum("ka,cax->ckx", mesh2d.tensor(shape[0], slope[1]), nodes)
     return float((np.outer(w, w).ravel() * (a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])).sum())
 
 

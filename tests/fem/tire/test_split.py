@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tireroad.fem.sections import reference
+from tireroad.fem.sections import mesh2d
 from tireroad.fem.sections.radial import radial
 from tireroad.fem.sections.split import split_ring, split_section
 from tireroad.runs.validation.cases import thesis_torus
@@ -11,10 +11,10 @@ from tireroad.runs.validation.cases import thesis_torus
 
 def area(section) -> float:
     """By Gauss's rule over the cells, m2."""
-    edge, (t, w) = reference.equispaced(section.order), np.polynomial.legendre.leggauss(4)
-    xi, eta = reference.grid_points(t / 2 + 0.5)
-    value, slope = ([f(edge, x) for x in (xi, eta)] for f in (reference.line, reference.line_slope))
-    shapes = reference.tensor(slope[0], value[1]), reference.tensor(value[0], slope[1])
+    edge, (t, w) = mesh2d.equispaced(section.order), np.polynomial.legendre.leggauss(4)
+    xi, eta = mesh2d.grid_points(t / 2 + 0.5)
+    value, slope = ([f(edge, x) for x in (xi, eta)] for f in (mesh2d.line, mesh2d.line_slope))
+    shapes = mesh2d.tensor(slope[0], value[1]), mesh2d.tensor(value[0], slope[1])
     across, along = (
         np.einsum("qa,cax->cqx", shape, section.nodes[section.cells]) for shape in shapes
     )

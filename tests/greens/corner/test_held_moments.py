@@ -8,9 +8,8 @@ from test_corner import COMM, DAMPING, FREQUENCY, SPOTS, body, loads, places, wh
 
 from tireroad.fem import compat
 from tireroad.fem.axle import Axle
-from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.matrices.operators import FIXED, Operators
 from tireroad.fem.matrices.rim_motion import rim_motion
-from tireroad.fem.matrices.support import FIXED
 from tireroad.fem.static.virtual_work import (
     AT_REST,
     Rolling,

@@ -1,4 +1,15 @@
-"""Reduction of three-dimensional decks that are bodies of revolution to their section.
+"""The axis about which the nodes of a three-dimensional deck form rings.
+
+Cord angles in three-dimensional membranes, converted to angles from the section's meridian.
+
+In a membrane the angle is measured from the local first direction 1 about the normal n: the cord
+lies along cos a e_1 + sin a (n x e_1). Two systems are the same at every angle around: the default
+one if x is the axle, where e_1 is the projection of global x (the meridian m towards larger x), and
+a cylindrical one about the axle with its first axis as normal, where e_1 is e_theta. With n x m = s
+e_theta, s = 1 or -1, the angle from m towards e_theta is s a in the first; in the second, as n x
+e_theta = -s m, it is atan2(cos a, -s sin a).
+
+Reduction of three-dimensional decks that are bodies of revolution to their section.
 
 The program's rolling states require a body whose undeformed shape is the same at every angle; any
 other body is refused, with the reason.
@@ -11,11 +22,127 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tireroad.fem.decks.deck import SCOPE, Deck, Members, Sets
-from tireroad.fem.decks.files.elements import Block, Kind, used_kind
-from tireroad.fem.decks.solids.revolved_cords import meridian_layers
-from tireroad.fem.decks.solids.rings import Rings, find_rings
+from tireroad.fem.decks.deck import SCOPE, Block, Deck, Kind, Layer, Members, Sets, used_kind
 from tireroad.fem.errors import InputError
+
+_SAME = 1e-6  # of the body's size (positions) or of a radian (angles): tolerance for equality
+
+
+@dataclass(frozen=True)
+class Rings:
+    """The nodes of a body about an axis.
+
+    For each row of the deck's points the numbers of its ring (its position in the section) and of
+    its angle; `places` (r, along) of the rings; `angles` ascending in rad.
+    """
+
+    axis: int
+    ring: np.ndarray
+    angle: np.ndarray
+    places: np.ndarray
+    angles: np.ndarray
+
+
+def find_rings(deck: Deck, corners: np.ndarray) -> Rings:
+    """The axis about which corner nodes form rings of equal angles. InputError if none."""
+    best: tuple[int, int, int] = (len(corners) + 1, 0, 0)  # more positions than possible
+    for axis in (1, 2, 0):
+        rings = _rings(deck.points, axis, corners)
+        pairs = np.unique(rings.ring[corners] * len(rings.angles) + rings.angle[corners])
+        places, angles = (len(np.unique(part[corners])) for part in (rings.ring, rings.angle))
+        if len(pairs) == len(corners) == places * angles and angles >= 3:
+            return rings
+        if places < best[0]:
+            best = (places, angles, axis)
+    raise InputError(
+        f"{deck.file}: not a body of revolution about x, y or z through the origin: its {len(corners)} corner "
+        f"nodes lie at {best[0]} places of the section and {best[1]} angles about {'xyz'[best[2]]}. Rolling is "
+        "formulated about a body that is undeformed the same at every angle: bring its section"
+    )
+
+
+def _rings(points: np.ndarray, axis: int, corners: np.ndarray) -> Rings:
+    """Rings and angles of all nodes about a coordinate axis."""
+    first, second = points[:, (axis + 1) % 3], points[:, (axis + 2) % 3]
+    r, along = np.hypot(first, second), points[:, axis]
+    small = _SAME * max(np.ptp(points[corners], axis=0).max(), 1e-300)
+    pair = _clusters(r, small) * (len(points) + 1) + _clusters(along, small)
+    _, start, ring = np.unique(pair, return_index=True, return_inverse=True)
+    theta = np.arctan2(second, first) % (2 * np.pi)
+    theta[theta > 2 * np.pi - _SAME] = 0.0
+    number = _clusters(theta, _SAME)
+    used = np.unique(number[corners])
+    _, begin = np.unique(number, return_index=True)
+    angle = np.searchsorted(used, number)
+    angle[~np.isin(number, used)] = -1
+    return Rings(axis, ring.ravel(), angle, np.column_stack([r, along])[start], theta[begin][used])
+
+
+def _clusters(values: np.ndarray, small: float) -> np.ndarray:
+    """Group numbers of values, ascending; groups have no gap above `small`."""
+    order = np.argsort(values)
+    group = np.cumsum(np.diff(values[order], prepend=values[order[0]]) > small)
+    out = np.empty(len(values), np.int64)
+    out[order] = group
+    return out
+
+
+def meridian_layers(deck: Deck, senses: dict[int, int], axis: int) -> tuple[Layer, ...]:
+    """The layers with angles from the meridian, for lines that run to larger axial coordinates.
+
+    `senses` is s for each membrane. Raises InputError for systems that vary around the axle.
+    """
+    return tuple(_layer(deck, layer, senses, axis) for layer in deck.layers)
+
+
+def _layer(deck: Deck, layer: Layer, senses: dict[int, int], axis: int) -> Layer:
+    labels = deck.element_sets.labels(layer.elements, layer.place).tolist()
+    found = {senses[label] for label in labels if label in senses}
+    if not found:
+        return layer
+    circumferential = _from_circumference(deck, layer, axis)
+    angle = np.radians(layer.angle)
+    slanted = abs(np.sin(2 * angle)) > 1e-9
+    if len(found) > 1 and slanted:
+        raise layer.place.error(
+            f"the normals of the membranes of {layer.elements} do not all point to one side, so the angle of "
+            f"{layer.name} is not clear"
+        )
+    sense = found.pop()
+    if circumferential:
+        angle = np.arctan2(
+            circumferential * np.cos(angle), -sense * np.sin(angle) * circumferential
+        )
+    else:
+        angle = sense * angle
+    return replace(layer, angle=float(np.degrees(angle)))
+
+
+def _from_circumference(deck: Deck, layer: Layer, axis: int) -> int:
+    """0: angle from the meridian; 1 or -1: cylindrical system, axis along or against the axle."""
+    if not layer.orientation:
+        if axis == 0:
+            return 0
+        raise layer.place.error(
+            f"cords {layer.name}: without ORIENTATION= their angle counts from the projection of x, which is "
+            f"not the same around the axle {'xyz'[axis]}: give a cylindrical *ORIENTATION"
+        )
+    system = deck.orientations.get(layer.orientation)
+    if system is None:
+        raise layer.place.error(f"there is no *ORIENTATION, NAME={layer.orientation}")
+    line = np.array(system.points[3:]) - np.array(system.points[:3])
+    off = np.delete(np.array(system.points[:3]), axis)
+    length = np.abs(line).max()
+    about = length > 0 and np.abs(np.delete(line, axis)).max() < 1e-6 * length
+    if not (system.system in ("CYLINDRICAL", "C") and about and not off.any()) or system.axis != 1:
+        raise system.place.error(
+            f"the system of cords {layer.name} must be cylindrical about the axle {'xyz'[axis]} with axis 1 as "
+            "normal, so that their angle counts from the circumference"
+        )
+    if system.turn:
+        raise system.place.error("a system with a further turn about its normal is not read")
+    return 1 if line[axis] > 0 else -1
+
 
 _NODES = 2_000_000
 

@@ -1,1 +1,0 @@
-"""File contents read as data: Abaqus decks and Gmsh meshes."""

@@ -1,1 +1,0 @@
-"""From elements to quadrilaterals with faces and cord lines."""

@@ -1,1 +1,0 @@
-"""Three-dimensional bodies of revolution and their sections."""
