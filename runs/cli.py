@@ -14,7 +14,7 @@ from tireroad.fem import form_cache
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.runs.arguments import parser
 from tireroad.runs.process import mpi, observe, signals
-from tireroad.runs.process.statuses import DONE, handed_over, processes_here, rank_before_mpi
+from tireroad.runs.process.signals import DONE, handed_over, processes_here, rank_before_mpi
 from tireroad.runs.process.surroundings import check_surroundings, crowded
 
 
@@ -111,7 +111,7 @@ def _reproduce(args: argparse.Namespace, comm) -> None:
 
 def _resumed(args: argparse.Namespace) -> argparse.Namespace:
     """Turn `resume DIR` into a `run` of the scene stored in DIR."""
-    from tireroad.runs.search.kept import to_resume
+    from tireroad.runs.search.journal import to_resume
 
     args.resumed = True
     args.command, args.scene, args.out = "run", to_resume(args.directory), args.directory
@@ -120,7 +120,7 @@ def _resumed(args: argparse.Namespace) -> argparse.Namespace:
 
 
 def _check(args: argparse.Namespace) -> None:
-    from tireroad.runs.report.section_picture import write_section
+    from tireroad.runs.report.section_figure import write_section
     from tireroad.runs.scene.check import explain
     from tireroad.runs.scene.load import load
 
@@ -178,7 +178,7 @@ def _validate(args: argparse.Namespace) -> None:
 
 def _results(directory: Path) -> Path:
     """The folder, if it is one of results; says which of its files are left out."""
-    from tireroad.runs.files.present import remarks
+    from tireroad.runs.files.folder import remarks
     from tireroad.runs.files.reader import check_results
 
     check_results(directory)

@@ -6,9 +6,9 @@ import sys
 import tempfile
 from pathlib import Path
 
-from tireroad.runs.process import signals, streams
+from tireroad.runs.process import signals, supervisor
 from tireroad.runs.process.packages import missing
-from tireroad.runs.process.statuses import DONE, INPUT, STOPPED, handed_over
+from tireroad.runs.process.signals import DONE, INPUT, STOPPED, handed_over
 
 
 def program() -> None:
@@ -16,7 +16,7 @@ def program() -> None:
     if sys.argv[1:2] == ["python"] and sys.argv[2:] not in (["-h"], ["--help"]):
         os.execv(sys.executable, [sys.executable, *sys.argv[2:]])  # the launcher does it by itself
     signal.pthread_sigmask(signal.SIG_BLOCK, signals.STOP_SIGNALS)
-    streams.mend()
+    supervisor.mend()
     _need_home()
     # A second BLAS thread waits by spinning: half as much processor time again for no second less, from
     # 30,000 to 100,000 unknowns. More cores are used by more processes.
@@ -60,7 +60,7 @@ def _status(arguments: list[str]) -> int:
             raise
         print(message, file=sys.stderr)
         return INPUT
-    refused = streams.refused()
+    refused = supervisor.refused()
     if status == DONE and refused is not None and arguments[:1] not in (["run"], ["resume"]):
         print(f"error: standard output cannot be written: {refused.strerror}", file=sys.stderr)
         return INPUT

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from synthetic_scene import SCENE
 
-from tireroad.runs.files.checksum import BLOCK, seal, signed
+from tireroad.runs.files.disk import BLOCK, seal, signed
 
 CROWN, SECTION, HALF_ARC, ROAD = 0.32, 0.10, np.radians(120.0), -0.309
 

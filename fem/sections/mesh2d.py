@@ -11,9 +11,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from tireroad.fem.errors import InputError
 
@@ -244,6 +241,8 @@ def _nodes(mesh: SectionMesh) -> None:
         raise InputError(
             f"section: node {unused[0]} at {_place(mesh.nodes[unused[0]])} has no element"
         )
+    from scipy.spatial import cKDTree  # late, here and below: the help of the program stays light
+
     pairs = cKDTree(mesh.nodes).query_pairs(_SAME * np.ptp(mesh.nodes, axis=0).max())
     if pairs:
         a, b = min(pairs)
@@ -277,6 +276,9 @@ def _jacobians(mesh: SectionMesh) -> None:
 def _one_body(mesh: SectionMesh) -> None:
     count = mesh.cells.shape[1]
     rows = np.repeat(np.arange(len(mesh.cells)), count)
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
     table = coo_matrix((np.ones(rows.size), (rows, mesh.cells.ravel()))).tocsr()
     bodies, which = connected_components(table @ table.T, directed=False)
     if bodies > 1:

@@ -1,18 +1,34 @@
-"""The result folder: its owner, and whether it is writable."""
+"""The result folder: its owner, and whether it is writable.
+
+Which result files of a folder belong to its scene: the one rule for all that read results.
+
+`summary.json`: what each stage of the folder's scene has given, and what other scenes left there.
+"""
 
 import fcntl
 import json
+import math
 import os
 import tempfile
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.files.checksum import is_as_signed, is_table_as_signed
-from tireroad.runs.files.disk import explained, remove_leftovers
+from tireroad.runs.files.disk import (
+    explained,
+    is_as_signed,
+    is_table_as_signed,
+    remove_leftovers,
+    signed,
+    signed_table,
+    text_digest,
+    write_text,
+)
+from tireroad.runs.files.store import opened, plain
+from tireroad.runs.scene.plan import STAGES
 from tireroad.runs.scene.resolved import MARK
 from tireroad.runs.version import PROGRAM, RESULT_FORMAT, VERSION
 
@@ -158,3 +174,213 @@ def _unusable(directory: Path, error: OSError) -> InputError:
         f"{directory}: cannot be written: {error.strerror}; choose another with --out"
     )
     return InputError(str(clear))
+
+
+CHOSEN = "chosen.toml"
+"""The scene with the settings that a search has found."""
+UNFINISHED = ("checkpoint.h5", "static_last.h5")
+"""Files of a stage that has not ended: no entry of the summary tells of them."""
+
+
+def has_result(entry: Mapping[str, Any] | None) -> bool:
+    """Whether a stage with this entry in summary.json has a result."""
+    return entry is not None and entry.get("status", "computed") != "skipped"
+
+
+def left_out(directory: Path) -> dict[str, str]:
+    """Files in a result folder that are not results of its scene, with the reason.
+
+    A run in a folder that is used again leaves the files of earlier runs where they are, to be
+    reused by a run that goes back to them. The file of a stage counts if the stage has a result by
+    summary.json; a file of an unfinished stage if it was written for the folder's scene; any other
+    file always. Without a readable summary nothing is known, and every file counts. Not collective.
+    """
+    return _left_out(directory, _table(directory))
+
+
+def _left_out(directory: Path, table: Mapping[str, Any] | None) -> dict[str, str]:
+    if table is None:
+        return {}
+    entries, found = table["stages"], {}
+    for stage in STAGES:
+        name, entry = f"{stage}.h5", entries.get(stage)
+        if not has_result(entry) and (directory / name).is_file():
+            why = (entry or {}).get("reason") or "this run has not finished it"
+            found[name] = f"it is of an earlier run ({why})"
+    for name in UNFINISHED:
+        if (directory / name).is_file() and not _is_of_scene(directory, name):
+            found[name] = "it is of another scene"
+    if _read(directory / CHOSEN) not in (None, _read(directory / "scene.toml")):
+        found[CHOSEN] = "it was chosen for another scene"
+    return found
+
+
+def ending(summary: Mapping[str, Any]) -> str:
+    """A sentence on a run that was stopped or failed, from its summary.json; else ""."""
+    told = summary.get("ended")
+    if not isinstance(told, Mapping):
+        return ""
+    return f"the run ended in stage {told.get('stage')}, {told.get('reason')}"
+
+
+def _read(path: Path) -> bytes | None:
+    try:
+        return path.read_bytes()
+    except OSError:
+        return None
+
+
+def remarks(directory: Path) -> list[str]:
+    """How the run ended, unless it finished, and the files left out, a sentence each."""
+    table = _table(directory)
+    ended = [f"{directory}: {text}"] if table and (text := ending(table)) else []
+    return ended + [
+        f"{directory / name} is left out: {reason}"
+        for name, reason in _left_out(directory, table).items()
+    ]
+
+
+def _table(directory: Path) -> dict[str, Any] | None:
+    """summary.json; None if it is absent or damaged, which its readers report."""
+    try:
+        table = json.loads((directory / "summary.json").read_text(encoding="utf-8"))
+        table["stages"] = {name: dict(entry) for name, entry in table["stages"].items()}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return None
+    return table if is_table_as_signed(table) else None
+
+
+def _is_of_scene(directory: Path, name: str) -> bool:
+    """Whether a file names the folder's scene as its own; its readers report any damage."""
+    try:
+        scene = (directory / "scene.toml").read_text(encoding="utf-8")
+        with opened(directory / name) as file:
+            return signed(str(file.attrs.get("scene", ""))) == scene
+    except (OSError, ValueError, InputError):
+        return True
+
+
+class Summary:
+    """`summary.json`: one entry per stage, rewritten completely after each. Root process only.
+
+    The file of a stage is a result of the folder's scene only if `stages` says so
+    (runs.files.present). Entries of a run of another scene, and of stages whose inputs have changed
+    since, are moved to `earlier`: their files stay, so that a run that goes back to that scene
+    finds them, with their figures. A run of the same scene begins with the entries it finds.
+    """
+
+    def __init__(
+        self, directory: Path, scene_name: str, processes: int, scene_text: str = ""
+    ) -> None:
+        self.path = directory / "summary.json"
+        self._scene = directory / "scene.toml", signed(scene_text)
+        self._entered: set[str] = set()
+        found = earlier_summary(directory) or {"stages": {}}
+        self.data: dict[str, Any] = {
+            "program": {"name": PROGRAM, "version": VERSION, "format": RESULT_FORMAT},
+            "scene": scene_name,
+            "resolved_scene": text_digest(scene_text),
+            "processes": processes,
+            "stages": found["stages"],
+            "earlier": found.get("earlier", {}),
+        }
+        self._of_another = not self._is_scene()
+        if self._of_another:
+            self._set_aside()
+        self.data["stages"].pop("report", None)  # it tells a finished run
+
+    def begin(self) -> None:
+        """Write scene.toml, after the summary if it has results of another scene to set aside."""
+        if self._of_another and self.path.exists():
+            self._write()
+        write_text(*self._scene)
+
+    def record(
+        self,
+        stage: str,
+        status: str,
+        *,
+        reason: str = "",
+        seconds: float = 0.0,
+        input_hash: str = "",
+        headline: dict[str, tuple[Any, str]] | None = None,
+        indicators: dict[str, tuple[Any, str]] | None = None,
+        warnings: list[str] | None = None,
+        cost: dict[str, float] | None = None,
+    ) -> None:
+        """Enter a stage and write the file. Figures are given as name: (value, unit).
+
+        A reused stage keeps the figures of the run that computed it. A skipped stage keeps its
+        result of a run of the same scene: it is only this run that ends before it.
+        """
+        if status == "skipped" and has_result(self.data["stages"].get(stage)):
+            return
+        kept = self._known(stage, input_hash) if status == "reused" else {}
+        self._displace(stage, status, input_hash)
+        self.data["stages"][stage] = {
+            "status": status,
+            "reason": reason,
+            "seconds": seconds,
+            "input_hash": input_hash,
+            "headline": _figures(headline) or kept.get("headline", {}),
+            "indicators": _figures(indicators) or kept.get("indicators", {}),
+            "warnings": warnings or kept.get("warnings", []),
+            "cost": cost or kept.get("cost", {}),
+        }
+        self._write()
+
+    def end(self, stage: str, reason: str) -> None:
+        """Enter that the run ends in a stage, failed or stopped, for those that read the results."""
+        self.data["ended"] = {"stage": stage, "reason": reason}
+        self._write()
+
+    def _is_scene(self) -> bool:
+        """Whether the folder's scene.toml is that of this run."""
+        path, text = self._scene
+        try:
+            return path.read_text(encoding="utf-8") == text
+        except (OSError, UnicodeDecodeError):
+            return False
+
+    def _known(self, stage: str, input_hash: str) -> dict[str, Any]:
+        """The entry of the file that a stage reuses, {} if there is none."""
+        for group in (self.data["stages"], self.data["earlier"]):
+            if stage in group and group[stage].get("input_hash", input_hash) == input_hash:
+                return group[stage]
+        return {}
+
+    def _displace(self, stage: str, status: str, input_hash: str) -> None:
+        """Set aside what the entry of a stage makes out of date: its own, and those after it."""
+        before = self.data["stages"].get(stage, {})
+        if before.get("input_hash", input_hash) != input_hash:
+            self._set_aside()
+        if status != "skipped":
+            self.data["earlier"].pop(stage, None)
+        self._entered.add(stage)
+
+    def _set_aside(self) -> None:
+        """Move the entries that this run has not made itself to `earlier`."""
+        for stage in self.data["stages"].keys() - self._entered:
+            entry = self.data["stages"].pop(stage)
+            if has_result(entry) and stage != "report":
+                self.data["earlier"][stage] = entry
+
+    def _write(self) -> None:
+        data = json.loads(json.dumps(_finite(self.data), default=plain))
+        text = json.dumps(signed_table(data), indent=1, ensure_ascii=False)
+        write_text(self.path, text + "\n")
+
+
+def _figures(given: dict[str, tuple[Any, str]] | None) -> dict[str, Any]:
+    return {name: {"value": value, "unit": unit} for name, (value, unit) in (given or {}).items()}
+
+
+def _finite(value: Any) -> Any:
+    """Replace infinities and NaN, which JSON does not have, by null."""
+    if isinstance(value, dict):
+        return {key: _finite(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(part) for part in value]
+    if hasattr(value, "item") and getattr(value, "ndim", 1) == 0:
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value

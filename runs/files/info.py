@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.files import checksum
+from tireroad.runs.files import disk
 from tireroad.runs.files.store import verify
 
 LONG = 96  # longest attribute text printed in full
@@ -30,8 +30,8 @@ def describe(file: Path, as_json: bool = False) -> str:
             f"{file}: {'is no file of data' if file.exists() else 'there is no such file'}"
         )
     try:
-        whole = "right" if checksum.is_whole(file) else "wrong"
-    except checksum.NoChecksum:
+        whole = "right" if disk.is_whole(file) else "wrong"
+    except disk.NoChecksum:
         whole = "none (not written by this version of tireroad)"
     except OSError as error:
         raise InputError(f"{file} cannot be read ({error.strerror})") from None

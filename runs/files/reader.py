@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.files.checksum import (
+from tireroad.runs.files.disk import (
     is_as_signed,
     is_table_as_signed,
     signed,
     text_digest,
 )
-from tireroad.runs.files.present import ending, left_out
+from tireroad.runs.files.folder import ending, left_out
 from tireroad.runs.files.store import AGAIN, verify
 
 

@@ -1,4 +1,6 @@
-"""Result files, written to a temporary name and renamed, so that an existing file is complete.
+"""The file object under HDF5 while a result file is written.
+
+Result files, written to a temporary name and renamed, so that an existing file is complete.
 
 Only the root process writes; callers gather the arrays. Every HDF5 file carries the resolved scene,
 the hash of its inputs, program and library versions, the number of processes, and a checksum that
@@ -6,6 +8,7 @@ the hash of its inputs, program and library versions, the number of processes, a
 """
 
 import hashlib
+import io
 import json
 import shutil
 import sys
@@ -19,11 +22,69 @@ import h5py
 import numpy as np
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.files import checksum
-from tireroad.runs.files.disk import replacing
-from tireroad.runs.files.hdf5_disk import Disk
+from tireroad.runs.files.disk import BLOCK, NoChecksum, is_whole, replacing, seal
 from tireroad.runs.files.identity import Identity, identity
 from tireroad.runs.version import PROGRAM, RESULT_FORMAT, VERSION
+
+
+class Disk(io.RawIOBase):
+    """The file under HDF5. The first write error is raised; later writes are dropped.
+
+    HDF5's own file driver cannot close a file on a full disk: it retries until the process ends
+    with a segmentation fault (seen with 1.10.8). Dropping writes lets it close; the file is then
+    removed.
+    """
+
+    def __init__(self, file: io.FileIO) -> None:
+        self._file = file
+        self.error: OSError | None = None
+
+    def readable(self) -> bool:
+        return True
+
+    def writable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return True
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        return self._file.seek(offset, whence)
+
+    def tell(self) -> int:
+        return self._file.tell()
+
+    def readinto(self, buffer: Any) -> int:
+        view = memoryview(buffer).cast("B")
+        count = self._file.readinto(view)
+        view[count:] = bytes(len(view) - count)
+        return len(view)
+
+    def write(self, data: Any) -> int:
+        view = memoryview(data).cast("B")
+        written = 0
+        while written < len(view):
+            written += self._attempt(self._file.write, view[written:]) or len(view)
+        return len(view)
+
+    def truncate(self, size: int | None = None) -> int:
+        self._attempt(self._file.truncate, size)
+        return self._file.seek(0, io.SEEK_END) if size is None else size
+
+    def _attempt(self, call: Any, argument: Any) -> int | None:
+        """The value of `call`; None once the disk has failed."""
+        if self.error is not None:
+            return None
+        try:
+            return call(argument)
+        except OSError as error:
+            self.error = error
+            raise
+
+    def close(self) -> None:
+        self._file.close()
+        super().close()
+
 
 LOADED = ("mpi4py", "h5py")
 """Libraries named in result files besides those in `identity`."""
@@ -75,7 +136,7 @@ def writing(path: Path, provenance: Provenance, begin: Path | None = None) -> It
             shutil.copyfile(begin, part)
         disk = Disk(part.open("r+b" if begin else "w+b", buffering=0))
         try:
-            block = {} if begin else {"userblock_size": checksum.BLOCK}
+            block = {} if begin else {"userblock_size": BLOCK}
             file = h5py.File(disk, "r+" if begin else "w", **block)
             try:
                 for name, value in provenance.attributes().items():
@@ -87,15 +148,15 @@ def writing(path: Path, provenance: Provenance, begin: Path | None = None) -> It
             disk.close()
         if disk.error is not None:
             raise disk.error
-        checksum.seal(part)
+        seal(part)
 
 
 @contextmanager
 def sealed(path: Path) -> Iterator[h5py.File]:
     """A new HDF5 file with a checksum but no provenance, e.g. one gathered from results."""
-    with h5py.File(path, "w", userblock_size=checksum.BLOCK) as file:
+    with h5py.File(path, "w", userblock_size=BLOCK) as file:
         yield file
-    checksum.seal(path)
+    seal(path)
 
 
 def put(file: h5py.Group, name: str, array: Any, unit: str, **attributes: Any) -> h5py.Dataset:
@@ -169,13 +230,13 @@ def verify(path: Path, foreign: bool = False) -> None:
     `foreign`: accept an HDF5 file without a checksum, written by another program.
     """
     try:
-        if not checksum.is_whole(path):
+        if not is_whole(path):
             raise InputError(f"{path} is damaged: it is not what was written (checksum); {AGAIN}")
     except FileNotFoundError:
         raise InputError(f"{path}: there is no such file") from None
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror})") from None
-    except checksum.NoChecksum:
+    except NoChecksum:
         if foreign:
             return
         raise InputError(

@@ -12,8 +12,16 @@ from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.parallel import FailedOnRoot
 from tireroad.runs.files.disk import Refused, Removed, explained
 from tireroad.runs.process.packages import missing
-from tireroad.runs.process.signals import STOP_SIGNALS, Stopped, raised
-from tireroad.runs.process.statuses import BUG, DONE, GAVE_UP, INPUT, STOPPED
+from tireroad.runs.process.signals import (
+    BUG,
+    DONE,
+    GAVE_UP,
+    INPUT,
+    STOP_SIGNALS,
+    STOPPED,
+    Stopped,
+    raised,
+)
 
 T = TypeVar("T")
 

@@ -1,36 +1,216 @@
-"""report.html: one self-contained page about a result folder."""
+"""Summary of a run: load, footprint, forces and levels with errors, first modes.
+
+Rates error indicators: limits, and a word for the reader.
+
+report.html: one self-contained page about a result folder.
+"""
+
+from __future__ import annotations
 
 import json
 import tomllib
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
+from math import inf
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+from tireroad.contact.results.spectra import SILENT, deviation, nominal
 from tireroad.fem.errors import InputError
-from tireroad.runs.files import present
-from tireroad.runs.files.checksum import is_as_signed, is_table_as_signed
-from tireroad.runs.files.disk import write_text
-from tireroad.runs.files.read import Absent, Results, Section
+from tireroad.runs.files import folder
+from tireroad.runs.files.disk import is_as_signed, is_table_as_signed, write_text
 from tireroad.runs.report import live
-from tireroad.runs.report.answer import answer
-from tireroad.runs.report.quantities import quantity
+from tireroad.runs.report.read import Absent, Results, Section, bounded, digits, quantity
 from tireroad.runs.report.realism import unusual
-from tireroad.runs.report.sections import (
-    forces,
-    rotating,
-    spectra,
-    stiffness,
-    tire,
-    vibration,
-)
-from tireroad.runs.report.verdicts import verdicts
+from tireroad.runs.report.sections import forces, rotating, spectra, stiffness, tire, vibration
 from tireroad.runs.scene.plan import STAGES
 from tireroad.runs.scene.schema import key_of, table_of
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.scene.walk import every_field
 from tireroad.runs.version import PROGRAM
+
+Fact = tuple[str, str]
+_MODES = 4
+_SPREAD = "error of the deviation of the"
+
+
+def answer(results: Results, stages: Mapping[str, Any]) -> list[Fact]:
+    """Facts (what, value) from the result files and the summary's `stages`, as far as available."""
+    found: list[Fact] = []
+    for part in (_standing, _rolling, _levels, _power, _modes):
+        try:
+            found += part(results, _Headlines(stages))
+        except (Absent, InputError, LookupError, ValueError):
+            continue  # the file's own section reports the problem
+    return found
+
+
+class _Headlines:
+    """Headline figures and indicators of the summary, by stage and name."""
+
+    def __init__(self, stages: Mapping[str, Any]) -> None:
+        self._stages = stages
+
+    def __call__(self, stage: str, name: str) -> float | None:
+        groups = [
+            self._stages.get(stage, {}).get(kind) or {} for kind in ("headline", "indicators")
+        ]
+        value = (groups[0].get(name) or groups[1].get(name) or {}).get("value")
+        return float(value) if isinstance(value, int | float) else None
+
+
+Given = Callable[[str, str], float | None]
+
+
+def _standing(results: Results, given: Given) -> list[Fact]:
+    """Load, deflection and footprint."""
+    load, sunk, length, width = (
+        float(results.attribute("static.h5", name) or 0.0)
+        for name in ("load", "deflection", "footprint_length", "footprint_width")
+    )
+    found: list[Fact] = []
+    if load and results.optional("static.h5", "contact/force") is not None:
+        error = given("static", "estimated error of the load")
+        about = f" ± {quantity(float(f'{error:.2g}'), '%')}" if error else ""
+        found.append(("load at rest", quantity(load, "N") + about))
+        found.append(("deflection", quantity(sunk, "m")))
+    if length and width:
+        found.append(("footprint at rest", f"{digits(1e3 * length)} × {digits(1e3 * width)} mm"))
+    return found
+
+
+def _rolling(results: Results, given: Given) -> list[Fact]:
+    """The vertical contact force while rolling, after the run-in as in the spectra.
+
+    Errors are estimated on part of that time: that of the deviation as a share of it there.
+    """
+    step = float(results.attribute("contact.h5", "step") or 1.0)
+    start = round((_of_spectra(results, "left_out") or 0.0) / step)
+    force = results.array("contact.h5", "total_force")[start:, 2]
+    if not len(force):
+        return []
+    end = _of_spectra(results, "limit")
+    varies = float(deviation(force[:, None], step, float(end or np.inf))[0])
+    error, spread = (
+        given("accuracy", f"{what} contact force") for what in ("error of the mean", _SPREAD)
+    )
+    there = given("accuracy", "deviation of the contact force")
+    off = spread / there * varies if spread and there else spread
+    after = f" from {quantity(start * step, 's')} on" if start else ""
+    what = "its standard deviation" + (f" up to {quantity(end, 'Hz')}" if end else "")
+    return [
+        (f"vertical force, rolling (mean{after})", bounded(float(force.mean()), error, "N")),
+        (what, bounded(varies, off, "N")),
+    ]
+
+
+def _of_spectra(results: Results, name: str) -> Any:
+    """`limit` of the model (Hz) or `left_out` (s) as run-in; None in a run without spectra."""
+    try:
+        return results.attribute("spectra.h5", name)
+    except Absent:
+        return None
+
+
+def _levels(results: Results, _: Given) -> list[Fact]:
+    """Levels summed over the bands, the upper bound of their errors, and their frequency limit."""
+    end = results.attribute("spectra.h5", "limit")
+    found = [("valid up to", quantity(end, "Hz"))] if end else []
+    centre = results.array("spectra.h5", "third_octave/centre")
+    if not len(centre):
+        return found
+    first, last = nominal(centre[[0, -1]])
+    band = f"{first:g} to {last:g} Hz" if last > first else f"{first:g} Hz band"
+    held = str(results.attribute("spectra.h5", "axle_force_is") or "")
+    axle = "hub force" if held.startswith("force on the hub") else "blocked axle force"
+    for key, what in (("level", axle), ("contact_level", "contact force")):
+        level = results.optional("spectra.h5", f"third_octave/{key}")
+        if level is None:
+            continue
+        fact = f"{what} z", "constant: no level"
+        if level[:, 2].max() > SILENT:
+            error = results.optional("spectra.h5", f"third_octave/{key}_error")
+            text = f"{_summed(level, error)} dB re 1 N"
+            weighted = results.optional("spectra.h5", f"third_octave/{key}_a_weighted")
+            if weighted is not None:
+                text += f", {_summed(weighted, None)} dB(A)"
+            fact = f"{what} z, {band}", text
+        found.insert(-1 if end else len(found), fact)
+    return found
+
+
+def _summed(level: np.ndarray, error: np.ndarray | None) -> str:
+    power = 10 ** (level[:, 2] / 10)
+    text = f"{10 * np.log10(max(power.sum(), 1e-300)):.1f}".replace("-", "−")
+    if error is not None and np.isfinite(error[:, 2]).all():
+        text += f" ± {(power * error[:, 2]).sum() / max(power.sum(), 1e-300):.1f}"
+    return text
+
+
+def _power(results: Results, _: Given) -> list[Fact]:
+    """The equivalent radiated power: an upper bound of what the outer face radiates."""
+    total = results.attribute("vibration.h5", "radiated_power_level_a_weighted")
+    if total is None:
+        return []
+    return [("equivalent radiated power", f"{total:.1f} dB(A) re 1 pW")]
+
+
+def _modes(results: Results, _: Given) -> list[Fact]:
+    """The lowest undamped modes of the non-rotating tire."""
+    lowest = results.array("modes.h5", "frequency")[:_MODES]
+    named = ", ".join(f"{value:.4g}" for value in lowest)
+    return [("lowest modes, undamped", f"{named} Hz")] if len(lowest) else []
+
+
+# (part of the indicator's name, largest good value, largest usable value); the first match counts.
+# At these limits a figure of the report would begin to change: 1e-6 of an eigenvector is 1e-12 of
+# its frequency; 1 % of the load is 1 % of the forces.
+LIMITS: tuple[tuple[str, float, float], ...] = (
+    ("least contact force", 0.0, 0.0),  # no point may pull; see `verdict`
+    ("largest penetration", 1e-9, 1e-6),
+    ("estimated error of the load", 1.0, 3.0),
+    ("residual in the static flexibility", 0.5, 1.0),
+    ("worst complementarity residual", 1e-9, 1e-6),
+    ("energy", inf, inf),  # in joules: rated by the other energy figures
+    ("residual states", inf, inf),  # a count
+    ("residual", 1e-8, 1e-5),
+    ("orthonormality", 1e-9, 1e-6),
+    ("identity", 1e-9, 1e-6),
+    ("biorthogonality", 1e-9, 1e-6),
+    ("basis condition", 1e4, 1e6),
+    ("near-defective", 0.0, 10.0),
+    ("truncation error", 0.05, 0.2),
+)
+GOOD, FAIR, POOR = "good", "fair", "poor"
+
+
+def verdict(name: str, value: Any) -> str:
+    """ "good", "fair", "poor", or "" for a figure without a rating."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return ""
+    if name == "least contact force":
+        return GOOD if value >= 0 else POOR
+    for part, good, fair in LIMITS:
+        if part in name:
+            if good == inf:
+                return ""
+            return GOOD if value <= good else FAIR if value <= fair else POOR
+    return ""
+
+
+def verdicts(stages: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str, Any, str, str]]:
+    """(stage, indicator, value, unit, verdict) of every indicator in a summary; poor ones first."""
+    rows = [
+        (stage, name, entry["value"], entry.get("unit", ""), verdict(name, entry["value"]))
+        for stage, found in stages.items()
+        for name, entry in (found.get("indicators") or {}).items()
+    ]
+    order = {POOR: 0, FAIR: 1, GOOD: 2, "": 3}
+    return sorted(rows, key=lambda row: order[row[4]])
+
 
 SECTIONS: Mapping[str, Callable[[Results], Section]] = {
     "static.h5": tire.static,
@@ -69,7 +249,7 @@ def render(directory: Path) -> str:
     summary = read_summary(directory / "summary.json", problems)
     scene_text, scene = read_scene(directory / "scene.toml", problems)
     stages = summary.get("stages", {})
-    ended = [("run", text)] if (text := present.ending(summary)) else []
+    ended = [("run", text)] if (text := folder.ending(summary)) else []
     judged = verdicts(summary.get("stages_known", {}))
     sections, left_out, provenance = build_sections(directory, scene, stages, problems)
     with Results(directory, scene) as results:
@@ -214,7 +394,7 @@ def short_attributes(results: Results, name: str) -> list[tuple[str, str]]:
 
 def computed(directory: Path) -> str:
     """Time of the newest result, UTC."""
-    names = {*SECTIONS, "summary.json", "scene.toml"} - present.left_out(directory).keys()
+    names = {*SECTIONS, "summary.json", "scene.toml"} - folder.left_out(directory).keys()
     files = [directory / name for name in names]
     newest = max(file.stat().st_mtime for file in files if file.is_file())
     return datetime.fromtimestamp(newest, UTC).strftime("%Y-%m-%d %H:%M UTC")

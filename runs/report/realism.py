@@ -11,8 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 import numpy as np
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.files.read import Absent, Results
-from tireroad.runs.report.quantities import digits, quantity
+from tireroad.runs.report.read import Absent, Results, digits, quantity
 
 _LOWEST = 6  # modes whose damping is checked
 _DIFFERS = 0.05  # relative to the static load; above it the mean force while rolling is explained

@@ -1,4 +1,7 @@
-"""A drawing of the section: regions, lines of cords with angles, inner face, tread and rim."""
+"""A drawing of the section: regions, lines of cords with angles, inner face, tread and rim.
+
+Draws a scene's section into its result folder.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +19,7 @@ from numpy.typing import NDArray
 
 from tireroad.fem.sections.mesh2d import SectionMesh
 from tireroad.runs.report.figures import canvas, styled
+from tireroad.runs.scene.tables.scene import Scene
 
 _CURVE = np.linspace(0, 1, 7)  # positions along a side at which it is drawn
 _FACES = {"inner": "#2f6db5", "tread": "#3e4c59", "rim": "#c8502d"}
@@ -99,3 +103,17 @@ def _faces(axes: Axes, mesh: SectionMesh) -> list[Line2D]:
         axes.add_collection(LineCollection(_curves(mesh, edges), **style))
         handles.append(Line2D([], [], color=colour, lw=3, label=f"{name}, {len(edges)} sides"))
     return handles
+
+
+NAME = "section.png"
+
+
+def write_section(scene: Scene, directory: Path) -> str:
+    """Draw the section of the scene's tire; returns a message: where it is, or why it failed."""
+    tire = scene.tire
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        save_section(tire.ring().section, directory / NAME, tire.shape.angles(tire))
+    except OSError as error:
+        return f"section not drawn: {directory / NAME}: {error.strerror}"
+    return f"section drawn: {directory / NAME}"

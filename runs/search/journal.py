@@ -1,23 +1,139 @@
-"""search.json: the trials of a search, so that it can be resumed, and is not repeated."""
+"""The estimated error of a run relative to its target, by cause and figure.
+
+What a search keeps in its result folder until it has found settings.
+
+`search/scene.toml` is the scene as given, with which `resume` goes on; `scene.toml` is always that
+of the results beside it. `search/cache` holds the stages of the trials.
+
+search.json: the trials of a search, so that it can be resumed, and is not repeated.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import json
+import shutil
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from tireroad.contact.results.error_bars import CAUSES
 from tireroad.runs.files import store
-from tireroad.runs.files.disk import write_text
+from tireroad.runs.files.disk import signed, write_text
+from tireroad.runs.files.folder import CHOSEN, make_folder
 from tireroad.runs.files.identity import identity
 from tireroad.runs.scene.resolved import dumps
-from tireroad.runs.scene.tables.accuracy import Accuracy
+from tireroad.runs.scene.tables.accuracy import Accuracy as Wanted
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.search.settings import Settings
-from tireroad.runs.search.shares import Found
+from tireroad.runs.stages.accuracy import Accuracy
+
+VERTICAL = 2
+
+
+@dataclass(frozen=True)
+class Found:
+    """Estimated errors of a run's vertical force by cause; NaN where unknown.
+
+    `history` and `mean`: relative; `level` dB of each third octave at `centre` Hz, up to the
+    highest frequency of interest.
+    """
+
+    history: Mapping[str, float]
+    mean: Mapping[str, float]
+    centre: tuple[float, ...]
+    level: Mapping[str, tuple[float, ...]]
+
+    @classmethod
+    def of(cls, product: Accuracy, wanted: Wanted) -> Found:
+        """Errors of the force that the target applies to."""
+        bars = product.by_cause.get(wanted.of, {})
+        below = np.flatnonzero(product.centre <= product.up_to)
+        unknown = (float("nan"),) * len(below)
+        mean = abs(float(product.mean[wanted.of][VERTICAL])) if wanted.of in product.mean else 0.0
+        return cls(
+            {c: float(bar.history[VERTICAL]) for c, bar in bars.items()},
+            {c: float(bar.mean[VERTICAL]) / mean if mean else 0.0 for c, bar in bars.items()},
+            tuple(map(float, product.centre[below])),
+            {
+                c: tuple(map(float, bars[c].level[below, VERTICAL])) if c in bars else unknown
+                for c in CAUSES
+            },
+        )
+
+    def over(self, wanted: Wanted) -> np.ndarray:
+        """Errors (causes, figures) over their targets; infinite where unknown."""
+        columns = []
+        if wanted.target is not None:
+            for values in (self.history, self.mean):
+                columns.append([values.get(cause, np.nan) / wanted.target for cause in CAUSES])
+        if wanted.target_db is not None:
+            levels = np.array([self.level[cause] for cause in CAUSES]).reshape(len(CAUSES), -1)
+            # Without a band below that frequency, nothing is known.
+            columns += list((levels / wanted.target_db).T) or [[np.nan] * len(CAUSES)]
+        return np.nan_to_num(np.array(columns, float).T, nan=np.inf)
+
+
+def worst(over: np.ndarray) -> tuple[float, int]:
+    """The largest total error over its target, and the index of that figure; 1 or less meets it."""
+    totals = np.sqrt((over**2).sum(axis=0))
+    figure = int(totals.argmax())
+    return float(totals[figure]), figure
+
+
+def shown(over: np.ndarray, wanted: Wanted) -> str:
+    """The error and its shares in words, for the figure that is furthest from its target."""
+    total, figure = worst(over)
+    relative = 2 if wanted.target is not None else 0
+    unit, scale = (
+        ("%", 100 * (wanted.target or 0.0)) if figure < relative else ("dB", wanted.target_db)
+    )
+    parts = ", ".join(
+        f"{cause} {_number(scale * value)}"
+        for cause, value in zip(CAUSES, over[:, figure], strict=True)
+    )
+    return f"{_number(scale * total)} {unit} ({parts})"
+
+
+def _number(value: float) -> str:
+    return f"{value:.2g}" if np.isfinite(value) else "unknown"
+
+
+FOLDER = "search"
+_SCENE = "scene.toml"
+
+
+def begin(directory: Path, scene_text: str) -> None:
+    """Keep the resolved scene of a search; what an earlier one chose is removed. Root only.
+
+    In a folder without results it is also the folder's scene, which names the owner.
+    """
+    (directory / CHOSEN).unlink(missing_ok=True)
+    make_folder(directory / FOLDER)
+    write_text(directory / FOLDER / _SCENE, signed(scene_text))
+    if not (directory / "summary.json").exists():
+        write_text(directory / _SCENE, signed(scene_text))
+
+
+def to_resume(directory: Path) -> Path:
+    """The scene that `resume` goes on with: that of an unfinished search, if there is one."""
+    given = directory / FOLDER / _SCENE
+    return given if given.is_file() else directory / _SCENE
+
+
+def leave(directory: Path) -> None:
+    """Before a run without a search: `resume` is to go on with that run. Root process only."""
+    (directory / FOLDER / _SCENE).unlink(missing_ok=True)
+
+
+def forget(directory: Path) -> None:
+    """Remove the scene as given, and the stages of the trials. Root process only."""
+    shutil.rmtree(directory / FOLDER, ignore_errors=True)
+
 
 NAME = "search.json"
 
@@ -87,7 +203,7 @@ def _trial(data: dict[str, Any]) -> Trial:
 def _origin(scene: Scene) -> str:
     """Hash of all that trials depend on: the scene without its target, its files, the program."""
     of, up_to = scene.accuracy.of, scene.accuracy.up_to
-    bare = replace(scene, accuracy=Accuracy(of=of, up_to=up_to))
+    bare = replace(scene, accuracy=Wanted(of=of, up_to=up_to))
     files = [store.file_hash(path) for path in _files(scene)]
     program = identity("accuracy")
     parts = (

@@ -18,11 +18,10 @@ from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.files.disk import FACTORS, remove_factors
-from tireroad.runs.files.folder import make_folder
-from tireroad.runs.files.summary import Summary
+from tireroad.runs.files.folder import Summary, make_folder
 from tireroad.runs.process import observe
-from tireroad.runs.process.memory import factors_on_disk, forget_peak, peak_memory
 from tireroad.runs.process.mpi import on_root
+from tireroad.runs.process.surroundings import factors_on_disk, forget_peak, peak_memory
 from tireroad.runs.scene.derived import with_modal
 from tireroad.runs.scene.extent.demand import check_demand, duration, memory_of, out_of_core
 from tireroad.runs.scene.extent.estimate import Estimate, estimate

@@ -11,10 +11,9 @@ from tireroad.runs.files.folder import held
 from tireroad.runs.files.store import stage_hash
 from tireroad.runs.process import observe
 from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.sweep import local, queue
-from tireroad.runs.sweep.definition import Sweep, read
+from tireroad.runs.sweep import local
+from tireroad.runs.sweep.definition import Member, Sweep, read
 from tireroad.runs.sweep.gather import gather, write
-from tireroad.runs.sweep.members import Member
 from tireroad.runs.sweep.page import write_page
 
 
@@ -63,10 +62,10 @@ def _gather(family: Sweep, folder: Path, failed: Sequence[str]) -> None:
 def _queue(family: Sweep, folder: Path, source: Path) -> None:
     """Write the job scripts and submit them."""
     first, rest = shared_first(family)
-    scripts = queue.write_scripts(family, folder, first, rest, source)
+    scripts = local.write_scripts(family, folder, first, rest, source)
     for script in scripts.values():
         observe.say(f"{script.path}")
-    jobs = queue.submit(family, scripts)
+    jobs = local.submit(family, scripts)
     observe.say("submitted: " + ", ".join(f"{name} as job {job}" for name, job in jobs.items()))
 
 

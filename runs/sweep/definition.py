@@ -1,4 +1,6 @@
-"""Definition of a sweep file: a base scene, axes, and how their values form members.
+"""The members of a sweep, from the plan, the axes and the list in its file.
+
+Definition of a sweep file: a base scene, axes, and how their values form members.
 
   name = "speeds"
   scene = "passenger.toml"          # relative to the sweep file
@@ -20,17 +22,246 @@ partition, time); [queue] names the template and the commands of another batch s
 
 from __future__ import annotations
 
+import itertools
+import math
+import re
 import tomllib
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from scipy.stats import qmc
+
 from tireroad.fem.errors import InputError
+from tireroad.fem.parameters import described, finite
 from tireroad.runs.scene.load import load
+from tireroad.runs.scene.resolved import literal
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.scene.walk import walk
-from tireroad.runs.sweep.members import NAME, PLAN_KEYS, Member, check_keys, planned, whole
+
+MOST = 10_000
+PLANS = {
+    "grid": {"axis"},
+    "list": {"member"},
+    "latin-hypercube": {"axis", "samples", "seed"},
+}  # and the keys of the file that each uses
+PLAN_KEYS = {"plan"}.union(*PLANS.values())
+_AXIS = {"grid": {"key", "values", "range", "count"}, "latin-hypercube": {"key", "range"}}
+NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,79}")
+
+
+@dataclass(frozen=True)
+class Member:
+    """One run: the name of its folder, and its settings on top of the base scene, key by key."""
+
+    name: str
+    settings: Mapping[str, Any]
+
+    def overrides(self) -> list[str]:
+        """The settings as arguments of --set; the scene takes the member's name."""
+        given = [f"{key}={literal(value)}" for key, value in self.settings.items()]
+        return [*given, f"name={literal(self.name)}"]
+
+
+def check_keys(where: str, given: Mapping[str, Any], known: set[str]) -> None:
+    """Raise InputError for a key that is not known."""
+    for key in given:
+        if key not in known:
+            raise InputError(f"{where}: unknown key {key}; known here: {', '.join(sorted(known))}")
+
+
+def planned(path: Path, raw: Mapping[str, Any]) -> tuple[tuple[str, ...], list[Member]]:
+    """The keys that vary, and the members. Raises InputError for any mistake in them."""
+    plan = raw.get("plan", "list" if "member" in raw else "grid")
+    if not isinstance(plan, str) or plan not in PLANS:
+        raise InputError(f"{path}: plan must be one of {', '.join(PLANS)}, not {plan!r}")
+    for key in PLAN_KEYS - PLANS[plan] - {"plan"}:
+        if key in raw:
+            users = " or ".join(name for name in PLANS if key in PLANS[name])
+            raise InputError(f'{path}: {key} belongs to plan = {users}, and this is "{plan}"')
+    return _listed(path, raw) if plan == "list" else _crossed(path, raw, plan)
+
+
+def _tables(path: Path, raw: Mapping[str, Any], name: str) -> list[dict[str, Any]]:
+    """An array of tables; empty if absent."""
+    found = raw.get(name, [])
+    if not isinstance(found, list) or not all(isinstance(one, dict) for one in found):
+        raise InputError(f"{path}: {name} must be written [[{name}]], one for each")
+    return found
+
+
+def _crossed(path: Path, raw: Mapping[str, Any], plan: str) -> tuple[tuple[str, ...], list[Member]]:
+    """The members of a grid or a latin hypercube over the axes."""
+    axes = _tables(path, raw, "axis")
+    if not axes or not all("key" in axis for axis in axes):
+        raise InputError(f'{path}: plan = "{plan}" needs [[axis]] tables, each with a key')
+    keys = tuple(str(axis["key"]) for axis in axes)
+    _check_apart(f"{path}: [[axis]]", keys)
+    for key, axis in zip(keys, axes, strict=True):
+        check_keys(f"{path}: axis {key}", axis, _AXIS[plan])
+    if plan == "latin-hypercube":
+        return keys, _named(keys, _hypercube(path, raw, axes))
+    values = [_values(f"{path}: axis {key}", axis) for key, axis in zip(keys, axes, strict=True)]
+    _check_count(path, math.prod(len(one) for one in values))
+    return keys, _named(keys, list(itertools.product(*values)))
+
+
+def _check_count(path: Path, count: int) -> None:
+    if not 1 <= count <= MOST:
+        raise InputError(f"{path}: {count} members; a sweep has 1 to {MOST}")
+
+
+def _listed(path: Path, raw: Mapping[str, Any]) -> tuple[tuple[str, ...], list[Member]]:
+    members = []
+    for number, one in enumerate(_tables(path, raw, "member"), start=1):
+        name, settings = str(one.get("name", f"{number:03d}")), one.get("set", {})
+        check_keys(f"{path}: member {name}", one, {"name", "set"})
+        if not isinstance(settings, dict):
+            raise InputError(
+                f"{path}: member {name}: set must be a table of keys and values, "
+                f'such as {{ "static.load" = 300.0 }}, not {described(settings)}'
+            )
+        given = list(_keyed(settings))
+        _check_apart(f"{path}: member {name}", [key for key, _ in given])
+        members.append(Member(name, dict(given)))
+    if not members:
+        raise InputError(f'{path}: plan = "list" needs [[member]] tables')
+    _check_count(path, len(members))
+    count = Counter(member.name for member in members)
+    wrong = [name for name, number in count.items() if number > 1 or not NAME.fullmatch(name)]
+    if wrong:
+        raise InputError(
+            f"{path}: member name {wrong[0]!r} must be unique and of letters, digits, '.', '_', '-'"
+        )
+    keys = dict.fromkeys(key for member in members for key in member.settings)
+    return tuple(keys), members
+
+
+def _keyed(settings: Mapping[str, Any], table: str = "") -> Iterator[tuple[str, Any]]:
+    """Keys and values of a member; contact.slip = 0.1 without quotes is a key in a table to TOML."""
+    for key, value in settings.items():
+        path = f"{table}{key}"
+        if isinstance(value, dict) and "." not in key and path in _tables_of_scene():
+            yield from _keyed(value, f"{path}.")
+        else:
+            yield path, value
+
+
+@cache
+def _tables_of_scene() -> frozenset[str]:
+    parents = (dotted.split(".")[:-1] for dotted, *_ in walk(Scene))
+    return frozenset(".".join(parts[:k]) for parts in parents for k in range(1, len(parts) + 1))
+
+
+def _check_apart(where: str, keys: Sequence[str]) -> None:
+    """Raise InputError for a key given twice, or with a table that holds it: one would be lost."""
+    for key in keys:
+        if keys.count(key) > 1:
+            raise InputError(f"{where}: {key} is given twice")
+        for other in keys:
+            if other.startswith(f"{key}."):
+                raise InputError(f"{where}: {key} holds {other}: give one of them")
+
+
+def _values(where: str, axis: Mapping[str, Any]) -> list[Any]:
+    """The values of an axis of a grid: a list, or `count` values over a `range`.
+
+    Of a range of whole numbers the whole values are integers, and for a key of whole numbers all
+    are.
+    """
+    if "values" in axis:
+        values = axis["values"]
+        if not isinstance(values, list) or not values:
+            raise InputError(f"{where}: values must be a list that is not empty")
+        if extra := {"range", "count"} & set(axis):
+            raise InputError(
+                f"{where}: give values or range and count, not values and {min(extra)}"
+            )
+        return values
+    low, high = _range(where, axis)
+    count = whole(where, axis, "count", 0, 2, MOST)
+    values = np.linspace(low, high, count)
+    if _counts(axis):
+        if count > high - low + 1:
+            raise InputError(
+                f"{where}: count = {count}, and {axis['range']} has fewer whole numbers"
+            )
+        return np.rint(values).astype(int).tolist()
+    if all(isinstance(end, int) for end in axis["range"]):
+        return [int(value) if value.is_integer() else value for value in values.tolist()]
+    return values.tolist()
+
+
+def _counts(axis: Mapping[str, Any]) -> bool:
+    """Whether the values of a range are whole: both ends are, and so are the key's in a scene."""
+    name = re.sub(r"\.\d+(?=\.)", "[]", str(axis["key"]))
+    known = any(key.is_whole for dotted, *_, key in walk(Scene) if dotted == name)
+    return known and all(isinstance(end, int) for end in axis["range"])
+
+
+def _hypercube(
+    path: Path, raw: Mapping[str, Any], axes: Sequence[Mapping[str, Any]]
+) -> list[tuple[Any, ...]]:
+    samples = whole(str(path), raw, "samples", 0, 1, MOST)
+    seed = whole(str(path), raw, "seed", 0, 0, 2**32 - 1)
+    unit = qmc.LatinHypercube(d=len(axes), seed=seed).random(samples)
+    columns = []
+    for share, axis in zip(unit.T, axes, strict=True):
+        low, high = _range(f"{path}: axis {axis['key']}", axis)
+        if _counts(axis):  # each whole number has the same share of the layers
+            columns.append((low + np.floor(share * (high - low + 1))).astype(int).tolist())
+        else:
+            columns.append((low + share * (high - low)).tolist())
+    return list(zip(*columns, strict=True))
+
+
+def _range(where: str, axis: Mapping[str, Any]) -> tuple[float, float]:
+    given = axis.get("range")
+    try:
+        if isinstance(given, list) and len(given) == 2:
+            low, high = (finite(end) for end in given)
+            if low < high:
+                return low, high
+    except ValueError as error:
+        raise InputError(f"{where}: range: an end {error}") from None
+    raise InputError(f"{where}: give values, or range = [low, high]")
+
+
+def whole(where: str, raw: Mapping[str, Any], key: str, default: int, least: int, most: int) -> int:
+    """A whole number of a table. Raises InputError if it is none, or out of range."""
+    value = raw.get(key, default)
+    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+        raise InputError(
+            f"{where}: {key} must be a whole number from {least} to {most}, not {value!r}"
+        )
+    return value
+
+
+def _named(keys: Sequence[str], rows: Sequence[tuple[Any, ...]]) -> list[Member]:
+    """Members numbered and named by their settings: 03_speed-40."""
+    digits = len(str(len(rows)))
+    members = []
+    for number, row in enumerate(rows, start=1):
+        settings = dict(zip(keys, row, strict=True))
+        parts = [f"{key.rpartition('.')[2]}-{_short(value)}" for key, value in settings.items()]
+        members.append(Member("_".join([f"{number:0{digits}d}", *parts])[:80], settings))
+    return members
+
+
+def _short(value: Any) -> str:
+    text = (
+        f"{value:.6g}"
+        if isinstance(value, float)
+        else Path(value).stem
+        if isinstance(value, str)
+        else str(value)
+    )
+    return re.sub(r"[^A-Za-z0-9._-]", "", text)[:24]
+
 
 _KEYS = {"name", "scene", "processes", "slurm", "queue"} | PLAN_KEYS
 

@@ -23,8 +23,7 @@ from tireroad.runs.scene.locate import parts
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.search.journal import NAME, read_trials
 from tireroad.runs.search.settings import applied
-from tireroad.runs.sweep.definition import Sweep
-from tireroad.runs.sweep.members import Member
+from tireroad.runs.sweep.definition import Member, Sweep
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ import os
 import sys
 
 from tireroad.runs.process import signals
-from tireroad.runs.process.statuses import DONE, STOPPED, rank_before_mpi
+from tireroad.runs.process.signals import DONE, STOPPED, rank_before_mpi
 
 
 def work() -> int:

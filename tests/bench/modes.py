@@ -9,7 +9,7 @@ import numpy as np
 from mpi4py import MPI
 
 from tireroad.runs.process import observe
-from tireroad.runs.process.memory import peak_memory
+from tireroad.runs.process.surroundings import peak_memory
 from tireroad.runs.validation.cases import thesis_torus
 from tireroad.runs.validation.tables import Table
 

@@ -14,7 +14,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from tireroad.runs.files.disk import write_text
-from tireroad.runs.report.quantities import quantity
+from tireroad.runs.report.read import quantity
 from tireroad.runs.version import PROGRAM, VERSION
 from tireroad.tests.thesis.claim import Claim
 from tireroad.tests.thesis.figure import Figure, Reproduced

@@ -1,4 +1,15 @@
-"""Report sections about forces: rolling contact and point forces."""
+"""Report section part about the wheel: hub moments, and its motion if it moves.
+
+Report section part about the tread pattern.
+
+Report section part about the road.
+
+Report section part about the axle: force on the held axle per force on the tread.
+
+Report sections about forces: rolling contact and point forces.
+"""
+
+from __future__ import annotations
 
 from collections.abc import Mapping
 
@@ -6,11 +17,191 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.runs.files.read import Absent, Results, Section, attributes
 from tireroad.runs.report import figures, live, realism, surface_figures
-from tireroad.runs.report.quantities import quantity
-from tireroad.runs.report.sections import corner, pattern, road, transmissibility
+from tireroad.runs.report.figures import COLOURS, COMPONENTS, WIDE, canvas, encode, envelope, styled
+from tireroad.runs.report.read import Absent, Results, Section, attributes, quantity
 from tireroad.runs.report.sections.tire import pressure
+
+_AXES = "xyz"
+
+
+def wheel(results: Results, section: Section, time: NDArray) -> None:
+    """Add the hub moments, and the motion of wheel and body if the wheel moves (contact.h5)."""
+    moved = results.optional("contact.h5", "wheel/translation")
+    moment = results.optional("contact.h5", "hub_moment")
+    if moment is not None:
+        hub = "the held axle" if moved is None else "the hub"
+        for axis, name in enumerate(_AXES):
+            section.facts.append(
+                (f"greatest moment on {hub}, {name}", _most(moment[:, axis], "N m"))
+            )
+    if moved is None:
+        return
+    turned = results.array("contact.h5", "wheel/rotation")
+    body = results.array("contact.h5", "body/height")
+    for axis, name in enumerate(_AXES):
+        if np.abs(moved[:, axis]).max() > 0:
+            section.facts.append(
+                (f"greatest motion of the wheel, {name}", _most(moved[:, axis], "m"))
+            )
+        if np.abs(turned[:, axis]).max() > 0:
+            turn = _most(turned[:, axis], "rad")
+            section.facts.append((f"greatest rotation of the wheel, {name}", turn))
+    lines = {"wheel, z": moved[:, 2], "body, z": body}
+    shown = {name: 1e3 * line for name, line in lines.items() if np.abs(line).max() > 0}
+    if shown:
+        drawn = live.chart(time, shown, ("time in s", "height in mm"), figures.COLOURS)
+        caption = "Wheel and body over the static state."
+        section.show(_drawn(time, shown), caption, live.charts(drawn))
+
+
+@figures.styled
+def _drawn(time: NDArray, lines: dict[str, NDArray]) -> str:
+    figure, axes = figures.canvas(figures.WIDE, 2.6)
+    for colour, (name, line) in zip(figures.COLOURS, lines.items(), strict=False):
+        axes[0, 0].plot(*envelope(time, line), color=colour, label=name)
+    axes[0, 0].set(xlabel="time in s", ylabel="height in mm", xlim=(time[0], time[-1]))
+    axes[0, 0].legend(ncols=2, loc="lower left", bbox_to_anchor=(0.0, 1.0))
+    return figures.encode(figure)
+
+
+def _most(values: NDArray, unit: str) -> str:
+    return quantity(float(np.abs(values).max()), unit)
+
+
+_SHOWN = 0.6  # m of tread drawn
+
+
+def tread(results: Results, section: Section) -> None:
+    """Add the pattern, and the part of it under the footprint at the beginning (contact.h5)."""
+    depth = results.optional("contact.h5", "pattern/depth")
+    if depth is None:
+        return
+    s, y = results.array("contact.h5", "pattern/s"), results.array("contact.h5", "pattern/y")
+    points = results.array("contact.h5", "points")
+    begun = results.array("contact.h5", "pattern/begun")
+    land = float((depth <= 0).mean())
+    section.facts += [
+        ("deepest groove", quantity(float(depth.max()), "m")),
+        ("land of the pattern across the patch", f"{100 * land:.3g} %"),
+    ]
+    section.show(
+        _pattern_drawn(s, y, depth, points, begun),
+        f"Tread pattern: depth over the first {1e3 * min(_SHOWN, s[-1]):.0f} mm around the tire, and at the "
+        "contact points when the run begins.",
+    )  # fmt: skip
+
+
+@figures.styled
+def _pattern_drawn(s: NDArray, y: NDArray, depth: NDArray, points: NDArray, begun: NDArray) -> str:
+    figure, axes = figures.canvas(figures.WIDE, 3.0, 1, 2)
+    around, patch = axes[0]
+    part = s <= _SHOWN
+    around.pcolormesh(1e3 * s[part], 1e3 * y, 1e3 * depth[part].T, cmap="Greys", shading="nearest")
+    around.set(xlabel="around the tire in mm", ylabel="y in mm")
+    shown = patch.scatter(
+        *(1e3 * points[:, :2].T), c=1e3 * begun, cmap="Greys", s=6, vmin=0.0, edgecolors="none"
+    )
+    patch.set(xlabel="x in mm", title="under the footprint", aspect="equal")
+    figure.colorbar(shown, ax=patch, label="depth in mm")
+    return figures.encode(figure)
+
+
+_DEEPEST = 60.0  # dB below the highest level: what is drawn
+
+
+def texture(results: Results, section: Section) -> None:
+    """Add mean profile depth and texture third octaves of the road (contact.h5)."""
+    depth = results.attribute("contact.h5", "mean_profile_depth")
+    if depth is not None:
+        section.facts.append(("mean profile depth of the road", quantity(depth, "m")))
+    notes = results.attribute("contact.h5", "road_notes")
+    if notes is not None:
+        section.notes.append(f"Road: {notes}.")
+    level = results.optional("contact.h5", "road/texture_level")
+    if level is None:
+        return
+    wavelength = 1e3 * results.array("contact.h5", "road/wavelength")
+    labels = "wavelength in mm", "level in dB re 1 µm"
+    level = np.maximum(level, level.max() - _DEEPEST)
+    curves, colours = {"level": level}, figures.COLOURS
+    drawn = live.chart(wavelength, curves, labels, colours, log=True, legend=False)
+    caption = "Texture of the road along its middle: level of each third octave (ISO 13473-4)."
+    section.show(_road_drawn(wavelength, level, labels), caption, live.charts(drawn))
+
+
+@figures.styled
+def _road_drawn(wavelength: NDArray, level: NDArray, labels: tuple[str, str]) -> str:
+    figure, axes = figures.canvas(figures.WIDE, 2.6)
+    axes[0, 0].step(wavelength, level, where="mid", color=figures.COLOURS[0])
+    axes[0, 0].set(xlabel=labels[0], ylabel=labels[1], xscale="log")
+    axes[0, 0].set_xlim(wavelength.min(), wavelength.max())
+    return figures.encode(figure)
+
+
+POINTS = 3  # at most, drawn
+LEAST = 1e-4  # of the largest; below, rounding at what is zero by symmetry
+
+
+def add(results: Results, section: Section, names: list[str]) -> None:
+    """Add the curves of response.h5, by momentum and by the free rim, if it has them."""
+    name = "response.h5"
+    frequency, found = (
+        results.optional(name, f"transmissibility/{part}") for part in ("frequency", "momentum")
+    )
+    if frequency is None or found is None or not len(frequency):
+        return
+    other = results.optional(name, "transmissibility/free_rim")
+    dashed = "" if other is None else "; dashed: by modes of a tire with a free rim"
+    section.show(
+        transmissibilities(frequency, found, other, names),
+        f"Force on the axle per force at the point, by momentum{dashed}.",
+    )
+    turning, held = (
+        results.optional(name, f"transmissibility/{part}") for part in ("moment", "free_rim_moment")
+    )
+    if turning is not None:
+        section.show(
+            transmissibilities(frequency, turning, held, names, "dB re 1 N m/N"),
+            "Moment on the axle, about its centre, per force at the point.",
+        )
+    for what, one, by_momentum in (("force", other, found), ("moment", held, turning)):
+        if one is not None and by_momentum is not None:
+            apart = np.linalg.norm(one - by_momentum) / np.linalg.norm(by_momentum)
+            fact = f"axle {what} by the free rim off that by momentum"
+            section.facts.append((fact, quantity(100 * float(apart), "%")))
+
+
+@styled
+def transmissibilities(
+    frequency: NDArray,
+    found: NDArray,
+    other: NDArray | None,
+    names: list[str],
+    reference: str = "dB re 1 N/N",
+) -> str:
+    """Magnitudes of (f, 3, k) in dB re `reference`, one row per point."""
+    rows = min(found.shape[2], POINTS)
+    figure, axes = canvas(WIDE, 2.4 * rows + 0.4, rows, sharex=True)
+    floor = LEAST * np.abs(found).max()
+    for point in range(rows):
+        here = axes[point, 0]
+        for column, component in enumerate(COMPONENTS):
+            for values, dashes in ((found, "-"), (other, "--")):
+                if values is None or np.abs(found[:, column, point]).max() < floor:
+                    continue
+                level = 20 * np.log10(np.maximum(np.abs(values[:, column, point]), floor))
+                label = component if dashes == "-" else None
+                here.plot(frequency, level, dashes, color=COLOURS[column], label=label)
+        here.set(title=names[point], ylabel=reference)
+        if here.lines:
+            here.legend(ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.12), borderaxespad=0.0)
+        else:
+            here.set_yticks([])
+            here.text(0.5, 0.5, "none, by symmetry", ha="center", transform=here.transAxes)
+    axes[-1, 0].set_xlabel("frequency in Hz")
+    return encode(figure)
+
 
 SAMPLED = 400  # instants read of a (time, point) dataset: it may be larger than memory
 AT_ONCE = 2e8  # bytes
@@ -40,9 +231,9 @@ def contact(results: Results) -> Section:
     if len(time) == 1:
         return section
     section.notes += [note] if (note := realism.mean_load(results)) else []
-    corner.wheel(results, section, time)
-    pattern.tread(results, section)
-    road.texture(results, section)
+    wheel(results, section, time)
+    tread(results, section)
+    texture(results, section)
     points, normal = results.array(name, "points"), results.dataset(name, "normal_force")
     stride = max(1, -(-len(time) // SAMPLED))
     picture = surface_figures.space_time(time[::stride], points, sampled(normal, stride))
@@ -150,7 +341,7 @@ def response(results: Results) -> Section:
         )
         section.show(picture, "Receptance: displacement at i along its force per N at j.", drawn)
     driven = len(results.scene.get("force", []))
-    transmissibility.add(results, section, point_names(results.scene, driven))
+    add(results, section, point_names(results.scene, driven))
     if not section.figures:
         raise Absent(f"{name} holds neither displacement over time nor receptance")
     return section

@@ -7,9 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.runs.files.read import Results, Section, Table
 from tireroad.runs.report.figures import COLOURS, MUTED, canvas, encode, styled
-from tireroad.runs.report.quantities import quantity
+from tireroad.runs.report.read import Results, Section, Table, quantity
 
 _FILE = "stiffness.h5"
 _FACTS = (

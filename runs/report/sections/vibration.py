@@ -4,7 +4,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.contact.results.spectra import nominal
-from tireroad.runs.files.read import Results, Section
 from tireroad.runs.report import live
 from tireroad.runs.report.figures import (
     COLOURS,
@@ -15,6 +14,7 @@ from tireroad.runs.report.figures import (
     line_canvas,
     styled,
 )
+from tireroad.runs.report.read import Results, Section
 
 
 def vibration(results: Results) -> Section:

@@ -4,7 +4,7 @@ import shutil
 from pathlib import Path
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.process.memory import available_memory
+from tireroad.runs.process.surroundings import available_memory
 from tireroad.runs.scene.extent.estimate import FACTOR, FOOTPRINT, KEYS, Estimate
 from tireroad.runs.scene.extent.static_state import DAMPING, FRICTION, LOAD_ERROR
 

@@ -18,7 +18,7 @@ from mpi4py import MPI
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.runs.files.disk import write_text
-from tireroad.runs.files.summary import Summary
+from tireroad.runs.files.folder import Summary
 from tireroad.runs.process.signals import Stopped
 
 VARIABLE = "TIREROAD_FAILURES"

@@ -15,8 +15,7 @@ from tireroad.contact.loop import Instant
 from tireroad.contact.results.chatter import Chosen
 from tireroad.contact.setup import ContactSetup
 from tireroad.runs.files import packed, store
-from tireroad.runs.files.checksum import seal
-from tireroad.runs.files.disk import part_of, replacing
+from tireroad.runs.files.disk import part_of, replacing, seal
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.stages.base.job import Job

@@ -16,10 +16,9 @@ from tireroad.fem.timing import by_processor
 from tireroad.runs.files.cache import Cache
 from tireroad.runs.process import observe
 from tireroad.runs.scene.extent.estimate import estimate
-from tireroad.runs.search.journal import Journal, Trial
+from tireroad.runs.search.journal import Journal, Trial, worst
 from tireroad.runs.search.search import Search, seconds
 from tireroad.runs.search.settings import Ladders, Settings, applied
-from tireroad.runs.search.shares import worst
 from tireroad.runs.stages.build.rolling.run_in import run_in
 from tireroad.runs.validation.tables import Table
 from tireroad.tests.bench.parts.kept import Records, every_case

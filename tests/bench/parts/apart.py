@@ -14,7 +14,7 @@ from typing import Any
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.runs.process import mpi, observe, signals
-from tireroad.runs.process.statuses import BUG, DONE
+from tireroad.runs.process.signals import BUG, DONE
 
 
 def apart(task: Callable[..., Any], *given: Any) -> Any:

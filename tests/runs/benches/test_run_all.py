@@ -7,8 +7,7 @@ import pytest
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.process.mpi import judged
-from tireroad.runs.process.signals import Stopped
-from tireroad.runs.process.statuses import STOPPED
+from tireroad.runs.process.signals import STOPPED, Stopped
 from tireroad.runs.validation import tables
 from tireroad.runs.validation.tables import Table
 

@@ -8,9 +8,8 @@ import h5py
 import numpy as np
 import pytest
 
-from tireroad.runs.files.checksum import signed
-from tireroad.runs.files.disk import write_text
-from tireroad.runs.files.summary import Summary
+from tireroad.runs.files.disk import signed, write_text
+from tireroad.runs.files.folder import Summary
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.search.journal import Journal, Trial
 from tireroad.runs.search.settings import Ladders, applied

@@ -16,13 +16,10 @@ from tireroad.runs.process.signals import Stopped
 from tireroad.runs.scene.extent.estimate import estimate
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.sections.kinds import torus
-from tireroad.runs.search import planning
 from tireroad.runs.search import search as searching
-from tireroad.runs.search.journal import Journal, Trial
-from tireroad.runs.search.kept import to_resume
+from tireroad.runs.search.journal import Found, Journal, Trial, to_resume, worst
 from tireroad.runs.search.search import Search
 from tireroad.runs.search.settings import CAUSES, MARGIN, Ladders, Settings, applied, size_ratio
-from tireroad.runs.search.shares import Found, worst
 
 AT_FIRST = {"step": 0.04, "points": 0.2, "modes": 0.06, "mesh": 0.3}
 
@@ -236,15 +233,15 @@ def test_no_rung_is_climbed_that_the_target_is_clearly_met_without(file, errors)
     history = dict(zip(CAUSES, errors, strict=True))
     found = Found(history, dict.fromkeys(CAUSES, 0.0), (), dict.fromkeys(CAUSES, ()))
     trial = Trial(first, estimate(applied(scene, first)).work, 1.0, found, "linear")
-    now = planning.planned(ladders, trial, 1)
+    now = searching.planned(ladders, trial, 1)
 
     def predicted(settings: Settings) -> float:
         rates = orders(first.order)
         ends = [e * size_ratio(c, first, settings) ** rates[c] for c, e in history.items()]
         return float(np.linalg.norm(ends)) / 0.15
 
-    assert predicted(now) <= planning.AIM < predicted(first)
+    assert predicted(now) <= searching.AIM < predicted(first)
     for cause, rung in now.rungs.items():
         if rung:
             lower = ladders.at(now.rungs | {cause: rung - 1})
-            assert predicted(lower) > planning._CLEAR * planning.AIM, cause
+            assert predicted(lower) > searching._CLEAR * searching.AIM, cause

@@ -12,11 +12,10 @@ from tireroad.runs.files.disk import Refused
 from tireroad.runs.process import observe
 from tireroad.runs.scene.check import explain
 from tireroad.runs.scene.load import load
-from tireroad.runs.search import search as searching
-from tireroad.runs.search.journal import Journal
+from tireroad.runs.search import search
+from tireroad.runs.search.journal import Found, Journal, worst
 from tireroad.runs.search.search import Search
 from tireroad.runs.search.settings import CAUSES, Ladders
-from tireroad.runs.search.shares import Found, worst
 
 
 @pytest.fixture
@@ -32,7 +31,7 @@ def test_what_is_no_fault_of_the_settings_ends_the_search_and_is_not_kept(file, 
     def failing(*args, **options):
         raise raised
 
-    monkeypatch.setattr(searching, "run_scene", failing)
+    monkeypatch.setattr(search, "run_scene", failing)
     out = file.parent / "out"
     out.mkdir()
     for raised in (InputError("0.02 GB of disk"), Refused("the disk is full")):

@@ -13,7 +13,7 @@ from started import environment
 
 import tireroad
 from tireroad.fem.errors import ConvergenceError, InputError
-from tireroad.runs.sweep.queue import Queue, _directives, _environment
+from tireroad.runs.sweep.local import Queue, _directives, _environment
 
 pytestmark = pytest.mark.slow
 

@@ -5,8 +5,7 @@ import pytest
 from scipy import stats
 
 from tireroad.runs.sweep.gather import Column, Gathered
-from tireroad.runs.sweep.levels import levels
-from tireroad.runs.sweep.page import TOTAL, _chosen, _figures, write_page
+from tireroad.runs.sweep.page import TOTAL, _chosen, _figures, levels, write_page
 
 LOUD = np.array([[0.0, 10.0], [1.0, 12.0], [-1.0, 11.0], [0.5, 10.5]])
 

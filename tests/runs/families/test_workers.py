@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 from tireroad.runs.sweep import local
-from tireroad.runs.sweep.members import Member
+from tireroad.runs.sweep.definition import Member
 
 STAND_IN = """
 import json, os, pathlib, signal, sys

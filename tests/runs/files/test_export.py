@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from synthetic_results import sealed, write_results
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.files.export import MADE, export
-from tireroad.runs.files.xdmf import INSTANTS, SHAPES
+from tireroad.runs.files.export import INSTANTS, MADE, SHAPES, export
 
 CSV = {
     "footprint.csv",

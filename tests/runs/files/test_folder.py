@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.files.checksum import signed
-from tireroad.runs.files.folder import check_kept_scene, check_owner, claimed
-from tireroad.runs.files.summary import Summary
+from tireroad.runs.files.disk import signed
+from tireroad.runs.files.folder import Summary, check_kept_scene, check_owner, claimed
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.resolved import dumps
 

@@ -15,10 +15,9 @@ from synthetic_scene import SCENE
 
 import tireroad
 from tireroad.fem.errors import ConvergenceError
-from tireroad.runs.files.checksum import signed
+from tireroad.runs.files.disk import signed
 from tireroad.runs.files.export import export
-from tireroad.runs.files.present import left_out, remarks
-from tireroad.runs.files.summary import Summary
+from tireroad.runs.files.folder import Summary, left_out, remarks
 from tireroad.runs.report.compare import compare
 from tireroad.runs.report.page import render
 from tireroad.runs.stages.base import failed

@@ -11,7 +11,7 @@ import pytest
 
 import tireroad
 from tireroad.fem.errors import InputError
-from tireroad.runs.files.checksum import signed, signed_table
+from tireroad.runs.files.disk import signed, signed_table
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.files import checksum, identity
+from tireroad.runs.files import disk, identity
 from tireroad.runs.files.disk import write_text
 from tireroad.runs.files.store import (
     Provenance,
@@ -206,15 +206,15 @@ def test_what_is_no_result_is_not_used(tmp_path: Path) -> None:
 
 
 def test_signed_texts_tell_a_change() -> None:
-    text = checksum.signed("load = 300.0\n# [road] absent\n")
-    assert checksum.is_as_signed(text)
-    assert not checksum.is_as_signed(text.replace("300", "700"))
-    assert not any(checksum.is_as_signed(text[:end]) for end in range(len(text) - 1)), "cut short"
-    table = checksum.signed_table({"stages": {"static": {"seconds": 1.5}}})
+    text = disk.signed("load = 300.0\n# [road] absent\n")
+    assert disk.is_as_signed(text)
+    assert not disk.is_as_signed(text.replace("300", "700"))
+    assert not any(disk.is_as_signed(text[:end]) for end in range(len(text) - 1)), "cut short"
+    table = disk.signed_table({"stages": {"static": {"seconds": 1.5}}})
     read = json.loads(json.dumps(table))
-    assert checksum.is_table_as_signed(read)
+    assert disk.is_table_as_signed(read)
     read["stages"]["static"]["seconds"] = 1.25
-    assert not checksum.is_table_as_signed(read)
+    assert not disk.is_table_as_signed(read)
 
 
 def test_libraries_in_a_wheel_have_its_version(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -137,7 +137,7 @@ def test_more_processes_than_the_cores_serve_are_warned_of(
 
 
 def test_folder_of_another_scene_is_left_alone(launch, scene: Path, tmp_path: Path) -> None:
-    from tireroad.runs.files.summary import Summary
+    from tireroad.runs.files.folder import Summary
 
     Summary(tmp_path, "other", 1).record("static", "computed")
     before = (tmp_path / "summary.json").read_bytes()

@@ -12,7 +12,7 @@ from started import environment
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.runs import cli
 from tireroad.runs.process import mpi, signals
-from tireroad.runs.process.statuses import STOPPED
+from tireroad.runs.process.signals import STOPPED
 
 CASE = """
 import sys, time

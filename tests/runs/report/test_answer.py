@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 from synthetic_results import sealed, write_results
 
-from tireroad.runs.files.read import Results
-from tireroad.runs.report.answer import answer
-from tireroad.runs.report.quantities import quantity
+from tireroad.runs.report.page import answer
+from tireroad.runs.report.read import Results, quantity
 
 
 def test_a_constant_force_has_no_level(tmp_path: Path) -> None:

@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.files.checksum import signed
+from tireroad.runs.files.disk import signed
 from tireroad.runs.files.reader import RunResults
-from tireroad.runs.report.compare import _change, compare
-from tireroad.runs.report.differences import Row, assurance, level_rows, scene_rows
+from tireroad.runs.report.compare import Row, _change, assurance, compare, level_rows, scene_rows
 
 
 def write(folder: Path, load: float, level: float, frequencies: list[float], turn: bool) -> Path:

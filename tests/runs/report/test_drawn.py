@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from tireroad.runs.report import drawn
-from tireroad.runs.report.drawn import once
+from tireroad.runs.report import surface_figures
+from tireroad.runs.report.surface_figures import once
 
 
 def test_the_same_arguments_are_drawn_once_and_others_anew() -> None:
@@ -22,8 +22,10 @@ def test_the_same_arguments_are_drawn_once_and_others_anew() -> None:
         draw(*other)
     draw(points, ["a", "b"], height=1.0)
     assert len(calls) == 5
-    for k in range(drawn.MOST):
+    for k in range(surface_figures.MOST):
         draw(points, ["a", "b"], height=float(k))
-    assert len(drawn._drawn) == drawn.MOST
+    assert len(surface_figures._drawn) == surface_figures.MOST
     draw(points, ["a", "b"])
-    assert len(calls) == 5 + drawn.MOST  # height 1.0 was there, the first picture had gone
+    assert (
+        len(calls) == 5 + surface_figures.MOST
+    )  # height 1.0 was there, the first picture had gone

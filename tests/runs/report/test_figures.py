@@ -8,9 +8,9 @@ import pytest
 from matplotlib import image
 from synthetic_results import lattice
 
-from tireroad.runs.report import figures, surface_figures, thinned
-from tireroad.runs.report.quantities import bounded, quantity
-from tireroad.runs.report.verdicts import verdict
+from tireroad.runs.report import figures, surface_figures
+from tireroad.runs.report.page import verdict
+from tireroad.runs.report.read import bounded, quantity
 
 
 @pytest.mark.parametrize(
@@ -41,8 +41,8 @@ def test_quantities(value: object, unit: str, text: str) -> None:
 def test_the_envelope_keeps_a_peak_of_one_sample() -> None:
     y = np.zeros(100_003)
     y[[12_345, 100_002]] = 5.0, -3.0
-    x, drawn = thinned.envelope(np.arange(y.size), y)
-    assert drawn.size < 3 * thinned.DRAWN
+    x, drawn = figures.envelope(np.arange(y.size), y)
+    assert drawn.size < 3 * figures.DRAWN
     assert (x[drawn.argmax()], x[drawn.argmin()]) == (12_345, 100_002)
     assert (np.diff(x) >= 0).all()
 
@@ -51,7 +51,7 @@ def test_a_spectrum_keeps_its_highest_line() -> None:
     frequency = np.arange(1.0, 50_001.0)
     level = np.full(frequency.size, -40.0)
     level[33_333] = 12.0
-    drawn, kept = thinned.peak_hold(frequency, level)
+    drawn, kept = figures.peak_hold(frequency, level)
     assert kept.max() == 12.0
     assert drawn[kept.argmax()] == pytest.approx(33_334.0, rel=0.03)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from synthetic_results import put, sealed, write_results
 
-from tireroad.runs.files.read import Results
+from tireroad.runs.report.read import Results
 from tireroad.runs.report.realism import mean_load, unusual
 
 PASSENGER = {"load": 4000.0, "deflection": 0.020, "inflation": 2.2e5, "mass": 9.3}

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from written_page import page
 
-from tireroad.runs.report.sections import search
-from tireroad.runs.search.journal import Trial
+from tireroad.runs.report.sections import spectra
+from tireroad.runs.search.journal import Found, Trial
 from tireroad.runs.search.settings import CAUSES, Settings
-from tireroad.runs.search.shares import Found
 
 
 @pytest.mark.long
@@ -43,7 +42,7 @@ def test_a_search_is_drawn_by_cost_and_error(
         file.write("[accuracy]\ntarget = 0.1\nup_to = 100.0\n")
     drawn = []
     monkeypatch.setattr(
-        search, "trade", lambda *given: drawn.append(given) or "data:image/png;base64,"
+        spectra, "trade", lambda *given: drawn.append(given) or "data:image/png;base64,"
     )
     text = page(results)
     assert "10 % of the axle force up to 100 Hz" in text
@@ -52,6 +51,6 @@ def test_a_search_is_drawn_by_cost_and_error(
     assert error == pytest.approx([0.8, np.hypot(3.0, 0.4 * 3**0.5)])
     assert causes.shape == (2, 4) and causes[1, CAUSES.index("mesh")] == pytest.approx(3.0)
     monkeypatch.undo()
-    assert search.trade(cost, error, causes).startswith("data:image/svg")
+    assert spectra.trade(cost, error, causes).startswith("data:image/svg")
     (results / "search.json").write_text("{")
     assert "The search:" not in page(results)

@@ -16,7 +16,7 @@ ON_DISK = """
 from pathlib import Path
 import numpy as np
 from scipy import sparse
-from tireroad.runs.process.memory import factors_on_disk
+from tireroad.runs.process.surroundings import factors_on_disk
 from tireroad.modal.solver.slicing import Shifted
 folder = Path({folder!r}) / "factors"
 folder.mkdir()

@@ -6,8 +6,7 @@ import pytest
 from mpi4py import MPI
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.files.read import Results
-from tireroad.runs.report.quantities import quantity
+from tireroad.runs.report.read import Results, quantity
 from tireroad.runs.report.sections.tire import friction
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.pipeline import run_scene
