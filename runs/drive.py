@@ -23,7 +23,7 @@ from tireroad.fem.static.footprint import Footprint
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.runs.library import RollingTire
-from tireroad.runs.scene.rules.scene import barred_from_contact
+from tireroad.runs.scene.rules import barred_from_contact
 from tireroad.runs.stages.build.rolling.loop import make_loop
 from tireroad.runs.stages.build.rolling.run_in import grown
 from tireroad.runs.typed import typed

@@ -138,7 +138,6 @@ TO_UNTIE = {
 TO_MERGE = {
     "contact/results/relief.py",
     "fem/static/diagnosis.py",
-    "runs/scene/rules/full.py",
     "runs/stages/build/rolling/watch.py",
     "runs/stages/build/shared_road.py",
     "runs/stages/parts.py",

@@ -27,9 +27,8 @@ from tireroad.runs.report.read import Absent, Results, Section, bounded, digits,
 from tireroad.runs.report.realism import unusual
 from tireroad.runs.report.sections import forces, rotating, spectra, stiffness, tire, vibration
 from tireroad.runs.scene.plan import STAGES
-from tireroad.runs.scene.schema import key_of, table_of
+from tireroad.runs.scene.schema import every_field, key_of, table_of
 from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.scene.walk import every_field
 from tireroad.runs.version import PROGRAM
 
 Fact = tuple[str, str]

@@ -4,14 +4,12 @@ from pathlib import Path
 from typing import Any
 
 from tireroad.runs.process.surroundings import crowded
-from tireroad.runs.scene.extent.demand import check_demand, duration, memory_of, out_of_core
-from tireroad.runs.scene.extent.estimate import estimate
+from tireroad.runs.scene.estimate import check_demand, duration, estimate, memory_of, out_of_core
 from tireroad.runs.scene.plan import STAGES, meets_road, skipped
 from tireroad.runs.scene.resolved import literal
-from tireroad.runs.scene.rules.road import check_road, remarks
-from tireroad.runs.scene.schema import key_of, table_of
+from tireroad.runs.scene.road_rules import check_road, remarks
+from tireroad.runs.scene.schema import applies, entries, key_of, table_of
 from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.scene.walk import applies, entries
 from tireroad.runs.search.settings import Ladders, applied, bounds
 
 Row = tuple[str, str, str, str, str]

@@ -1,4 +1,13 @@
-"""Reads a scene from TOML, checks it completely and fills in every default.
+"""A scene before its checks: the text of its file, and single keys overridden by --set.
+
+Drops keys of the file that are of no use to a variant chosen by --set.
+
+A scene with `kind = "sine"` has the sine's keys. With `--set road.kind=flat` these would be errors,
+and every one of them would have to be removed on the command line too.
+
+Defaults of a scene that follow from other tables than their own.
+
+Reads a scene from TOML, checks it completely and fills in every default.
 
 `load` returns a `Scene` whose values have their types, lie in their ranges and do not contradict
 each other, or raises one InputError that lists all problems: the key, its place and the remedy.
@@ -7,23 +16,225 @@ each other, or raises one InputError that lists all problems: the key, its place
 import difflib
 import re
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence, Set
 from dataclasses import Field, fields, replace
 from pathlib import Path
 from typing import Any
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Key, ParameterError, described
-from tireroad.runs.scene import derived
-from tireroad.runs.scene.chosen import drop_unused
-from tireroad.runs.scene.plan import meets_road
-from tireroad.runs.scene.raw import override, read_text
-from tireroad.runs.scene.rules import scene as rules
-from tireroad.runs.scene.schema import Table, fields_of, gathered, key_of, table_of, variant_of
-from tireroad.runs.scene.source import Source, shortened
-from tireroad.runs.scene.tables.cavity import filled
-from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.scene.walk import applies, every_field, names, owners
+from tireroad.runs.scene import rules
+from tireroad.runs.scene.plan import meets_road, skipped
+from tireroad.runs.scene.resolved import literal
+from tireroad.runs.scene.schema import (
+    Table,
+    applies,
+    every_field,
+    fields_of,
+    gathered,
+    key_of,
+    names,
+    owners,
+    table_of,
+    variant_of,
+)
+from tireroad.runs.scene.sections.kind import SECTIONS
+from tireroad.runs.scene.source import Path_, Source, parts, shortened
+from tireroad.runs.scene.tables.scene import Damping, Modal, Road, Scene
+from tireroad.runs.scene.tables.tire import filled
+
+LARGEST = 1_000_000
+
+
+def read_text(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            data = file.read(LARGEST + 1)
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such scene file") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    if len(data) > LARGEST:
+        raise InputError(f"{path}: not a scene: more than {LARGEST / 1e6:g} MB")
+    try:
+        return data.decode("utf-8").removeprefix("\ufeff")
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        raise InputError(f"{path}, line {line}: not UTF-8 text") from None
+
+
+def _value(text: str) -> Any:
+    """A value of --set: parsed as TOML if possible, else the text itself."""
+    try:
+        read = tomllib.loads(f"value = {text}")
+    except tomllib.TOMLDecodeError:
+        return text
+    return read["value"] if len(read) == 1 else text
+
+
+def override(raw: dict[str, Any], item: str) -> tuple[str, ...]:
+    """Apply one `table.key=value`; an empty value removes the key. Returns the key's path."""
+    dotted, equals, value = item.partition("=")
+    path = parts(dotted)
+    if not equals or not all(path):
+        raise InputError(f"--set {item[:80]}: must be table.key=value, e.g. static.load=400")
+    here: Any = raw
+    at: Any  # a key of a table, or a number in an array of tables
+    for depth, part in enumerate(path):
+        last, at = depth == len(path) - 1, part
+        if isinstance(here, list):
+            if not part.isdigit() or int(part) >= len(here):
+                name = ".".join(path[:depth])
+                raise InputError(f"--set {dotted}: {name} has the numbers 0 to {len(here) - 1}")
+            at = int(part)
+        elif not isinstance(here, dict):
+            raise InputError(f"--set {dotted}: {'.'.join(path[:depth])} is not a table")
+        if not last:
+            here = here[at] if isinstance(here, list) else here.setdefault(part, {})
+        elif value.strip():
+            here[at] = _value(value.strip())
+        elif isinstance(here, list):
+            del here[at]
+        else:
+            here.pop(part, None)
+    return path
+
+
+def drop_unused(
+    of: type, raw: Any, changed: Set[Path_], say: Callable[[str], object], path: Path_ = ()
+) -> None:
+    """Remove from `raw`, a table of dataclass `of`, what a variant chosen by --set does not use.
+
+    `changed`: paths given by --set; their keys are kept, for the checks to refuse. `say` gets a
+    line for each variant that lost keys.
+    """
+    if not isinstance(raw, dict):
+        return
+    for selector, kind, unused in _selected(of, raw):
+        lost = [one for one in unused if one in raw and not _given((*path, one), changed)]
+        if lost and (*path, selector) in changed:
+            for name in lost:
+                del raw[name]
+            listed = ", ".join(shortened((*path, name)) for name in lost)
+            verb = "is" if len(lost) == 1 else "are"
+            say(f"{listed} {verb} not used with {selector} = {literal(kind)}, which --set chose")
+    for name, item in every_field(of).items():
+        table, inner = table_of(item), raw.get(name)
+        if table is None:
+            continue
+        many = enumerate(inner) if isinstance(inner, list) else ()
+        drop_unused(table.of, inner, changed, say, (*path, name))
+        for number, one in many:
+            drop_unused(table.of, one, changed, say, (*path, name, str(number)))
+
+
+def _selected(of: type, raw: dict[str, Any]) -> Iterator[tuple[str, str, list[str]]]:
+    """(selecting key, its value, keys of a table that this value does not use)."""
+    defaults = {item.name: item.default for item in fields(of)}
+    unused: dict[str, list[str]] = {}
+    for item in fields_of(of):
+        part, key = variant_of(item), key_of(item)
+        if part is not None:
+            kind = raw.get(part.selector, defaults[part.selector])
+            if isinstance(kind, str) and kind in part.registry:
+                law = part.registry[kind]
+                own = {*names(of), *names(law)}
+                others = [name for name in raw if name not in own and part.registry.owners(name)]
+                yield part.selector, kind, [*others, *getattr(law, "without", ())]
+        elif key is not None and key.only_for is not None:
+            selector, kinds = key.only_for
+            if raw.get(selector, defaults[selector]) not in kinds:
+                unused.setdefault(selector, []).append(item.name)
+    for selector, lost in unused.items():
+        yield selector, raw.get(selector, defaults[selector]), lost
+
+
+def _given(path: Path_, changed: Set[Path_]) -> bool:
+    """Whether --set gave a key, a part of it, or the table that holds it."""
+    return any(path[: len(one)] == one or one[: len(path)] == path for one in changed)
+
+
+Say = Callable[[str], object]
+
+
+def by_section(raw: dict[str, Any]) -> None:
+    """Set what follows from the kind of section: a mesh's section, a section's tread."""
+    tire, contact = raw.get("tire"), raw.get("contact")
+    if not isinstance(tire, dict):
+        return
+    if "mesh" in tire:
+        tire.setdefault("section", "file")
+    kind = tire.get("section")
+    if isinstance(contact, dict) and isinstance(kind, str) and kind in SECTIONS:
+        contact.setdefault("tread", SECTIONS[kind].tread_law)
+
+
+def with_speed(scene: Scene) -> Scene:
+    """Set the wheel's speed for a travel speed until the static state gives its rolling radius."""
+    rotation = scene.rotation
+    if rotation is None or rotation.travel_speed is None:
+        return scene
+    speed = rotation.travel_speed / (
+        rotation.rolling_radius or scene.tire.proportions().outer_radius
+    )
+    return replace(scene, rotation=replace(rotation, speed=speed))
+
+
+def with_damping(scene: Scene) -> Scene:
+    """Set the default proportional damping if neither it nor a compound's loss factor is given."""
+    loses = scene.tire.shape.has_losses(scene.tire)
+    return replace(scene, damping=Damping()) if scene.damping is None and not loses else scene
+
+
+def with_road(scene: Scene, say: Say) -> Scene:
+    """Set a flat road where there is contact with none given."""
+    if scene.contact is None or scene.road is not None:
+        return scene
+    say("no [road]: it is flat")
+    return replace(scene, road=Road())
+
+
+def with_outputs(scene: Scene, say: Say) -> Scene:
+    """Leave out what is asked of driven points where there are none."""
+    kept = tuple(one for one in scene.output.kinds if scene.force or one[1].of != "points")
+    if len(kept) == len(scene.output.kinds):
+        return scene
+    lost = [f"output.{name}" for name, kind in scene.output.kinds if (name, kind) not in kept]
+    say(f"no [[force]], hence no driven points: {', '.join(lost)} left out")
+    return replace(scene, output=replace(scene.output, kinds=kept))
+
+
+def with_modal(scene: Scene, until: str | None) -> Scene:
+    """Set the default [modal] where something needs modes, or the run is to end with them."""
+    needed = scene.contact, scene.force, scene.rotation, scene.axle.kind != "fixed"
+    if scene.modal is None and (any(needed) or until in ("modes", "rotating")):
+        return replace(scene, modal=Modal())
+    return scene
+
+
+def with_count(
+    scene: Scene, raw: dict[str, Any], until: str | None, source: Source, say: Say
+) -> Scene:
+    """Fit the default number of modes to the mesh; note a given one that the mesh does not have.
+
+    A given number is judged only if the modes will be computed.
+    """
+    modal = scene.modal
+    if modal is None or modal.up_to is not None:
+        return scene
+    count, free = modal.count, scene.tire.free_unknowns()
+    if count < free:
+        return scene
+    if "count" not in raw.get("modal", {}):
+        say(
+            f"modal.count is {free - 1}, all the modes that the mesh has, not {count} as by default"
+        )
+        return replace(scene, modal=replace(modal, count=free - 1))
+    if "modes" not in skipped(scene, until):
+        text = f"= {count} must be less than the {free} free unknowns of the mesh"
+        source.add(("modal", "count"), text)
+    return scene
+
 
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,99}")
 
@@ -53,7 +264,7 @@ def load(
     source = Source(path, text, changed, unread=unread)
     raw.setdefault("name", re.sub(r"[^A-Za-z0-9._-]", "-", path.stem).lstrip(".-") or "scene")
     drop_unused(Scene, raw, changed, say)
-    derived.by_section(raw)
+    by_section(raw)
     scene = _table(Scene, raw, (), source)
     if not NAME.fullmatch(scene.name):
         source.add(
@@ -64,11 +275,11 @@ def load(
     if "tire" not in source.broken():
         scene.tire.shape.check(scene.tire, source)
     if "tire" not in source.broken():
-        scene = derived.with_speed(derived.with_damping(scene))
-    scene = derived.with_outputs(derived.with_road(scene, say), say)
-    scene = derived.with_modal(scene, until)
+        scene = with_speed(with_damping(scene))
+    scene = with_outputs(with_road(scene, say), say)
+    scene = with_modal(scene, until)
     if not source.broken() & {"tire", "modal"}:
-        scene = derived.with_count(scene, raw, until, source, say)
+        scene = with_count(scene, raw, until, source, say)
     rules.check(scene, raw, source)
     source.refuse()
     return scene

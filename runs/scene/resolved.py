@@ -5,9 +5,8 @@ from math import isfinite
 from typing import Any
 
 from tireroad.fem.parameters import Key
-from tireroad.runs.scene.schema import Pitch, key_of, table_of
+from tireroad.runs.scene.schema import Pitch, applies, entries, key_of, table_of
 from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.scene.walk import applies, entries
 from tireroad.runs.version import PROGRAM, RESULT_FORMAT, VERSION
 
 MARK = f"# {PROGRAM} "

@@ -27,7 +27,7 @@ from tireroad.runs.files.disk import signed, write_text
 from tireroad.runs.files.folder import CHOSEN, make_folder
 from tireroad.runs.files.identity import identity
 from tireroad.runs.scene.resolved import dumps
-from tireroad.runs.scene.tables.accuracy import Accuracy as Wanted
+from tireroad.runs.scene.tables.scene import Accuracy as Wanted
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.search.settings import Settings
 from tireroad.runs.stages.accuracy import Accuracy

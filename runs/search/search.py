@@ -29,8 +29,7 @@ from tireroad.runs.files.folder import CHOSEN
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.process.surroundings import available_memory
-from tireroad.runs.scene.extent.demand import DOUBTFUL
-from tireroad.runs.scene.extent.estimate import estimate
+from tireroad.runs.scene.estimate import DOUBTFUL, estimate
 from tireroad.runs.scene.plan import STAGES
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.tables.scene import Scene

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 
 from tireroad.contact.results.error_bars import CAUSES
 from tireroad.runs.scene.schema import Pitch
-from tireroad.runs.scene.tables.accuracy import Accuracy
-from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.scene.tables.scene import Accuracy, Scene
 
 FINER = 2**0.5  # factor per rung of modes; step and spacing of the points are halved
 # A grid of points that is no part of the next one places their errors anew: on cobblestones a radial

@@ -15,8 +15,8 @@ from tireroad.greens.responses import Wanted, band, judged, make_response, selec
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
-from tireroad.runs.scene.tables.cavity import has_air
 from tireroad.runs.scene.tables.scene import PointForce
+from tireroad.runs.scene.tables.tire import has_air
 from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.base.stage import Computed, Done
 from tireroad.runs.stages.build import cavity, corner

@@ -18,7 +18,7 @@ from tireroad.modal.standing import projected, solved, with_fields
 from tireroad.modal.waves import Labels, label
 from tireroad.runs.process import observe
 from tireroad.runs.process.surroundings import available_memory
-from tireroad.runs.scene.extent.estimate import estimate
+from tireroad.runs.scene.estimate import estimate
 from tireroad.runs.stages.base import kept
 from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.base.stage import Computed, Done, Shared

@@ -22,12 +22,18 @@ from tireroad.runs.files.folder import Summary, make_folder
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.process.surroundings import factors_on_disk, forget_peak, peak_memory
-from tireroad.runs.scene.derived import with_modal
-from tireroad.runs.scene.extent.demand import check_demand, duration, memory_of, out_of_core
-from tireroad.runs.scene.extent.estimate import Estimate, estimate
+from tireroad.runs.scene.estimate import (
+    Estimate,
+    check_demand,
+    duration,
+    estimate,
+    memory_of,
+    out_of_core,
+)
+from tireroad.runs.scene.load import with_modal
 from tireroad.runs.scene.plan import meets_road, skipped
 from tireroad.runs.scene.resolved import dumps
-from tireroad.runs.scene.rules.road import check_road
+from tireroad.runs.scene.road_rules import check_road
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.stages.base import failed
 from tireroad.runs.stages.base.job import Job

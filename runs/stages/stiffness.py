@@ -16,7 +16,7 @@ from tireroad.fem.static.load_steps import Loader
 from tireroad.fem.static.state import StaticState
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
-from tireroad.runs.scene.tables.stiffness import deflections
+from tireroad.runs.scene.tables.scene import deflections
 from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.base.stage import Computed, Done
 from tireroad.runs.stages.build import sliding

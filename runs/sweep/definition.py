@@ -40,8 +40,8 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import described, finite
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.resolved import literal
+from tireroad.runs.scene.schema import walk
 from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.scene.walk import walk
 
 MOST = 10_000
 PLANS = {

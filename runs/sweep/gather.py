@@ -18,9 +18,9 @@ from tireroad.fem.errors import InputError
 from tireroad.runs.files.disk import replacing
 from tireroad.runs.files.reader import RunResults
 from tireroad.runs.files.store import sealed
-from tireroad.runs.scene.derived import with_modal
-from tireroad.runs.scene.locate import parts
+from tireroad.runs.scene.load import with_modal
 from tireroad.runs.scene.resolved import dumps
+from tireroad.runs.scene.source import parts
 from tireroad.runs.search.journal import NAME, read_trials
 from tireroad.runs.search.settings import applied
 from tireroad.runs.sweep.definition import Member, Sweep

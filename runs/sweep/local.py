@@ -28,7 +28,7 @@ from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.runs.files.disk import write_text
 from tireroad.runs.process import observe
 from tireroad.runs.process.surroundings import available_memory
-from tireroad.runs.scene.extent.estimate import memory
+from tireroad.runs.scene.estimate import memory
 from tireroad.runs.stages.base import failed
 from tireroad.runs.sweep.definition import Member, Sweep
 

@@ -68,7 +68,7 @@ from tireroad.fem.static.virtual_work import AT_REST
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.mesh import INNER, TREAD
-from tireroad.runs.scene.tables.pattern import Groove
+from tireroad.runs.scene.tables.contact import Groove
 from tireroad.runs.validation.cases import oval_patch
 
 YOUNG, POISSON = 3.4e6, 0.49

@@ -14,7 +14,7 @@ from tireroad.contact.roads.kind import RoadKind
 from tireroad.contact.roads.kinds.laser import LaserFile
 from tireroad.contact.roads.kinds.measured import GridFile
 from tireroad.fem.errors import InputError
-from tireroad.runs.scene.rules.road import made
+from tireroad.runs.scene.road_rules import made
 from tireroad.runs.stages.build.shared_road import share
 
 COMM = MPI.COMM_WORLD

@@ -24,9 +24,9 @@ from scene_makers import BASES, SIZES, needed, write_files
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.check import explain
 from tireroad.runs.scene.load import load
-from tireroad.runs.scene.rules.road import made
+from tireroad.runs.scene.road_rules import made
+from tireroad.runs.scene.schema import walk
 from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.scene.walk import walk
 
 
 def ends(name: str, key) -> Iterator[str]:

@@ -11,8 +11,8 @@ from matplotlib.image import imsave
 from tireroad.contact.roads.kind import ROADS
 from tireroad.contact.tread.law import TREADS
 from tireroad.fem.tire.law import MATERIALS
+from tireroad.runs.scene.schema import walk
 from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.scene.walk import walk
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "fem" / "decks"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "contact" / "roads"))

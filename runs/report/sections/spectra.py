@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tireroad.contact.results.spectra import FEW, SILENT, heard, nominal
 from tireroad.runs.report import figures, live
 from tireroad.runs.report.read import Results, Section, Table, quantity
-from tireroad.runs.scene.tables.accuracy import Accuracy
+from tireroad.runs.scene.tables.scene import Accuracy
 from tireroad.runs.search.journal import CAUSES, NAME, Trial, read_trials, worst
 from tireroad.runs.search.settings import MARGIN, aim
 

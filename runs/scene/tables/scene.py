@@ -1,20 +1,504 @@
-"""The tables of a scene, key by key, with units, ranges and defaults (contract: Scene)."""
+"""The table [static]: inflation, and the road by load, deflection or height.
 
+The table [modal]: which modes are extracted.
+
+The table [road]: placement, kind with the kind's keys, and motion.
+
+The table [axle]: support of the wheel, and incompatible settings.
+
+The table [accuracy]: error estimates, and the target of a search for settings.
+
+The table [stiffness]: load-deflection curve and stiffness, and what they need.
+
+The tables of a scene, key by key, with units, ranges and defaults (contract: Scene).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
-from tireroad.fem.parameters import choice, flag, integer, number, text, vector
+import numpy as np
+
+from tireroad.contact.roads.kind import ROADS, RoadKind
+from tireroad.contact.roads.placement import Placement
+from tireroad.contact.roads.under_tire import Motion
+from tireroad.fem.axle import DIRECTIONS, Axle
+from tireroad.fem.errors import InputError
+from tireroad.fem.parameters import Key, Limits, OnlyFor, described, finite, parameter, text
 from tireroad.runs.scene.outputs import OUTPUTS
 from tireroad.runs.scene.outputs import Output as PointOutput
-from tireroad.runs.scene.schema import Collects, collection, table, tables
-from tireroad.runs.scene.tables.accuracy import Accuracy
-from tireroad.runs.scene.tables.axle import AxleTable
-from tireroad.runs.scene.tables.contact import Contact, Time
-from tireroad.runs.scene.tables.modal import Modal
-from tireroad.runs.scene.tables.pattern import PatternTable
-from tireroad.runs.scene.tables.road import Road
-from tireroad.runs.scene.tables.static import Static
-from tireroad.runs.scene.tables.stiffness import Stiffness
+from tireroad.runs.scene.schema import (
+    Collects,
+    Variants,
+    choice,
+    collection,
+    flag,
+    integer,
+    number,
+    registered,
+    table,
+    tables,
+    variant,
+    vector,
+)
+from tireroad.runs.scene.tables.contact import Contact, PatternTable, Time
 from tireroad.runs.scene.tables.tire import Tire
+
+
+@dataclass(frozen=True)
+class Static:
+    inflation: float = number(
+        2.0e5, "Pa", "inflation pressure on the inner face", least=0, most=1e8
+    )
+    load: float | None = number(
+        None, "N", "vertical load of the tire on the road", least=1e-3, most=1e8
+    )
+    deflection: float | None = number(
+        None,
+        "m",
+        "deflection from the first touch of the inflated tire, instead of load",
+        least=1e-6,
+        most=10,
+    )
+    road_height: float | None = number(
+        None,
+        "m",
+        "z of the road under the axle, the axle at 0, instead of load",
+        least=-10,
+        most=-1e-3,
+    )
+    camber: float = number(
+        0.0,
+        "deg",
+        "inclination of the wheel on its road, load and deflection along the road's normal; > 0: its top leans to the "
+        "right (-y)",
+        least=-20,
+        most=20,
+    )
+    friction: float | None = number(
+        None,
+        "-",
+        "coefficient of Coulomb friction between tire and road in the static state; absent: none. A standing tire sticks "
+        "and slips as it is pressed on the road, a rolling one as its tread passes through the contact, with a wheel "
+        "that turns as it would roll freely without contact.slip and rotation.slip_angle",
+        least=0,
+        most=10,
+    )
+    friction_steps: int = integer(
+        10,
+        "steps in which a standing tire with friction is pressed on the road",
+        least=1,
+        most=1000,
+    )
+    steady_rolling: bool = flag(
+        True,
+        "include the inertia and material damping of the rolling shape; false: the state at rest",
+    )
+    error_estimate: bool = flag(
+        True,
+        "estimate the discretisation error of the load, by finer elements at the footprint, which also give its extent, "
+        "and by elements of another order everywhere",
+    )
+
+    @property
+    def on_road(self) -> bool:
+        """Whether there is a road."""
+        return (self.load, self.deflection, self.road_height) != (None, None, None)
+
+
+@dataclass(frozen=True)
+class Modal:
+    count: int = integer(500, "number of modes, from the lowest", least=1, most=100000)
+    up_to: float | None = number(
+        None, "Hz", "all modes below this frequency, instead of count", least=1e-3, most=1e6
+    )
+    rim: str = choice(
+        "fixed",
+        ("fixed", "free"),
+        "bead faces: fixed, or one massless rigid body that is free",
+    )
+    road: str = choice(
+        "forces",
+        ("forces", "held"),
+        "road in the modes: replaced by its static forces, or the touching nodes held in height",
+    )
+
+    @property
+    def on_axle_alone(self) -> bool:
+        """Whether the axle alone carries what acts on the tire: its rim is fixed, no other node is held."""
+        return (self.rim, self.road) == ("fixed", "forces")
+
+    @property
+    def asked(self) -> dict[str, Any]:
+        """`count` or `up_to` (Hz), whichever decides; the other is None."""
+        return {"count": None if self.up_to else self.count, "up_to": self.up_to}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Road(Variants, Placement):
+    """The road driven over; `surface` is the kind with its parameters."""
+
+    kind: str = registered(ROADS, "flat", "type of road")
+    surface: RoadKind = variant("kind", ROADS)
+    motion: Motion = table(Motion, "vertical motion of the whole road")
+
+    @property
+    def file(self) -> str | None:
+        """The file of a measured road, or None."""
+        return getattr(self.surface, "file", None)
+
+
+Where = Callable[[tuple[str, ...], str], InputError]
+Springs = tuple[float, ...] | tuple[tuple[float, ...], ...]
+_SPRINGS = Limits(least=-1e15, most=1e15)  # N/m, N m/rad and per unit of velocity
+_HELD = tuple(name for name in DIRECTIONS if name != "z")
+_MOVING: OnlyFor = ("kind", ("corner", "free"))
+_SPRUNG: OnlyFor = ("kind", ("corner",))
+
+
+def _entry(value: Any) -> float:
+    number = finite(value)
+    _SPRINGS.check(number, "")
+    return number
+
+
+def _springs(default: Springs, doc: str) -> Any:
+    """A key of six diagonal entries, or a whole 6 x 6 matrix."""
+
+    def read(value: Any) -> Springs:
+        whole = isinstance(value, list | tuple) and len(value) == 6
+        if not whole:
+            raise ValueError(f"must be 6 numbers, or 6 rows of 6, not {described(value)}")
+        if not any(isinstance(part, list | tuple) for part in value):
+            return tuple(_entry(part) for part in value)
+        rows = [part if isinstance(part, list | tuple) else () for part in value]
+        if any(len(row) != 6 for row in rows):
+            raise ValueError("must be 6 numbers, or 6 rows of 6")
+        return tuple(tuple(_entry(part) for part in row) for row in rows)
+
+    values = "6 numbers ≥ 0, or a symmetric matrix of 6 rows, each ≤ 1e+15"
+    key = Key(read=read, unit="N, m, s, rad", doc=doc, values=values, only_for=_SPRUNG)
+    return parameter(key, default)
+
+
+def _directions(default: tuple[str, ...], doc: str) -> Any:
+    def read(value: Any) -> tuple[str, ...]:
+        if not isinstance(value, list | tuple) or any(part not in DIRECTIONS for part in value):
+            raise ValueError(f"must be a list of {', '.join(DIRECTIONS)}, not {described(value)}")
+        return tuple(name for name in DIRECTIONS if name in value)
+
+    values = f"of {', '.join(DIRECTIONS)}"
+    return parameter(Key(read=read, doc=doc, values=values, only_for=_MOVING), default)
+
+
+@dataclass(frozen=True)
+class AxleTable:
+    kind: str = choice(
+        "fixed",
+        ("fixed", "corner", "free"),
+        "support of the wheel: held, on springs and dampers, or free under the constant static load",
+    )
+    wheel_mass: float = number(
+        15.0,
+        "kg",
+        "mass of rim, brake and all that moves with them, without the tire",
+        least=0.01,
+        most=1e6,
+        only_for=_MOVING,
+    )
+    wheel_inertia: tuple[float, float, float] = vector(
+        (0.4, 0.8, 0.4),
+        "kg m²",
+        "moments of inertia of the wheel about x, y (the axle) and z",
+        least=0,
+        most=1e6,
+    )
+    stiffness: Springs = _springs(
+        (0.0, 0.0, 25e3, 0.0, 0.0, 0.0),
+        "stiffness of the springs to the body along x, y, z (N/m) and about them (N m/rad)",
+    )
+    damping: Springs = _springs(
+        (0.0, 0.0, 2.4e3, 0.0, 0.0, 0.0),
+        "damping of the dampers parallel to the springs, N s/m and N m s/rad",
+    )
+    body_mass: float | None = number(
+        None,
+        "kg",
+        "mass of the car body on this corner, which moves up and down; absent: springs to the ground",
+        least=0.1,
+        most=1e8,
+        only_for=_SPRUNG,
+    )
+    locked: tuple[str, ...] = _directions(
+        _HELD,
+        "directions in which the wheel is held; about y (ry) it is its speed of rotation that is held",
+    )
+
+
+def axle_of(scene: Scene) -> Axle | None:
+    """The moving wheel; None if held. Raises InputError if it is no valid mechanical system."""
+    given = scene.axle
+    if given.kind == "fixed" or len(given.locked) == len(DIRECTIONS):
+        return None
+    none = (0.0,) * 6
+    free = given.kind == "free"
+    return Axle(
+        wheel_mass=given.wheel_mass,
+        wheel_inertia=given.wheel_inertia,
+        stiffness=np.array(none if free else given.stiffness),
+        damping=np.array(none if free else given.damping),
+        body_mass=None if free else given.body_mass,
+        locked=given.locked,
+    )
+
+
+def check_axle(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    """Raise an error for an unstable corner, and for settings incompatible with a moving wheel."""
+    given = scene.axle
+    if given.kind == "fixed":
+        return
+    try:
+        axle = axle_of(scene)
+    except InputError as problem:
+        raise error(("axle",), str(problem).removeprefix("axle: ")) from None
+    if axle is None:
+        return
+    if given.kind == "free" and any(k > 2 for k in axle.moving):
+        raise error(
+            ("axle", "locked"),
+            'must hold rx, ry and rz of kind = "free": nothing else keeps the wheel upright',
+        )
+    if given.kind == "corner":
+        _check_springs(axle, error)
+    _check_company(scene, axle, error)
+
+
+def _check_springs(axle: Axle, error: Where) -> None:
+    if axle.body_mass is not None and not axle.has_body:
+        raise error(("axle", "body_mass"), "has no part where z is locked: take it or the lock out")
+    for k in axle.moving:
+        if axle.stiffness[k, k] <= 0:
+            what = "carries the static load" if k == 2 else "keeps the wheel in place"
+            raise error(
+                ("axle", "stiffness"),
+                f"has no spring along {DIRECTIONS[k]}, and nothing else {what}: the corner is unstable. "
+                f'Give one, or lock {DIRECTIONS[k]}; kind = "free" is a wheel under a constant force',
+            )
+
+
+def _check_company(scene: Scene, axle: Axle, error: Where) -> None:
+    """Refuse what is available for a held wheel only."""
+    turns = scene.rotation is not None and scene.rotation.speed > 0
+    if scene.modes.rim == "free":
+        raise error(("modal", "rim"), '= "free" is a wheel without mass: [axle] needs "fixed"')
+    if scene.modes.road == "held":
+        raise error(
+            ("modal", "road"),
+            f'= "held" keeps the wheel of axle.kind = "{scene.axle.kind}" where it is: take modal.road = "forces", '
+            'or axle.kind = "fixed"',
+        )
+    if turns and scene.rotation.method == "full":
+        raise error(("rotation", "method"), '= "full" knows no [axle] that moves: take "projected"')
+    if turns and scene.rotation.inertia == "doppler":
+        raise error(
+            ("rotation", "inertia"),
+            '= "doppler" pulls at a wheel that moves along with its tire: take "full"',
+        )
+    if scene.greens.residual == "second-order":
+        raise error(
+            ("greens", "residual"),
+            '= "second-order" knows no [axle] that moves: take "static" or "attachment"',
+        )
+    tilts = any(k > 2 for k in axle.moving)
+    if tilts and turns and not scene.static.steady_rolling:
+        raise error(
+            ("static", "steady_rolling"),
+            "= false leaves out the centrifugal tension that keeps a tilting tire upright",
+        )
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    estimate: bool = flag(
+        True,
+        "error bars of contact and axle force by cheaper companion runs: elements of twice the size, fewer modes, twice "
+        "the step, another spacing of points",
+    )
+    target: float | None = number(
+        None,
+        "-",
+        "largest estimated error of the vertical force named by of: relative L2 norm of the error of its varying part up "
+        "to up_to, and relative error of its mean; mesh, modes, residual, points and step are then searched for",
+        least=1e-3,
+        most=1,
+    )
+    target_db: float | None = number(
+        None,
+        "dB",
+        "largest estimated error of every third octave below up_to; together with target both must be met",
+        least=0.05,
+        most=20,
+    )
+    of: str = choice(
+        "axle_force", ("axle_force", "contact_force"), "force to which the target applies"
+    )
+    up_to: float = number(
+        400.0,
+        "Hz",
+        'highest frequency of interest: of the error, and of the waves by which contact.points = "auto" is chosen',
+        least=1,
+        most=1e5,
+    )
+    search: bool = flag(
+        True,
+        "with a target: search for settings that meet it; false: keep those of the scene, as in the scene that a "
+        "search writes",
+    )
+    trials: int = integer(12, "number of settings that a search tries at most", least=1, most=100)
+    budget: float | None = number(
+        None,
+        "s",
+        "duration of the finished trials of a search, also of those before an interruption, after which no further settings "
+        "are tried",
+        least=1,
+        most=1e8,
+    )
+
+    @property
+    def aimed(self) -> bool:
+        """Whether a target error is given."""
+        return self.target is not None or self.target_db is not None
+
+    @property
+    def searches(self) -> bool:
+        """Whether settings are searched for."""
+        return self.aimed and self.search
+
+
+def check_accuracy(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    """Check what a target requires of the other tables."""
+    wanted = scene.accuracy
+    if not wanted.aimed:
+        return
+    key = ("accuracy", "target" if wanted.target is not None else "target_db")
+    if not wanted.estimate:
+        raise error(key, "is met by the estimated error: it needs accuracy.estimate = true")
+    if not scene.in_contact or scene.road is None or scene.time is None:
+        raise error(
+            key,
+            "is of the forces of a tire on a road: add [contact], [road], [time], and load (N) to [static]",
+        )
+    if wanted.of == "axle_force" and not scene.output.axle_force:
+        raise error(("accuracy", "of"), '= "axle_force" needs output.axle_force = true')
+    if scene.road.kind == "flat" and scene.road.motion.kind == "none" and not scene.force:
+        raise error(key, "is of what varies, and nothing drives the tire: take another road")
+    if wanted.up_to * scene.time.duration < 4:
+        raise error(
+            ("accuracy", "up_to"),
+            f"= {wanted.up_to:g} Hz is not seen in {scene.time.duration:g} s: four periods at least",
+        )
+    if wanted.searches:
+        _check_points(scene, error)
+
+
+def _check_points(scene: Scene, error: Where) -> None:
+    """Raise an error for contact that does not exist, or is another, on grids of a search."""
+    assert scene.contact is not None
+    if scene.contact.brush_stiffness is not None:
+        raise error(
+            ("contact", "brush_stiffness"),
+            "is that of a point: a search for accuracy chooses grids of points, and would change the tread with them; take "
+            "brush_stiffness_per_area (N/m³), or accuracy.search = false and your own contact.points",
+        )
+    if not scene.contact.law.compliant:
+        raise error(
+            ("contact", "tread"),
+            f'= "{scene.contact.tread}" has no compliance of its own, so it works on the nodes of the mesh only, and a '
+            'search for accuracy chooses grids of points: take another, e.g. "half-space", or accuracy.search = false',
+        )
+
+
+_MOST = 200
+_BEYOND = 1.5  # times the scene's own deflection, by default
+
+
+def _ascending(doc: str, unit: str, limits: Limits) -> Any:
+    """A key for an ascending list of numbers, empty by default."""
+
+    def read(value: Any) -> tuple[float, ...]:
+        if not isinstance(value, list | tuple) or len(value) > _MOST:
+            raise ValueError(f"must be a list of at most {_MOST} numbers, not {described(value)}")
+        result = tuple(finite(part) for part in value)
+        for part in result:
+            limits.check(part, unit)
+        if any(b <= a for a, b in zip(result, result[1:], strict=False)):
+            raise ValueError(f"must ascend, not {described(list(result))}")
+        return result
+
+    allowed = f"ascending numbers, {limits}"
+    return parameter(Key(read=read, unit=unit, doc=doc, values=allowed, limits=limits), ())
+
+
+@dataclass(frozen=True)
+class Stiffness:
+    deflections: tuple[float, ...] = _ascending(
+        "deflections at which load and footprint are computed; empty: equal steps up to up_to",
+        "m",
+        Limits(least=1e-6, most=10),
+    )
+    up_to: float | None = number(
+        None, "m", "largest deflection; absent: 1.5 times that of the scene", least=1e-6, most=10
+    )
+    steps: int = integer(6, "number of equal steps up to up_to", least=1, most=_MOST)
+    which: str = choice(
+        "all",
+        ("all", "vertical"),
+        "stiffnesses to compute: vertical, or all (also longitudinal, lateral and torsional)",
+    )
+    slide_steps: int = integer(
+        8,
+        "with static.friction and which = all: steps of the curves of force over the displacement of the road along and "
+        "across a standing tire, or over the slip of a rolling one, up to sliding; 0: none",
+        least=0,
+        most=_MOST,
+    )
+    slide_to: float | None = number(
+        None,
+        "m",
+        "largest displacement of these curves; absent: 2 friction times load over the stiffness of the sticking footprint",
+        least=1e-6,
+        most=1,
+    )
+    slip_to: float | None = number(
+        None,
+        "-",
+        "largest slip of these curves for a rolling wheel; absent: 3 friction times load over the initial slope, at most "
+        "0.5",
+        least=1e-6,
+        most=0.5,
+    )
+
+
+def deflections(wanted: Stiffness, own: float | None) -> list[float]:
+    """The deflections (m) to compute; `own` is that of the scene's static state."""
+    if wanted.deflections:
+        return list(wanted.deflections)
+    last = wanted.up_to or _BEYOND * own
+    return (last * np.arange(1, wanted.steps + 1) / wanted.steps).tolist()
+
+
+def check_stiffness(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    """Raise an error if there is nothing to derive the deflections from."""
+    wanted, static = scene.stiffness, scene.static
+    if wanted is None or wanted.deflections or wanted.up_to:
+        return
+    if not static.on_road:
+        raise error(
+            ("stiffness", "up_to"),
+            "is needed where the scene has no road: give it (m), or load (N) in [static]",
+        )
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,7 @@ from tireroad.runs.files import store
 from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.scene.resolved import dumps
-from tireroad.runs.scene.tables.axle import axle_of
-from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.scene.tables.scene import Scene, axle_of
 from tireroad.runs.stages.build.tire import make_tire
 
 T = TypeVar("T")

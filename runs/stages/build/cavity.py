@@ -13,7 +13,7 @@ from tireroad.fem.model import SmallMotions
 from tireroad.modal.basis import Air, ModalBasis
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
-from tireroad.runs.scene.tables.cavity import has_air
+from tireroad.runs.scene.tables.tire import has_air
 from tireroad.runs.stages.base.job import Job
 from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.base.stage import Done, Shared

@@ -16,7 +16,7 @@ from tireroad.contact.tread.pattern import Heights, Pattern, pitch_starts
 from tireroad.fem.errors import InputError
 from tireroad.runs.files import store
 from tireroad.runs.files.store import put
-from tireroad.runs.scene.tables.pattern import PatternTable
+from tireroad.runs.scene.tables.contact import PatternTable
 from tireroad.runs.stages.base.job import Job
 from tireroad.runs.stages.base.record import Record
 

@@ -15,7 +15,7 @@ from tireroad.contact.setup import ContactSetup, Rolled, contact_setup, nodes_wi
 from tireroad.contact.tread.free_rolling import shape_slip
 from tireroad.fem.matrices import probe
 from tireroad.fem.static.state import StaticState
-from tireroad.runs.scene.rules.road import made
+from tireroad.runs.scene.road_rules import made
 from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.stages.base import kept
 from tireroad.runs.stages.base.job import Job

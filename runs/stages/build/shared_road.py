@@ -8,7 +8,7 @@ from tireroad.contact.roads.kind import RoadKind
 from tireroad.contact.roads.under_tire import Road
 from tireroad.fem.collective import broadcast
 from tireroad.fem.errors import InputError
-from tireroad.runs.scene.rules.road import keep, made
+from tireroad.runs.scene.road_rules import keep, made
 
 
 def share(surface: RoadKind, comm: MPI.Comm) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tireroad.contact.grid_patch import MOST, finer_touching
-from tireroad.runs.scene.extent.estimate import estimate
+from tireroad.runs.scene.estimate import estimate
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.stages.companions.given import Given
 

@@ -15,7 +15,7 @@ from tireroad.runs.scene.outputs import (
     Where,
     check_steps,
 )
-from tireroad.runs.scene.tables.cavity import has_air
+from tireroad.runs.scene.tables.tire import has_air
 
 if TYPE_CHECKING:
     from tireroad.runs.scene.tables.scene import Scene

@@ -8,8 +8,8 @@ from tireroad.contact.results.relief import Relief, nothing_met, relief_seen
 from tireroad.contact.setup import ContactSetup
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
-from tireroad.runs.scene.rules.road import foot, never_met, within_run_in, without_relief
-from tireroad.runs.scene.tables.road import Road
+from tireroad.runs.scene.road_rules import foot, never_met, within_run_in, without_relief
+from tireroad.runs.scene.tables.scene import Road
 from tireroad.runs.stages.base.record import Record
 
 # Share of the road's standard deviation that the points have to see.

@@ -15,7 +15,7 @@ from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.timing import by_processor
 from tireroad.runs.files.cache import Cache
 from tireroad.runs.process import observe
-from tireroad.runs.scene.extent.estimate import estimate
+from tireroad.runs.scene.estimate import estimate
 from tireroad.runs.search.journal import Journal, Trial, worst
 from tireroad.runs.search.search import Search, seconds
 from tireroad.runs.search.settings import Ladders, Settings, applied

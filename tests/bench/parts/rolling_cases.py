@@ -20,8 +20,7 @@ from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.files.disk import replacing
 from tireroad.runs.process import observe
 from tireroad.runs.scene.resolved import dumps
-from tireroad.runs.scene.tables.accuracy import Accuracy
-from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.scene.tables.scene import Accuracy, Scene
 from tireroad.runs.stages.pipeline import Finished, run_scene
 from tireroad.tests.bench.parts.apart import apart
 

@@ -13,7 +13,7 @@ from tireroad.fem.errors import ConvergenceError
 from tireroad.runs.files.folder import check_kept_scene
 from tireroad.runs.process import observe
 from tireroad.runs.process.signals import Stopped
-from tireroad.runs.scene.extent.estimate import estimate
+from tireroad.runs.scene.estimate import estimate
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.sections.kinds import torus
 from tireroad.runs.search import search as searching

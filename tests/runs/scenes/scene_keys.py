@@ -1,6 +1,6 @@
 """Every key of a scene by its table and name."""
 
+from tireroad.runs.scene.schema import walk
 from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.scene.walk import walk
 
 KEYS = {f"{of.__name__}.{item.name}": key for _, of, item, key in walk(Scene)}

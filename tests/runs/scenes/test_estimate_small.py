@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from tireroad.runs.scene.extent.estimate import estimate
-from tireroad.runs.scene.extent.sizes import highest_frequency
+from tireroad.runs.scene.estimate import estimate
 from tireroad.runs.scene.load import load
+from tireroad.runs.scene.sizes import highest_frequency
 from tireroad.runs.scene.tables.scene import Scene
 
 SCENE = """

@@ -4,9 +4,14 @@ from pathlib import Path
 
 import pytest
 
-from tireroad.runs.scene.extent.demand import memory_of
-from tireroad.runs.scene.extent.estimate import Estimate, estimate
-from tireroad.runs.scene.extent.static_state import DAMPING, FRICTION, LOAD_ERROR
+from tireroad.runs.scene.estimate import (
+    DAMPING,
+    FRICTION,
+    LOAD_ERROR,
+    Estimate,
+    estimate,
+    memory_of,
+)
 from tireroad.runs.scene.load import load
 
 SMALL = ["tire.segments=26", "tire.elements_arc=8", "modal.count=100"]

@@ -15,11 +15,10 @@ from scene_keys import KEYS
 from tireroad.contact.roads.kind import ROADS
 from tireroad.fem.tire.law import MATERIALS
 from tireroad.runs.scene.load import load
-from tireroad.runs.scene.schema import collection_of, variant_of
+from tireroad.runs.scene.schema import collection_of, variant_of, walk
 from tireroad.runs.scene.tables import tire as tire_tables
-from tireroad.runs.scene.tables.pattern import PatternTable
+from tireroad.runs.scene.tables.contact import PatternTable
 from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.scene.walk import walk
 from tireroad.runs.stages.build.pattern import make_pattern
 from tireroad.runs.stages.pipeline import run_scene
 

@@ -7,8 +7,8 @@ from full_scene import FULL, refused
 
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.resolved import dumps
+from tireroad.runs.scene.schema import walk
 from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.scene.walk import walk
 
 
 def test_empty_scene_has_every_default(scene_file) -> None:

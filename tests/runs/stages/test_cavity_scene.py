@@ -6,7 +6,7 @@ import pytest
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.load import load
-from tireroad.runs.scene.tables.cavity import Cavity, has_air
+from tireroad.runs.scene.tables.tire import Cavity, has_air
 
 SCENE = """
 [tire]

@@ -235,7 +235,7 @@ def test_a_force_on_the_tire_in_contact_ends_where_statics_has_it(run):
 
 @pytest.mark.long
 def test_the_estimated_memory_is_about_what_a_run_takes(run):
-    from tireroad.runs.scene.extent.estimate import memory
+    from tireroad.runs.scene.estimate import memory
     from tireroad.runs.scene.load import load
 
     folder, stages = run("again", FLAT + "[rotation]\nspeed = 40.0\n")

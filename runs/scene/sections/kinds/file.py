@@ -1,24 +1,210 @@
-"""`section = "file"`: an Abaqus deck, a Gmsh mesh or a section file (docs/how-to/own-tire.md)."""
+"""A tire's section from a file: read once; its regions and cords are matched with the scene's.
+
+`section = "file"`: an Abaqus deck, a Gmsh mesh or a section file (docs/how-to/own-tire.md).
+"""
 
 from __future__ import annotations
 
+import hashlib
+from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import choice, filename, flag, text, texts
-from tireroad.runs.scene.sections import own_file
 from tireroad.runs.scene.sections.kind import Proportions, SectionKind, section_kind
-from tireroad.runs.scene.sections.parts import proportions_of
+from tireroad.runs.scene.sections.parts import cords_of, losses_of, proportions_of, region_of, spelt
 from tireroad.runs.scene.source import Source
 
 if TYPE_CHECKING:
+    from tireroad.fem.decks.compounds import Rubber
+    from tireroad.fem.decks.own import OwnSection, Wishes
+    from tireroad.fem.sections.mesh2d import SectionMesh
     from tireroad.fem.sections.ring import Ring
     from tireroad.fem.tire.cords import Cords
     from tireroad.fem.tire.material import Material
+    from tireroad.runs.scene.tables.tire import Cords as Line
     from tireroad.runs.scene.tables.tire import Tire
+
+
+def _keys(tire: Tire) -> FileSection:
+    return cast("FileSection", tire.shape)
+
+
+def own_section(tire: Tire) -> OwnSection:
+    """The section in the tire's file. Raises InputError, with file and line, for errors in it."""
+    return _read(*_source(tire))
+
+
+def own_ring(tire: Tire) -> Ring:
+    """The ring of that section in the scene's order and segments; cached per scene and file."""
+    return _ring(*_source(tire), tire.order, tire.segments, tire.footprint_size)
+
+
+def _source(tire: Tire) -> tuple[Path, int, Wishes]:
+    """The file, its modification time, and what is requested from it."""
+    from tireroad.fem.decks.own import Wishes
+
+    keys = _keys(tire)
+    path = keys.name
+    wishes = Wishes(
+        inner=keys.inner,
+        tread=keys.tread,
+        rim=keys.rim,
+        length_unit=keys.length_unit,
+        mirror=keys.mirror,
+        materials=frozenset(r.name for r in tire.region if r.name and r.material is not None),
+    )
+    try:
+        return path, path.stat().st_mtime_ns, wishes
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}") from None
+
+
+@lru_cache(maxsize=4)
+def _read(path: Path, _: int, wishes: Wishes) -> OwnSection:
+    from tireroad.fem.decks.own import read
+
+    return read(path, wishes)
+
+
+@lru_cache(maxsize=4)
+def _ring(
+    path: Path, stamp: int, wishes: Wishes, order: int, segments: int, footprint_size: float
+) -> Ring:
+    mesh = _read(path, stamp, wishes).mesh.of_order(order)
+    return _revolved(mesh, segments, footprint_size)
+
+
+def _revolved(mesh: SectionMesh, segments: int, footprint_size: float) -> Ring:
+    """The section as a ring; its coarser companion has half as many elements around."""
+    from tireroad.fem.sections.ring import revolved
+    from tireroad.fem.sections.torus import LEAST
+
+    def coarser() -> Ring | None:
+        half = segments // 2
+        return _revolved(mesh, half, footprint_size) if half >= LEAST[0] else None
+
+    return revolved(mesh, segments, footprint_size, coarser)
+
+
+def fingerprint(tire: Tire) -> str:
+    """Hash of everything that the run takes from the tire's file."""
+    own = own_section(tire)
+    mesh = own.mesh
+    faces = (mesh.outer, mesh.tread, mesh.inner, mesh.rim, *mesh.plies.values())
+    found = hashlib.sha256()
+    for array in (mesh.nodes, mesh.cells, mesh.region, *faces):
+        found.update(np.ascontiguousarray(array).tobytes())
+    plies = [{k: v for k, v in vars(ply).items() if k != "sides"} for ply in own.plies]
+    found.update(repr((mesh.regions, own.rubbers, plies)).encode())
+    return found.hexdigest()
+
+
+def check_regions(tire: Tire, own: OwnSection) -> None:
+    """Check that every [[tire.region]] names a region of the file."""
+    known = {name.upper() for name in own.mesh.regions}
+    for number, region in enumerate(tire.region):
+        if region.name is None or region.name.upper() not in known:
+            shown = "has no name" if region.name is None else f'name = "{region.name}" is none'
+            raise InputError(
+                f"tire.region.{number} {shown} of the file's regions: {', '.join(own.mesh.regions)}"
+            )
+
+
+def check_cords(tire: Tire, own: OwnSection) -> None:
+    """Check that every [[tire.cords]] names a line of the file."""
+    for number, cords in enumerate(spelt(tire.cords, own.mesh.plies)):
+        if cords.name not in own.mesh.plies:
+            known = ", ".join(own.mesh.plies) or "none"
+            raise InputError(
+                f'tire.cords.{number} name = "{cords.name}" is no line of the file: {known}'
+            )
+
+
+def own_materials(tire: Tire) -> dict[str, Material]:
+    """Compound of each region by name: of [[tire.region]], else the file, else [tire.material]."""
+    own = own_section(tire)
+    return {
+        name: _material(tire, name, rubber)
+        for name, rubber in zip(own.mesh.regions, own.rubbers, strict=True)
+    }
+
+
+def _material(tire: Tire, name: str, rubber: Rubber | None) -> Material:
+    """The material of one region.
+
+    Dynamic modulus and loss factor are those of the [[tire.region]] if not 1 and 0, else likewise
+    those of the file's compound, else those of [tire].
+    """
+    from tireroad.fem.tire.material import Material, compound
+
+    region = region_of(tire, name)
+    change = {"dynamic": tire.dynamic, "loss_factor": tire.loss_factor}
+    change |= losses_of(rubber) | losses_of(region)
+    if region is not None and region.material is not None:
+        return Material(law=region.material.law, density=region.material.density, **change)
+    if rubber is None:
+        return Material(law=tire.material.law, density=tire.material.density, **change)
+    density = tire.material.density if rubber.density is None else rubber.density
+    return compound(rubber.model, density, **rubber.coefficients, **change)
+
+
+def given_cords(tire: Tire) -> list[Line]:
+    """The scene's [[tire.cords]], with names spelt as in the file."""
+    return spelt(tire.cords, own_section(tire).mesh.plies)
+
+
+def own_cords(tire: Tire) -> list[Cords]:
+    """The cords on the lines of the file: from [[tire.cords]] of that name, else from the file."""
+    from tireroad.fem.tire.cords import Cords
+
+    given = {cords.name: cords_of(cords) for cords in given_cords(tire)}
+    found = [
+        Cords(**{key: value for key, value in vars(ply).items() if key != "sides"})
+        for ply in own_section(tire).plies
+        if ply.name not in given
+    ]
+    return found + list(given.values())
+
+
+def described(tire: Tire) -> list[str]:
+    """Which parts of the tire's file are used and which are not, for `check`."""
+    own = own_section(tire)
+    mesh = own.mesh
+    lines = [f"tire from {_keys(tire).name.name}", *(f"  {line}" for line in own.used)]
+    for name, rubber in zip(mesh.regions, own.rubbers, strict=True):
+        lines.append(f"  region {name}: {_in_words(tire, name, rubber)}")
+    lines += [
+        f"  cords {ply.name}: {np.degrees(ply.angle):+.4g} deg, E {ply.youngs_modulus:.4g} Pa, area "
+        f"{ply.area:.4g} m², spacing {ply.spacing:.4g} m, {len(ply.sides)} sides"
+        for ply in own.plies
+    ]
+    lines += [f"  {note}" for note in own.notes]
+    with_data = {ply.name for ply in own.plies} | {cords.name for cords in given_cords(tire)}
+    lines += [
+        f'  line {name}: no cords on it ([[tire.cords]] name = "{name}" lays some)'
+        for name in mesh.plies
+        if name not in with_data
+    ]
+    return lines + ["not used of the file", *(f"  {line}" for line in own.unused or ("nothing",))]
+
+
+def _in_words(tire: Tire, name: str, rubber: Rubber | None) -> str:
+    region = region_of(tire, name)
+    if region is not None and region.material is not None:
+        return "material of the scene's [[tire.region]]"
+    if rubber is None:
+        return "no material in the file: that of [tire.material]"
+    values = ", ".join(f"{key} {value:.4g}" for key, value in rubber.coefficients.items())
+    density = (
+        f"density {rubber.density:.4g} kg/m³"
+        if rubber.density is not None
+        else "no density in the file: that of [tire.material]"
+    )
+    return f"{rubber.name}, {rubber.model}, {values}; {density}"
 
 
 @section_kind("file", "a section read from a file")
@@ -51,20 +237,20 @@ class FileSection(SectionKind):
             source.add(("tire",), 'with section = "file" needs one of file = "…" and mesh = "…"')
             return
         try:
-            own = own_file.own_section(tire)
-            own_file.check_regions(tire, own)
-            own_file.check_cords(tire, own)
+            own = own_section(tire)
+            check_regions(tire, own)
+            check_cords(tire, own)
         except InputError as error:
             source.add_as_is(("tire", "file"), str(error))
 
     def proportions(self, tire: Tire) -> Proportions:
-        return proportions_of(self.ring(tire), own_file.own_section(tire).mesh)
+        return proportions_of(self.ring(tire), own_section(tire).mesh)
 
     def ring(self, tire: Tire) -> Ring:
-        return own_file.own_ring(tire)
+        return own_ring(tire)
 
     def rubbers(self, tire: Tire) -> dict[str, Material]:
-        return own_file.own_materials(tire)
+        return own_materials(tire)
 
     def rubber(self, tire: Tire) -> tuple[float, float, float]:
         """Values of the softest compound, in which the wall bends most."""
@@ -72,11 +258,11 @@ class FileSection(SectionKind):
         return soft.dynamic * soft.law.youngs, soft.law.poisson, soft.density
 
     def cords(self, tire: Tire) -> list[Cords]:
-        return own_file.own_cords(tire)
+        return own_cords(tire)
 
     def angles(self, tire: Tire) -> dict[str, float]:
-        own = own_file.own_section(tire).plies
-        given = {line.name: line.angle for line in own_file.given_cords(tire)}
+        own = own_section(tire).plies
+        given = {line.name: line.angle for line in given_cords(tire)}
         return {ply.name: float(np.degrees(ply.angle)) for ply in own} | given
 
     def coarser(self, tire: Tire) -> FileSection:
@@ -87,7 +273,7 @@ class FileSection(SectionKind):
         return any(one.loss_factor for one in self.rubbers(tire).values())
 
     def fingerprint(self, tire: Tire) -> str:
-        return own_file.fingerprint(tire)
+        return fingerprint(tire)
 
     def described(self, tire: Tire) -> list[str]:
-        return own_file.described(tire)
+        return described(tire)

@@ -6,7 +6,7 @@ import numpy as np
 
 from tireroad.contact.roads.under_tire import is_level
 from tireroad.contact.setup import ContactSetup
-from tireroad.runs.scene.tables.road import Road
+from tireroad.runs.scene.tables.scene import Road
 
 
 def run_in(setup: ContactSetup, road: Road) -> float:

@@ -11,7 +11,7 @@ from tireroad.contact.roads.placement import begun_at, moved_start, shown
 from tireroad.contact.roads.road import placed
 from tireroad.contact.roads.under_tire import Road, is_level
 from tireroad.fem.errors import InputError
-from tireroad.runs.scene.tables.road import Road as Table
+from tireroad.runs.scene.tables.scene import Road as Table
 from tireroad.runs.scene.tables.scene import Scene
 
 # Least ratio of a pressed tire's effective rolling radius to its outer radius, and farthest reach

@@ -1,4 +1,8 @@
-"""Sizes of the parts of a scene, estimated before anything is computed.
+"""The tire's wall as a shallow shell under tension: how dense its modes are.
+
+Sizes of the matrices and factors of a mesh whose columns of nodes go through the wall.
+
+Sizes of the parts of a scene, estimated before anything is computed.
 
 Modes from their density in a shell under tension, contact points from the footprint, steps from the
 automatic step. Each is within a factor of about two of what a run finds.
@@ -14,10 +18,110 @@ from tireroad.contact.roads.kinds.obstacle import Edges
 from tireroad.contact.roads.placement import begun_at
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections.mesh2d import SectionMesh
-from tireroad.runs.scene.extent.wall import wall_of
-from tireroad.runs.scene.rules.road import least_travel, made
+from tireroad.runs.scene.road_rules import least_travel, made
 from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.scene.tables.scene import Scene
+
+DIRECTIONS = 16  # of waves, over a quarter turn
+
+
+@dataclass(frozen=True)
+class Wall:
+    """N = A/4π (k² + s² ω²) modes up to ω, k² averaged over the directions of waves.
+
+    k is the wave number of bending waves in a shallow shell (Donnell), ρh (ω² - ω_c²) = B k⁴ + T k²,
+    and s² the sum of the squared slownesses of the two in-plane waves, which cords make too fast to
+    count. A wave across which the wall is curved stretches it, and there is none below its
+    ω_c = c (cos²θ / r + sin²θ / R), where c is the speed of sound in a rod, r and R the radii of the
+    section and of the crown, θ the direction from the circumference (318 Hz at θ = 0 in a torus of
+    48 MPa and r = 0.1 m, whose 60th mode is at 313 Hz: 294 Hz by this, 210 Hz in a flat plate).
+
+    `area` A m², `mass` ρh kg/m², `bending` B N m, `tension` T N/m, `slowness2` s² (s/m)²,
+    `curved2` ω_c² (1/s²) by direction.
+    """
+
+    area: float
+    mass: float
+    bending: float
+    tension: float
+    slowness2: float
+    curved2: np.ndarray
+
+    def modes_below(self, frequency: float) -> float:
+        """Number of modes below a frequency (Hz)."""
+        omega2 = (2 * math.pi * frequency) ** 2
+        driving = self.mass * np.maximum(omega2 - self.curved2, 0.0)
+        root = np.sqrt(self.tension**2 + 4 * self.bending * driving)
+        k2 = float(np.mean((root - self.tension) / (2 * self.bending)))
+        return self.area * (k2 + self.slowness2 * omega2) / (4 * math.pi)
+
+    def frequency_of(self, modes: float) -> float:
+        """Frequency (Hz) below which there are that many modes, by bisection in its logarithm."""
+        low, high = 1e-3, 1e9
+        while high > 1.001 * low:
+            middle = math.sqrt(low * high)
+            low, high = (middle, high) if self.modes_below(middle) < modes else (low, middle)
+        return low
+
+
+def wall_of(scene: Scene) -> Wall:
+    """The wall, from the section's height and thickness; tension as in a circle of that radius.
+
+    With cords its waves are those of a flat plate: cords hinder the stretching of rubber, and give
+    way to waves that do not stretch them.
+    """
+    tire, shape = scene.tire.proportions(), scene.tire.shape
+    youngs, poisson, density = shape.rubber(scene.tire)
+    plane = density * (1 - poisson**2 + 2 * (1 + poisson)) / youngs
+    middle = tire.outer_radius - 0.5 * tire.height
+    cords = bool(shape.angles(scene.tire))
+    theta = (np.arange(DIRECTIONS) + 0.5) / DIRECTIONS * math.pi / 2
+    curved = np.cos(theta) ** 2 / tire.height + np.sin(theta) ** 2 / tire.outer_radius
+    return Wall(
+        area=2 * math.pi * middle * 2 * math.radians(tire.half_angle) * tire.height,
+        mass=density * tire.thickness,
+        bending=youngs * tire.thickness**3 / (12 * (1 - poisson**2)),
+        tension=scene.static.inflation * tire.height,
+        slowness2=0.0 if cords else plane,
+        curved2=np.zeros(DIRECTIONS) if cords else youngs / density * curved**2,
+    )
+
+
+def factor(free: float, through: int, order: int) -> float:
+    """Bytes of one triangle of a factor; `free` unknowns, `through` elements through the wall.
+
+    That of nested dissection on a surface: 31/4 N log2 N entries for N columns of nodes (George
+    1973, doi 10.1137/0710032), each a dense block of the unknowns of one column. For 27,225 and
+    59,697 unknowns of second order MUMPS took 84 and 194 MB; this gives 88 and 211 MB.
+    """
+    block = unknowns_through(through, order)
+    columns = max(free / block, 2.0)
+    return 4.0 * 7.75 * columns * math.log2(columns) * block**2
+
+
+def matrices(count: int, free: float, through: int, order: int) -> float:
+    """Bytes of `count` sparse matrices of the same mesh."""
+    coupled = _layers_coupled(through, order) * _columns_coupled(order)
+    return 12.0 * count * (3 * free) * coupled
+
+
+def unknowns_through(through: int, order: int) -> int:
+    """Unknowns of a column of nodes."""
+    return 3 * (through * order + 1)
+
+
+def _columns_coupled(order: int) -> float:
+    """Columns of nodes sharing an element with a given one, averaged over an element's columns."""
+    own = np.full(order, order + 1.0)  # inside an element
+    own[0] = 2 * order + 1  # between two elements
+    return float(np.outer(own, own).mean())
+
+
+def _layers_coupled(through: int, order: int) -> float:
+    """Nodes of one column that share an element with a given one, on average."""
+    inside = through * (order - 1) * (order + 1)
+    return (inside + 2 * (order + 1) + (through - 1) * (2 * order + 1)) / (through * order + 1)
+
 
 TURN = 0.3  # radians of the fastest mode per automatic step (stages.build.rolling.stepping)
 LEAST_STEPS = 200  # of an automatic step (ibid.)

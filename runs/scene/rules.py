@@ -1,26 +1,82 @@
-"""Rules beyond single keys: contradictions between tables, and combinations not supported."""
+"""Solutions on the full matrices need a damping that has a full matrix.
+
+Requirements and limits of a scene's outputs.
+
+Rules beyond single keys: contradictions between tables, and combinations not supported.
+"""
 
 from collections.abc import Callable, Iterator
 from typing import Any
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.scene.rules.full import full_matrices
-from tireroad.runs.scene.rules.output import (
-    check_campbell,
-    check_outputs,
-    check_vibration,
-)
-from tireroad.runs.scene.rules.road import check_shape
+from tireroad.runs.scene.outputs import Output, check_steps
+from tireroad.runs.scene.road_rules import check_shape
 from tireroad.runs.scene.source import Source
-from tireroad.runs.scene.tables.accuracy import check_accuracy
-from tireroad.runs.scene.tables.axle import check_axle
-from tireroad.runs.scene.tables.cavity import check_cavity
-from tireroad.runs.scene.tables.contact import check_tread
-from tireroad.runs.scene.tables.pattern import check_pattern
-from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.scene.tables.stiffness import check_stiffness
+from tireroad.runs.scene.tables.contact import check_pattern, check_tread
+from tireroad.runs.scene.tables.scene import Scene, check_accuracy, check_axle, check_stiffness
+from tireroad.runs.scene.tables.tire import check_cavity
 
 Where = Callable[[tuple[str, ...], str], InputError]
+
+
+def full_matrices(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    """Raise an error for a solution on the full matrices without [damping]."""
+    if scene.damping is not None:
+        return
+    advice = "needs a full damping matrix, which loss factors do not give: add [damping]"
+    if scene.rotation is not None and scene.rotation.method == "full":
+        raise error(("rotation", "method"), f'= "full" {advice}')
+
+
+MOST_SPEEDS = 10_000
+
+
+def check_outputs(scene: Scene, raw: dict[str, Any], error: Where) -> Iterator[InputError]:
+    """The error of each kind of output at the driven points, checked against the scene."""
+    for name, kind in scene.output.kinds:
+        try:
+            _check_kind(scene, kind, ("output", name), error)
+        except InputError as found:
+            yield found
+
+
+def _check_kind(scene: Scene, kind: Output, path: tuple[str, ...], error: Where) -> None:
+    if scene.in_contact and not kind.in_contact:
+        raise error(
+            path,
+            "is not available in scenes with [contact]: leave it out, or take out [contact]",
+        )
+    if kind.of == "contact" and not scene.in_contact:
+        raise error(
+            path, "is of the forces of the road: add [contact], [time], and load (N) to [static]"
+        )
+    kind.check(scene, path, error)
+
+
+def check_campbell(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    """Check that the Campbell diagram has at least one speed and not too many."""
+    campbell = scene.rotation.campbell if scene.rotation else None
+    if campbell is not None:
+        path = "rotation", "campbell", "step"
+        check_steps(path, "speeds", campbell.to, campbell.step, "rad/s", error, most=MOST_SPEEDS)
+
+
+def check_vibration(scene: Scene, raw: dict[str, Any], error: Where) -> Iterator[InputError]:
+    """Check what the motion of the whole tire needs, in frequency and in time."""
+    output, rotation = scene.output, scene.rotation
+    full = rotation is not None and rotation.speed and rotation.method == "full"
+    for key in ("vibration", "fields"):
+        path = "output", key
+        if not getattr(output, key):
+            continue
+        if scene.time is None or not (scene.force or scene.in_contact):
+            yield error(path, "needs forces in time: add [time] with [contact] or a [[force]]")
+        if full:
+            yield error(path, 'is seen through the modes: take rotation.method = "projected"')
+    if output.vibration and scene.in_contact and not output.spectra:
+        yield error(
+            ("output", "vibration"), "needs output.spectra, which find the run-in and the limit"
+        )
 
 
 def check(scene: Scene, raw: dict[str, Any], source: Source) -> None:

@@ -1,1 +1,0 @@
-"""Rules beyond single keys: consistency between tables, usable roads, cords and compounds."""
