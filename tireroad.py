@@ -21,7 +21,7 @@ _HOMES = {
     "press": "tireroad.runs.library",
     "modes": "tireroad.runs.library",
     "roll": "tireroad.runs.library",
-    "drive": "tireroad.runs.drive",
+    "drive": "tireroad.runs.library",
     "make_road": "tireroad.contact.roads.road",
     "Material": "tireroad.fem.tire.material",
     "compound": "tireroad.fem.tire.material",

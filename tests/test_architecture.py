@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[1]
 ROOMS = ("fem", "modal", "greens", "contact", "runs")  # each may use those before it
 LARGEST = 800  # lines of a module: more than that is more than one subject
 SMALLEST = 60  # lines of a module that only one other imports: less is a page of its reader
-PLUGINS = {"kinds", "laws", "sections", "tables", "outputs"}  # folders of one variant a file
+PLUGINS = {"kinds", "laws", "outputs"}  # folders of one variant a file
 FUNCTION = 30  # lines that 95 % of all functions stay within
 
 
@@ -85,8 +85,6 @@ def test_no_circle_of_imports() -> None:
 
 @pytest.mark.parametrize("room", ROOMS)
 def test_no_circle_of_imports_for_types(room: str) -> None:
-    if room in TO_UNTIE:
-        pytest.xfail(f"{room} still has one: {_circle(types=True, rooms=(room,))}")
     assert _circle(types=True, rooms=(room,)) == ""
 
 
@@ -117,8 +115,7 @@ def test_no_module_is_a_page_of_its_only_reader() -> None:
         and _lines(file) < SMALLEST
         and readers[name] == 1
     }
-    assert pages - TO_MERGE == set(), "merge these with the one module that imports them"
-    assert TO_MERGE - pages == set(), "take these out of TO_MERGE: the list only shrinks"
+    assert pages == set(), "merge these with the one module that imports them"
 
 
 def test_functions_stay_short() -> None:
@@ -129,18 +126,3 @@ def test_functions_stay_short() -> None:
         if isinstance(node, ast.FunctionDef) and node.end_lineno
     ]
     assert sum(length <= FUNCTION for length in lengths) >= 0.95 * len(lengths)
-
-
-# What is still to be mended; nothing is added here.
-TO_UNTIE = {
-    "runs",
-}
-TO_MERGE = {
-    "contact/results/relief.py",
-    "fem/static/diagnosis.py",
-    "runs/stages/build/rolling/watch.py",
-    "runs/stages/build/shared_road.py",
-    "runs/stages/parts.py",
-    "runs/stages/stored/responses.py",
-    "runs/stages/stored/static_file.py",
-}

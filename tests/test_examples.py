@@ -12,7 +12,7 @@ from started import environment
 
 from tireroad.fem.tire.law import MATERIALS
 from tireroad.runs.scene.outputs import OUTPUTS
-from tireroad.runs.scene.sections.kind import SECTIONS
+from tireroad.runs.scene.tables.tire import SECTIONS
 
 pytestmark = pytest.mark.slow
 

@@ -161,7 +161,7 @@ def third_octaves(
     """Band centres (b,) Hz and levels (b, d), dB re `reference` (rms), of values (n, d).
 
     With `rate`, of their rate of change per second; A-weighted line by line if `weighted`. Bands as
-    in `contact.results.levels.band_sums`, below `up_to` Hz and half the sampling rate. Hann window
+    in `contact.results.spectra.band_sums`, below `up_to` Hz and half the sampling rate. Hann window
     over the whole record, mean removed. A record of one value has no band, and levels of one that
     does not vary are below `SILENT`.
     """
@@ -240,7 +240,7 @@ class Density:
     """One-sided power spectral `density` (f, d) at `frequency` (f,) Hz, by Welch's method.
 
     Hann windows of `segment` s, half overlapping, `averages` of them; `confidence` (2,) dB, 95 %,
-    as in contact.results.levels.
+    as in contact.results.spectra.
     """
 
     frequency: np.ndarray

@@ -473,7 +473,7 @@ def read_grid(
 
     Heights stay in the file, and the part under the tire is read when needed: for .h5, and for .npz
     as written by numpy.savez. A .csv matrix or a compressed .npz is first converted to a temporary
-    file (contact.roads.rows.Spool). Only a list of points is kept in memory, at most 10 million.
+    file (contact.roads.grid.Spool). Only a list of points is kept in memory, at most 10 million.
     """
     reader = READERS.get(file.suffix.lower())
     if reader is None:

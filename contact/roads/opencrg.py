@@ -100,7 +100,7 @@ class Payload(NamedTuple):
 def read_payload(payload: Payload) -> Rows:
     """Rows of numbers, NaN where missing. InputError names the place of damage.
 
-    Binary data stay in the file; text is converted once (contact.roads.rows.Spool).
+    Binary data stay in the file; text is converted once (contact.roads.grid.Spool).
     """
     if payload.code in ("KRBI", "KDBI"):
         return _read_binary(payload)

@@ -24,7 +24,7 @@ _LEAST_LAND = 1e-3
 
 
 class GrooveLike(Protocol):
-    """A groove (runs.scene.tables.pattern): lengths in m.
+    """A groove (runs.scene.tables.contact): lengths in m.
 
     `angle` a in degrees from the axle: the middle of a lateral groove is at s = s_0 + y tan(a).
     """

@@ -288,7 +288,7 @@ def static_shapes(
 
     `beside`: own rows (b, n) that replace those of the momentum; its first three rows must be the
     momentum if there is air. An unsymmetric stiffness is factorised a second time, transposed; a
-    free standing tire is solved by inertia relief (fem.matrices.inertia_relief).
+    free standing tire is solved by inertia relief (above).
     """
     comm = operators.body.comm
     loads = on_own_rows(operators, probes)

@@ -33,6 +33,8 @@ If the steps become too small, an error names the last converged state.
 Path to a load or a deflection: known states and the choice of the next trial.
 
 Load steps to a requested state: inflation, then the road by height, deflection or load.
+
+Why a rolling tire has no static state: too high a speed, or too high a load.
 """
 
 from __future__ import annotations
@@ -50,6 +52,8 @@ from tireroad.fem.static.axisymmetric import RoundEquilibrium, inflated
 from tireroad.fem.static.equilibrium import Drag, Equilibrium, Step
 from tireroad.fem.static.half_model import HalfTurnEquilibrium, looks_the_same
 from tireroad.fem.static.tread_surface import TreadSurface
+from tireroad.fem.static.virtual_work import AT_REST, Rolling
+from tireroad.fem.tire.body import Body
 
 # Residual over load. The radial tire starts with 15 and 18 on 16 x 12 and 20 x 16 elements, where
 # only springs converge, and with 8 on 30 x 26, where they cost two tangents in vain. Rubber alone
@@ -617,3 +621,28 @@ class Loader:
         value *= upright if unit == "m" else 1.0
         loads = self.equilibrium.load() / upright, self.equilibrium.points()
         self.report(Progress(what, value, unit, *loads, step))
+
+
+def with_cause(
+    error: ConvergenceError, loader: Loader, rolling: Rolling, press: Callable[[Loader], object]
+) -> ConvergenceError:
+    """The error, with the cause added if that is the speed of rotation. Collective.
+
+    `press` inflates and loads a tire. It is repeated at rest on a separate body; if that converges,
+    the speed is the cause. Takes no longer than the state at rest.
+    """
+    if rolling.speed == 0 or not isinstance(error, LoadingStopped):
+        return error
+    old = loader.body
+    body = Body(old.comm, old.ring, old.materials, cords=old.plies.cords)
+    try:
+        press(Loader(Equilibrium(body, AT_REST), lambda progress: None))
+    except ConvergenceError:
+        return error
+    return ConvergenceError(
+        f"{error.fact}. At rest the same tire converges, so its speed is the cause: "
+        f"rotation.speed = {rolling.speed:g} rad/s lies beyond the critical speed, up to which it has a "
+        "steady rolling shape. Lower the speed, raise the inflation or stiffen the material; "
+        "static.steady_rolling = false takes the shape at rest, whose rotating stage reports the critical "
+        "speed."
+    )

@@ -111,7 +111,9 @@ class HeldSystem:
             self.raising = self._moved(matrix, raising)
             matrix.zeroRowsColumns(rows, 1.0)
         with self._timing("factorisation"):
-            self._ksp.setOperators(matrix)  # may differ from the first one (fem.static.friction)
+            self._ksp.setOperators(
+                matrix
+            )  # may differ from the first one (fem.static.friction_road)
             self._ksp.getPC().setUp()
         return self._checked()
 

@@ -5,7 +5,7 @@ DOLFINx writes it). The results lie one folder up. Readers expect every field to
 dataset: a row of a larger dataset becomes one through a virtual dataset (HDF5) in a small file
 beside the page.
 
-Exports for other programs: CSV for spreadsheets, and XDMF (runs/files/xdmf.py) for ParaView.
+Exports for other programs: CSV for spreadsheets, and XDMF for ParaView.
 """
 
 from __future__ import annotations

@@ -264,7 +264,7 @@ class Summary:
     """`summary.json`: one entry per stage, rewritten completely after each. Root process only.
 
     The file of a stage is a result of the folder's scene only if `stages` says so
-    (runs.files.present). Entries of a run of another scene, and of stages whose inputs have changed
+    (runs.files.folder). Entries of a run of another scene, and of stages whose inputs have changed
     since, are moved to `earlier`: their files stay, so that a run that goes back to that scene
     finds them, with their figures. A run of the same scene begins with the entries it finds.
     """

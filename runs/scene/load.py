@@ -38,10 +38,9 @@ from tireroad.runs.scene.schema import (
     table_of,
     variant_of,
 )
-from tireroad.runs.scene.sections.kind import SECTIONS
 from tireroad.runs.scene.source import Path_, Source, parts, shortened
-from tireroad.runs.scene.tables.scene import Damping, Modal, Road, Scene
-from tireroad.runs.scene.tables.tire import filled
+from tireroad.runs.scene.tables.scene import Damping, Modal, Road, Scene, filled
+from tireroad.runs.scene.tables.tire import SECTIONS
 
 LARGEST = 1_000_000
 

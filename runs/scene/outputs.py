@@ -8,17 +8,12 @@ the key reference and the range tests derive from it: a class without parameters
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Parameters, Registry
-
-if TYPE_CHECKING:
-    from tireroad.runs.scene.tables.scene import Scene
-    from tireroad.runs.stages.base.record import Record
-    from tireroad.runs.stages.build.driven import Driven
 
 Curves = dict[str, tuple[np.ndarray, str]]
 Where = Callable[[tuple[str, ...], str], InputError]
@@ -30,14 +25,16 @@ class Output(Parameters):
     """Base class of the kinds of output.
 
     `of`: "points" for the driven points, which needs a [[force]], or "contact"; `in_contact`:
-    whether it is available in a scene with [contact]. `check` reports what a scene lacks.
+    whether it is available in a scene with [contact]. `check` reports what a scene lacks; `curves`
+    is given what the run computed at the points (runs.stages.driven.Driven) and where to note figures
+    (runs.stages.record.Record). Their types are not imported: a scene knows nothing of the stages.
     """
 
     owner = "output"
     of: ClassVar[str] = "points"
     in_contact: ClassVar[bool] = True
 
-    def check(self, scene: Scene, path: tuple[str, ...], error: Where) -> None:
+    def check(self, scene: Any, path: tuple[str, ...], error: Where) -> None:
         """Raise error((*path, key), reason) if the rest of the scene does not allow this output."""
 
     def frequencies(self) -> int:
@@ -48,7 +45,7 @@ class Output(Parameters):
         """Values per time step that it adds to the file, for that many driven points."""
         return 0
 
-    def curves(self, seen: Driven, record: Record) -> Curves:
+    def curves(self, seen: Any, record: Any) -> Curves:
         """(values, unit) by name in response.h5; figures go into the record. Collective."""
         raise NotImplementedError
 

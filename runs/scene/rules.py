@@ -12,9 +12,14 @@ from tireroad.fem.errors import InputError
 from tireroad.runs.scene.outputs import Output, check_steps
 from tireroad.runs.scene.road_rules import check_shape
 from tireroad.runs.scene.source import Source
-from tireroad.runs.scene.tables.contact import check_pattern, check_tread
-from tireroad.runs.scene.tables.scene import Scene, check_accuracy, check_axle, check_stiffness
-from tireroad.runs.scene.tables.tire import check_cavity
+from tireroad.runs.scene.tables.contact import check_tread
+from tireroad.runs.scene.tables.scene import (
+    Scene,
+    check_accuracy,
+    check_axle,
+    check_stiffness,
+    has_air,
+)
 
 Where = Callable[[tuple[str, ...], str], InputError]
 
@@ -234,6 +239,43 @@ def _time(scene: Scene, raw: dict[str, Any], error: Where) -> None:
         raise error(
             ("time", "step"),
             f"= {time.step:g} s makes {time.duration / time.step:.3g} steps; at most 1e8",
+        )
+
+
+def check_pattern(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    """Raise an error for an invalid pattern, or for one without a grid that resolves it."""
+    wanted = scene.pattern
+    if wanted is None:
+        return
+    if scene.contact is None or scene.contact.on_nodes:
+        raise error(
+            ("pattern",), "needs [contact] on a grid that sees it: contact.points = { dx, dy } (m)"
+        )
+    if bool(wanted.groove) == (wanted.file is not None):
+        raise error(("pattern",), "needs either [[pattern.groove]] or file")
+    if not wanted.pitch_lengths:
+        raise error(("pattern", "pitch_lengths"), "must have one number at least")
+    for number_, groove in enumerate(wanted.groove):
+        if groove.span[0] >= groove.span[1]:
+            raise error(("pattern", "groove", str(number_), "span"), "must ascend")
+
+
+def check_cavity(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    """Raise an error for what is not available with air."""
+    if not has_air(scene):
+        return
+    rotation, residual = scene.rotation, scene.greens.residual
+    if rotation is not None and rotation.speed and rotation.method == "full":
+        raise error(
+            ("rotation", "method"),
+            '= "full" knows no air: take "projected", or tire.cavity.gas = "none"',
+        )
+    used = bool(scene.force) or scene.contact is not None
+    if used and scene.modes.rim == "free" and residual not in ("none", "attachment"):
+        raise error(
+            ("greens", "residual"),
+            f'= "{residual}" of a free rim knows no air: take "attachment" or "none", or '
+            'tire.cavity.gas = "none"',
         )
 
 

@@ -2,7 +2,7 @@
 
 Starts from a trial's errors by cause, each with a known order in its size
 (contact.results.error_bars.orders), and its measured seconds by stage, scaled with the sizes of the
-stages (scene.extent.estimate). Rungs are climbed one at a time, each time the one that removes most
+stages (scene.estimate). Rungs are climbed one at a time, each time the one that removes most
 squared error per cost, until the target is predicted to be met; then those that it is clearly met
 without are left again, the most expensive first.
 

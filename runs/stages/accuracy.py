@@ -1,4 +1,7 @@
-"""Stage accuracy: error estimates of a run's forces from cheap companion runs of known orders."""
+"""Upper frequency up to which the results of a run are valid.
+
+Stage accuracy: error estimates of a run's forces from cheap companion runs of known orders.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ from typing import ClassVar
 import numpy as np
 
 from tireroad.contact.results.error_bars import CAUSES, Bars, Measured, measured, total
+from tireroad.contact.results.limits import Limit, limits, lowest, pitch
 from tireroad.contact.setup import ContactSetup
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.static.state import StaticState
@@ -18,17 +22,28 @@ from tireroad.runs.files.disk import Refused
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
-from tireroad.runs.stages.base.record import Record
-from tireroad.runs.stages.base.stage import Computed, Done
-from tireroad.runs.stages.build.model_limit import model_limit
-from tireroad.runs.stages.build.rolling.run_in import first_step
-from tireroad.runs.stages.build.rolling.scheme import recursive
-from tireroad.runs.stages.companions.budget import Budget, least_steps
-from tireroad.runs.stages.companions.coarser import COARSER
-from tireroad.runs.stages.companions.given import Given
-from tireroad.runs.stages.companions.runs import companions
+from tireroad.runs.stages.companions import COARSER, Budget, Given, companions, least_steps
+from tireroad.runs.stages.contact_file import ContactHistory
 from tireroad.runs.stages.greens import Responses
-from tireroad.runs.stages.stored.contact_file import ContactHistory
+from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.rolling import first_step, recursive
+from tireroad.runs.stages.stage import Computed, Done
+
+
+def all_limits(setup: ContactSetup, rolling: RollingModes, step: float) -> tuple[Limit, ...]:
+    """Limits by the modes, the spacing of the contact points and the `step` (s)."""
+    return limits(
+        step=step,
+        highest=rolling.highest / (2 * np.pi),
+        pitch=pitch(setup.patch),
+        speed=setup.rolled.speed,
+    )
+
+
+def model_limit(setup: ContactSetup, rolling: RollingModes, step: float) -> Limit:
+    """The lowest of the limits."""
+    return lowest(all_limits(setup, rolling, step))
+
 
 FORCES = ("contact_force", "axle_force")
 _UNITS = {"mean": "N", "deviation": "N", "level": "dB", "history": "-"}

@@ -1,31 +1,171 @@
-"""Stage modes: the lowest modes about the static state, and rotation matrices projected on them."""
+"""modes.h5: frequencies, traces on the outer face, small matrices; no fields on all unknowns.
+
+The modes on all unknowns, in the shared cache beside modes.h5.
+
+A family with attachment modes thus solves them once. Not in the result folder: 38 MB for 157 modes
+of 30,240 unknowns. Those above LARGEST are solved again by each member.
+
+Stage modes: the lowest modes about the static state, and rotation matrices projected on them.
+"""
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
+from tireroad.fem.axle import Axle
 from tireroad.fem.cavity.column import Column
+from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.static.state import StaticState
-from tireroad.modal.basis import ModalBasis, Projection
+from tireroad.modal.basis import ModalBasis, Projection, same_fields
 from tireroad.modal.damping import Damping, StrainEnergy
 from tireroad.modal.rotation_shapes import up_to
 from tireroad.modal.solver.slicing import Modes, how_many
 from tireroad.modal.standing import projected, solved, with_fields
 from tireroad.modal.waves import Labels, label
+from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
+from tireroad.runs.process.mpi import on_root
 from tireroad.runs.process.surroundings import available_memory
 from tireroad.runs.scene.estimate import estimate
-from tireroad.runs.stages.base import kept
-from tireroad.runs.stages.base.record import Record
-from tireroad.runs.stages.base.stage import Computed, Done, Shared
-from tireroad.runs.stages.build import cavity
-from tireroad.runs.stages.build.turning import damping_of, shapes_of
-from tireroad.runs.stages.stored import fields_file, modes_file
-from tireroad.runs.stages.stored.checkpoint import checkpointed, forget
+from tireroad.runs.stages import cavity, corner, reuse
+from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.stage import Computed, Done, Job, Shared, checkpointed, forget_checkpoint
+from tireroad.runs.stages.turning import damping_of, shapes_of
+
+_UNITS = {
+    "squares": "1/s2",
+    "gyroscopic": "1/rad",
+    "convective": "1/rad2",
+    "body": "1/rad",
+    "body_convective": "1/rad2",
+    "momentum": "kg^1/2",
+    "loss_factor": "-",
+}
+
+
+def fill(file, basis: ModalBasis, points: np.ndarray) -> None:
+    """Write a basis; `points` (s, 3) m: the undeformed nodes of the outer face."""
+    m, modes, labels = len(basis.frequency), basis.modes, basis.labels
+    put(file, "frequency", basis.frequency, "Hz")
+    put(file, "residual", modes.residual, "-")
+    if basis.projection.loss_factor is not None:
+        put(file, "loss_factor", basis.projection.loss_factor[:m], "-")
+    put(file, "surface/points", points, "m")
+    face = 3 * len(points)
+    shapes = basis.shape[:face].T.reshape(m + basis.projection.shapes, -1, 3)
+    put(file, "surface/shape", shapes[:m], "kg^-1/2")
+    if len(shapes) > m:
+        put(file, "turning/shape", shapes[m:], "kg^-1/2")
+    if len(basis.shape) > face:
+        put(file, "rim/translation", basis.shape[face : face + 3].T, "kg^-1/2")
+        put(file, "rim/rotation", basis.shape[face + 3 :].T, "rad/(m kg^1/2)")
+    if labels is not None:
+        put(file, "wave_number", labels.wave, "-")
+        put(file, "section_mode", labels.section, "-")
+        put(file, "wave_share", labels.share, "-")
+    for name, unit in _UNITS.items():
+        if getattr(basis.projection, name) is not None:
+            put(file, f"projected/{name}", getattr(basis.projection, name), unit)
+    cavity.fill(file, basis.projection.air)
+    corner.fill(file, basis.projection.corner)
+    file.attrs["inertia_count"] = modes.inertia_count
+    file.attrs["rigid_modes"] = modes.rigid
+
+
+def read(file, axle: Axle | None) -> ModalBasis:
+    """The basis of a wheel on an `axle`, without its fields on all unknowns."""
+    parts = [file["surface/shape"][:]]
+    if "turning/shape" in file:
+        parts = [np.concatenate([parts[0], file["turning/shape"][:]])]
+    if "rim" in file:
+        parts += [file["rim/translation"][:], file["rim/rotation"][:]]
+    shape = np.hstack([part.reshape(len(part), -1) for part in parts]).T.copy()
+    matrices = {name: values[:] for name, values in file["projected"].items()}
+    return ModalBasis(
+        frequency=file["frequency"][:],
+        shape=shape,
+        projection=Projection(
+            **matrices,
+            shapes=len(shape.T) - len(file["frequency"]),
+            air=cavity.read(file),
+            corner=corner.read(file, axle),
+        ),
+    )
+
+
+NAME = "fields"
+LARGEST = 300e6  # bytes: each process holds all of them while they are written or read
+_KEPT = ("orthonormality", "inertia_count", "counted_below", "rigid", "slices", "segments")
+
+
+def keep(job: Job, key: str, operators: Operators, modes: Modes) -> None:
+    """Store the fields of the modes with the hash `key` in the cache, if any. Collective."""
+    body = operators.body
+    if job.cache.folder is None or _size(operators, len(modes.squares)) > LARGEST:
+        return
+    whole = body.everywhere(operators.spread(modes.vectors))
+
+    def fill(file: Any) -> None:
+        put(file, "field", whole, "kg^-1/2")
+        put(file, "square", modes.squares, "1/s2")
+        put(file, "residual", modes.residual, "-")
+        file.attrs.update({name: getattr(modes, name) for name in _KEPT})
+        file.attrs["sectors"], file.attrs["symmetries"] = modes.sectors, list(modes.symmetries)
+
+    path = job.path(NAME)
+    job.write(path, job.provenance(NAME, key), fill)
+
+    def move() -> None:
+        job.cache.keep(NAME, key, path, {})
+        path.unlink()
+
+    on_root(job.comm, move)
+
+
+def kept(job: Job, key: str, operators: Operators, basis: ModalBasis) -> Modes | None:
+    """The modes of a basis with the hash `key`, with fields, from the cache; else None.
+
+    None also if they belong to another solution: fields and modes.h5 enter the cache separately,
+    from runs on any number of processes. Collective.
+    """
+    count = basis.projection.own
+    if job.fresh or job.cache.folder is None or _size(operators, count) > LARGEST:
+        return None
+    path = job.path(NAME)
+    if on_root(job.comm, lambda: job.cache.fetch(NAME, key, path)) is None:
+        return None
+    found = job.read(path, _read)
+
+    def remove() -> None:
+        with suppress(OSError):
+            path.unlink()
+
+    on_root(job.comm, remove)
+    whole = found.pop("field")
+    vectors = operators.restrict(np.ascontiguousarray(whole[operators.body.ids]))
+    return (
+        Modes(vectors=vectors, **found)
+        if same_fields(operators.trace(vectors), basis.shape)
+        else None
+    )
+
+
+def _read(file: Any) -> dict[str, Any]:
+    given = file.attrs
+    found = {name: given[name].item() for name in _KEPT}
+    found |= {"squares": file["square"][:], "residual": file["residual"][:]}
+    found |= {"sectors": tuple(int(n) for n in given["sectors"])}
+    return found | {"symmetries": tuple(map(str, given["symmetries"])), "field": file["field"][:]}
+
+
+def _size(operators: Operators, count: int) -> float:
+    return 24.0 * operators.body.lattice.size * count
+
 
 _NAMED = 8  # modes of an axisymmetric tire shown by name
 
@@ -42,7 +182,7 @@ class Motions(Shared[SmallMotions]):
         tire, static, modal = self.job.tire, self.static.product, self.job.scene.modes
         rim, road = modal.rim, modal.road
         key = self.static.key, rim, road
-        return kept.once("matrices", key, lambda: SmallMotions(tire, static, rim=rim, road=road))
+        return reuse.once("matrices", key, lambda: SmallMotions(tire, static, rim=rim, road=road))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,8 +240,8 @@ class ModesStage(Computed[ModalBasis]):
         """As any stage; also caches the fields for other members of a family. Collective."""
         basis = super().produce(key, record)
         if self.job.scene.greens.residual == "attachment" and basis.modes is not None:
-            fields_file.keep(self.job, key, self.motions.product.operators, basis.modes)
-        forget(self.job, self.name)
+            keep(self.job, key, self.motions.product.operators, basis.modes)
+        forget_checkpoint(self.job, self.name)
         return basis
 
     def _teams(self, record: Record) -> int:
@@ -122,11 +262,11 @@ class ModesStage(Computed[ModalBasis]):
 
     def write(self, file, product: ModalBasis) -> None:
         """Frequencies, traces and the small matrices; not the fields on all unknowns."""
-        modes_file.fill(file, product, self.static.product.points)
+        fill(file, product, self.static.product.points)
 
     def read(self, file) -> ModalBasis:
         """The basis without its fields on all unknowns."""
-        return modes_file.read(file, self.job.axle)
+        return read(file, self.job.axle)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,7 +285,7 @@ class Fields(Shared[ModalBasis]):
             return basis
         motions, air = self.motions.product, self.air.product
         given = self.job, self.modes.key, motions.operators
-        if (known := fields_file.kept(*given, basis)) is not None:
+        if (known := kept(*given, basis)) is not None:
             return replace(basis, modes=known, column=air)
         again = with_fields(
             basis,
@@ -156,7 +296,7 @@ class Fields(Shared[ModalBasis]):
             turning=shapes_of(self.job),
         )
         assert again.modes is not None, "they were solved just now"
-        fields_file.keep(*given, again.modes)
+        keep(*given, again.modes)
         return again
 
 

@@ -10,8 +10,7 @@ import numpy as np
 
 from tireroad.greens.basis import Basis
 from tireroad.runs.files.store import put
-from tireroad.runs.stages.build.forces import Forces
-from tireroad.runs.stages.build.whole_tire import WholeTire, replayed
+from tireroad.runs.stages.whole_tire import Forces, WholeTire, replayed
 
 _INSTANTS = 400  # at most; the last ones of the run
 _PER_PERIOD = 8  # of the band's upper frequency

@@ -1,4 +1,9 @@
-"""Runs the stages in order: each is reused, computed or skipped, and its cost is recorded."""
+"""A road file, read by one process of each machine and shared with the others.
+
+The parts of the pipeline in their order.
+
+Runs the stages in order: each is reused, computed or skipped, and its cost is recorded.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +15,11 @@ from pathlib import Path
 
 from mpi4py import MPI
 
+from tireroad.contact.roads.kind import RoadKind
+from tireroad.contact.roads.under_tire import Road
 from tireroad.contact.setup import ContactSetup
+from tireroad.fem.collective import broadcast
+from tireroad.fem.errors import InputError
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.static.state import StaticState
 from tireroad.greens.coupling import Wheel
@@ -33,16 +42,75 @@ from tireroad.runs.scene.estimate import (
 from tireroad.runs.scene.load import with_modal
 from tireroad.runs.scene.plan import meets_road, skipped
 from tireroad.runs.scene.resolved import dumps
-from tireroad.runs.scene.road_rules import check_road
+from tireroad.runs.scene.road_rules import check_road, keep, made
 from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.stages.base import failed
-from tireroad.runs.stages.base.job import Job
-from tireroad.runs.stages.base.stage import Done, Part, Shared, Stage
-from tireroad.runs.stages.build.setup import Setup
-from tireroad.runs.stages.build.shared_road import share
+from tireroad.runs.stages import obtained as stages_obtained
+from tireroad.runs.stages.accuracy import AccuracyStage
+from tireroad.runs.stages.companions import STATIC_TO_GREENS
+from tireroad.runs.stages.contact import ContactStage
 from tireroad.runs.stages.greens import Responses
-from tireroad.runs.stages.parts import PARTS
-from tireroad.runs.stages.stored.obtained import obtained
+from tireroad.runs.stages.motion import MotionStage
+from tireroad.runs.stages.obtained import obtained
+from tireroad.runs.stages.response import ResponseStage
+from tireroad.runs.stages.setup import Setup
+from tireroad.runs.stages.spectra import SpectraStage
+from tireroad.runs.stages.stage import Done, Job, Part, Shared, Stage
+from tireroad.runs.stages.static import StaticStage
+from tireroad.runs.stages.stiffness import StiffnessStage
+from tireroad.runs.stages.vibration import VibrationStage
+
+
+def share(surface: RoadKind, comm: MPI.Comm) -> None:
+    """Make the road of a file available on every process, where `made` finds it.
+
+    Heights in memory are sent as buffers; a file, the user's or a temporary one, is opened by each
+    process, which reads what it drives over. A process that cannot open it reads the road file
+    itself on first use. Raises InputError on all processes if one machine cannot use the file.
+    Collective.
+    """
+    if comm.size == 1 or surface.reads is None:
+        return
+    node = comm.Split_type(MPI.COMM_TYPE_SHARED)
+    road, error = None, None
+    if node.rank == 0:
+        try:
+            road = made(surface)
+        except InputError as told:
+            error = told
+    failed = [one for one in comm.allgather(error) if one is not None]
+    if not failed and (found := _sent(road, node)) is not None:
+        keep(surface, found)
+    node.Free()
+    if failed:
+        raise failed[0]
+
+
+def _sent(road: Road | None, node: MPI.Comm) -> Road | None:
+    """The road of the machine's first process if this one can open it, else None. Collective.
+
+    No process leaves before all have opened it: the first one may then close its temporary file.
+    """
+    try:
+        return broadcast(node, road)
+    except OSError:
+        return None
+    finally:
+        node.Barrier()
+
+
+PARTS: tuple[type[Part], ...] = (
+    StaticStage,
+    StiffnessStage,
+    *STATIC_TO_GREENS,
+    ContactStage,
+    AccuracyStage,
+    ResponseStage,
+    SpectraStage,
+    VibrationStage,
+    MotionStage,
+)
+
+"""Each takes its inputs by name from the parts before it."""
 
 
 @dataclass(frozen=True)
@@ -135,7 +203,7 @@ def _parts(job: Job, reasons: Mapping[str, str], summary: Summary) -> dict[str, 
     """The product of each part of the pipeline, by name. Collective."""
     done: dict[str, Done] = {}
     for kind in PARTS:
-        with failed.entered(kind.name, summary, job.comm):
+        with stages_obtained.entered(kind.name, summary, job.comm):
             if (found := _done(job, kind, done, reasons, summary)) is not None:
                 done[kind.name] = found
             job.settle(done)

@@ -14,14 +14,20 @@ from tireroad.modal.basis import ModalBasis
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.scene.outputs import Curves
-from tireroad.runs.stages.base.record import Record
-from tireroad.runs.stages.base.stage import Computed, Done
-from tireroad.runs.stages.build.driven import Driven
-from tireroad.runs.stages.build.point_forces import directions, histories, shortest_period
-from tireroad.runs.stages.build.rolling.scheme import of_given_forces
-from tireroad.runs.stages.build.rolling.stepping import Integration, integration, planned
+from tireroad.runs.stages.contact_file import ContactHistory
+from tireroad.runs.stages.driven import Driven
 from tireroad.runs.stages.greens import Responses
-from tireroad.runs.stages.stored.contact_file import ContactHistory
+from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.rolling import (
+    Integration,
+    directions,
+    histories,
+    integration,
+    of_given_forces,
+    planned,
+    shortest_period,
+)
+from tireroad.runs.stages.stage import Computed, Done
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,11 @@
-"""Stage rotating: eigenproblem of the rotating tire, on the modal basis or the finite elements."""
+"""The states in rotating.h5: those of the modes and, apart, those of the shapes that joined them.
+
+A state dominated by rotation shapes (modal.rotation_shapes) is not an eigenfrequency of the tire: it
+represents the coupling of its modes to faster ones. There are as many as shapes; `turning/place`
+holds their indices among all states.
+
+Stage rotating: eigenproblem of the rotating tire, on the modal basis or the finite elements.
+"""
 
 from __future__ import annotations
 
@@ -18,12 +25,59 @@ from tireroad.modal.damping import Proportional, StrainEnergy
 from tireroad.modal.rolling import RollingModes, full_states, rolling_modes
 from tireroad.modal.states import StateModes
 from tireroad.runs.files.store import put
-from tireroad.runs.stages.base.job import Job
-from tireroad.runs.stages.base.record import Record
-from tireroad.runs.stages.base.stage import Computed, Done, Shared
-from tireroad.runs.stages.build import cavity, corner
-from tireroad.runs.stages.build.turning import turning_of
-from tireroad.runs.stages.stored import states_file
+from tireroad.runs.stages import cavity, corner
+from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.stage import Computed, Done, Job, Shared
+from tireroad.runs.stages.turning import turning_of
+
+_STATES = {"eigenvalue": "1/s", "right": "-", "left": "s", "residual": "-", "left_residual": "-"}
+_BLOCK = {"block": "1/s", "block_right": "-", "block_left": "s"}
+_LAST = ("right",)  # the states lie along the last axis; for all others along the first
+
+
+def of_shapes(rolling: RollingModes) -> np.ndarray:
+    """Mask (q,) of the shapes' states: those with the largest share of shapes in their norm."""
+    projection, right = rolling.basis.projection, rolling.states.right
+    mask = np.zeros(right.shape[1], bool)
+    if projection.shapes and not rolling.full:
+        square = np.abs(right) ** 2
+        share = square[projection.modes : projection.own].sum(axis=0) / square.sum(axis=0)
+        mask[np.argsort(-share, kind="stable")[: projection.shapes]] = True
+    return mask
+
+
+def fill(file, rolling: RollingModes) -> None:
+    """Write the states and the near-defective block."""
+    states, joined = rolling.states, of_shapes(rolling)
+    for group, mask in (("", ~joined), ("turning/", joined)):
+        if group and not joined.any():
+            continue
+        for name, unit in _STATES.items():
+            values = getattr(states, name)
+            put(file, group + name, values[:, mask] if name in _LAST else values[mask], unit)
+        put(file, f"{group}frequency", states.eigenvalue[mask].imag / (2 * np.pi), "Hz")
+    if joined.any():
+        put(file, "turning/place", np.flatnonzero(joined), "-")
+    for name, unit in _BLOCK.items():
+        put(file, name, getattr(states, name), unit)
+    file.attrs["basis_condition"] = states.condition
+    file.attrs["rigid_states"] = states.rigid
+
+
+def read(file) -> StateModes:
+    """The states in their original order."""
+    values = {name: file[name][:] for name in (*_STATES, *_BLOCK)}
+    if "turning" in file:
+        place = file["turning/place"][:]
+        joined = np.zeros(len(values["eigenvalue"]) + len(place), bool)
+        joined[place] = True
+        order = np.argsort(np.concatenate([np.flatnonzero(~joined), place]))
+        for name in _STATES:
+            axis = -1 if name in _LAST else 0
+            both = np.concatenate([values[name], file[f"turning/{name}"][:]], axis=axis)
+            values[name] = np.ascontiguousarray(np.take(both, order, axis=axis))
+    known = float(file.attrs["basis_condition"]), int(file.attrs["rigid_states"])
+    return StateModes(condition=known[0], rigid=known[1], **values)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,7 +185,7 @@ class RotatingStage(Computed[RollingModes]):
 
     def read(self, file) -> tuple[StateModes, dict]:
         """The states and, for full states, their own fields: shape and momentum."""
-        states = states_file.read(file)
+        states = read(file)
         if "basis" not in file:
             return states, {}
         own = file["basis"]
@@ -160,7 +214,7 @@ def _beyond(speed: float, critical: float) -> str:
 
 def _describe(record: Record, rolling: RollingModes, critical: float) -> None:
     states = rolling.states
-    own = states.eigenvalue[~states_file.of_shapes(rolling)]
+    own = states.eigenvalue[~of_shapes(rolling)]
     oscillating = own[own.imag > 0]
     record.headline |= {
         "pairs": (len(oscillating), "-"),
@@ -200,13 +254,13 @@ def _growth(job: Job, rolling: RollingModes, basis: ModalBasis) -> str:
 
 def _fill(file, rolling: RollingModes) -> None:
     states, lines = rolling.states, rolling.campbell
-    states_file.fill(file, rolling)
+    fill(file, rolling)
     if rolling.full:
         put(file, "basis/shape", rolling.basis.shape, "kg^-1/2")
         put(file, "basis/momentum", rolling.basis.projection.momentum, "kg^1/2")
         corner.fill(file["basis"], rolling.basis.projection.corner)
     if rolling.basis.projection.air is not None:
-        put(file, "air_share", cavity.share(rolling)[~states_file.of_shapes(rolling)], "-")
+        put(file, "air_share", cavity.share(rolling)[~of_shapes(rolling)], "-")
     if lines is not None:
         put(file, "campbell/speed", lines.speed, "rad/s")
         put(file, "campbell/eigenvalue", lines.eigenvalue, "1/s")

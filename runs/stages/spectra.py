@@ -1,4 +1,7 @@
-"""Stage spectra: contact and axle force over frequency."""
+"""Levels and densities of all histories of a run: forces, moments, motion of chosen points.
+
+Stage spectra: contact and axle force over frequency.
+"""
 
 from __future__ import annotations
 
@@ -6,22 +9,170 @@ import math
 from dataclasses import dataclass, field
 from typing import ClassVar
 
+import h5py
 import numpy as np
 
+from tireroad.contact.results import spectra
 from tireroad.contact.results.limits import Limit, lowest
-from tireroad.contact.results.spectra import amplitudes, least_duration, lowest_wanted, nominal
+from tireroad.contact.results.spectra import (
+    FORCE,
+    MOMENT,
+    SILENT,
+    VELOCITY,
+    amplitudes,
+    density,
+    least_duration,
+    lowest_wanted,
+    nominal,
+    off_middle,
+    third_octaves,
+    total_level,
+)
 from tireroad.contact.setup import ContactSetup
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
-from tireroad.runs.stages.accuracy import Accuracy
-from tireroad.runs.stages.base.record import Record
-from tireroad.runs.stages.base.stage import Computed, Done
-from tireroad.runs.stages.build import corner
-from tireroad.runs.stages.build.model_limit import all_limits
-from tireroad.runs.stages.build.rolling.run_in import first_step, run_in
-from tireroad.runs.stages.stored import levels
-from tireroad.runs.stages.stored.contact_file import ContactHistory
+from tireroad.runs.stages import corner
+from tireroad.runs.stages.accuracy import Accuracy, all_limits
+from tireroad.runs.stages.contact_file import ContactHistory
+from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.rolling import first_step, run_in
+from tireroad.runs.stages.stage import Computed, Done
+
+# name in `third_octave/`: name in `density/`, reference of the level, its unit, unit of the
+# density, whether the rate is taken
+_KINDS = {
+    "level": ("axle_force", FORCE, "1 N", "N2/Hz", False),
+    "contact_level": ("contact_force", FORCE, "1 N", "N2/Hz", False),
+    "hub_moment_level": ("hub_moment", MOMENT, "1 N m", "N2 m2/Hz", False),
+    "point_velocity_level": ("point_velocity", VELOCITY, "1 nm/s", "m2/s2/Hz", True),
+}
+WEIGHTED = "_a_weighted"
+# dB by which the window may change the mean square of a force without a warning: an impact in the
+# middle adds 4.26, a short rough record loses up to 5. A force that varies by less than this share
+# needs none.
+_LOWER, _HIGHER, _SLIGHT = -6.0, 4.0, 1e-6
+_CONSTANT = "none: it does not vary", "-"
+_ONE = {  # common to all
+    "third_octave/centre": "Hz",
+    "third_octave/nominal": "Hz",
+    "third_octave/lines": "-",
+    "third_octave/confidence": "dB",
+    "third_octave/too_narrow": "Hz",
+    "density/frequency": "Hz",
+    "density/confidence": "dB",
+    "density/segment": "s",
+    "density/averages": "-",
+}
+UNITS = _ONE | {
+    key: unit
+    for name, (what, _, reference, per_hertz, _) in _KINDS.items()
+    for key, unit in (
+        (f"third_octave/{name}", f"dB re {reference}"),
+        (f"third_octave/{name}{WEIGHTED}", f"dB(A) re {reference}"),
+        (f"density/{what}", per_hertz),
+    )
+}
+
+
+def series(history: ContactHistory, start: int) -> dict[str, np.ndarray]:
+    """The histories by level name from step `start` on: (n, d) in N, N m, and m for points."""
+    found = {"contact_level": history.total_force, "level": history.axle_force}
+    found |= {"hub_moment_level": history.wheel.get("hub_moment")}
+    found |= {"point_velocity_level": history.driven}
+    return {name: values[start:] for name, values in found.items() if values is not None}
+
+
+def levels_of(history: ContactHistory, start: int, up_to: float) -> dict[str, np.ndarray]:
+    """All entries of `UNITS` that the history provides, after the run-in and below `up_to` Hz.
+
+    By their names in spectra.h5: levels (b, 3), for points (b, k, 3), dB of the rms; `…_a_weighted`
+    with each line weighted; densities (f, 3) or (f, k, 3).
+    """
+    found: dict[str, np.ndarray] = {}
+    for name, values in series(history, start).items():
+        what, reference, _, _, rate = _KINDS[name]
+        flat, shape = values.reshape(len(values), -1), values.shape[1:]
+        for weighted, suffix in ((False, ""), (True, WEIGHTED)):
+            centre, level = third_octaves(
+                flat, history.step, up_to, reference=reference, rate=rate, weighted=weighted
+            )
+            found[f"third_octave/{name}{suffix}"] = level.reshape(-1, *shape)
+        welch = density(flat, history.step, up_to, rate)
+        found[f"density/{what}"] = welch.density.reshape(-1, *shape)
+    spacing = 1 / (len(flat) * history.step)
+    count = spectra.lines(centre, spacing)
+    return found | {
+        "third_octave/centre": centre,
+        "third_octave/nominal": spectra.nominal(centre),
+        "third_octave/lines": count,
+        "third_octave/confidence": spectra.confidence(spectra.freedom(count)),
+        "third_octave/too_narrow": spectra.too_narrow(spacing, up_to),
+        "density/frequency": welch.frequency,
+        "density/confidence": welch.confidence,
+        "density/segment": np.array(welch.segment),
+        "density/averages": np.array(welch.averages),
+    }
+
+
+def describe(
+    record: Record,
+    found: dict[str, np.ndarray],
+    history: ContactHistory,
+    start: int,
+    up_to: float,
+) -> None:
+    """Record the bands of `levels_of`, the vertical totals, and what the window hides.
+
+    Totals are over all lines below `up_to` Hz and do not depend on which bands have a level.
+    """
+    names = found["third_octave/nominal"]
+    if len(names):
+        record.headline["bands"] = (_named(names), "-")
+    forces = series(history, start)
+    for name, what in (("contact_level", "contact force"), ("level", "force on the axle")):
+        if name not in forces or len(forces[name]) < 2:
+            continue
+        vertical = forces[name][:, 2:]
+        for kind, letter in (("level", ""), ("A-weighted level", "(A)")):
+            total = float(total_level(vertical, history.step, up_to, weighted=bool(letter))[0])
+            record.headline[f"{kind} of the vertical {what}"] = (
+                (total, f"dB{letter} re 1 N") if total > SILENT else _CONSTANT
+            )
+        _warn_of_window(record, vertical, what)
+    narrow = spectra.nominal(found["third_octave/too_narrow"])
+    if len(narrow):
+        record.headline["bands left out, narrower than three lines"] = (_named(narrow), "-")
+
+
+def _warn_of_window(record: Record, force: np.ndarray, what: str) -> None:
+    """Warn where an impact near an end of the record, or in its middle, sets its level."""
+    off = float(off_middle(force)[0])
+    if not _LOWER < off < _HIGHER and force.std() > _SLIGHT * np.abs(force).max():
+        where, change = ("near an end", "lower") if off < 0 else ("in the middle", "higher")
+        record.warnings.append(
+            f"most of what the {what} varies lies {where} of the record, where the Hann window of spectra and "
+            f"levels makes them {abs(off):.2g} dB {change} than its mean square: such levels depend on when an "
+            "impact happens (road.position, time.duration); compare runs with equal ones only"
+        )
+
+
+def _named(bands: np.ndarray) -> str:
+    """The first and the last band in words."""
+    return f"{bands[0]:g} to {bands[-1]:g} Hz" if len(bands) > 1 else f"{bands[0]:g} Hz"
+
+
+def write(file: h5py.File, found: dict[str, np.ndarray]) -> None:
+    """Write all datasets of `found`."""
+    for name in UNITS:
+        if name in found:
+            put(file, name, found[name], UNITS[name])
+
+
+def read(file: h5py.File) -> dict[str, np.ndarray]:
+    """The same, read back."""
+    return {name: file[name][()] for name in UNITS if name in file}
+
 
 _FEWEST = 32  # fewest steps for a meaningful spectrum
 
@@ -34,11 +185,11 @@ class Spectra:
 
     `frequency` (f,) Hz; `contact_force` and, if stored, `axle_force` (f, 3) N: complex amplitudes;
     `left_out` s: the run-in; `limit`: where the model ends; `levels`: third octaves and densities
-    by the names of runs.stages.stored.levels; `too_short`: what the reader is told of a run without
+    by the names of `levels_of`; `too_short`: what the reader is told of a run without
     its low bands, empty if it has them; `level_error` and `contact_level_error` (b, 3) dB:
     estimated errors of the third octaves of axle and contact force, NaN where unknown, None if not
     requested; `wheel`: hub moments and motions of a moving wheel, (f, 3) or (f, 1), by the names of
-    runs.stages.build.corner.
+    runs.stages.corner.
     """
 
     frequency: np.ndarray
@@ -91,8 +242,8 @@ class SpectraStage(Computed[Spectra]):
         limit = self._limit(record, step)
         frequency, contact = amplitudes(total, step)
         below = frequency <= limit.frequency
-        found = levels.levels_of(history, start, limit.frequency)
-        levels.describe(record, found, history, start, limit.frequency)
+        found = levels_of(history, start, limit.frequency)
+        describe(record, found, history, start, limit.frequency)
         grows = run_in(self.setup.product, self.job.scene.road)
         short = too_short(found["third_octave/centre"], limit.frequency, grows)
         record.warnings += [short] if short else []
@@ -159,7 +310,7 @@ class SpectraStage(Computed[Spectra]):
                 put(file, stored, getattr(product, name), unit)
         for name, values in product.wheel.items():
             put(file, name, values, corner.UNITS[name])
-        levels.write(file, product.levels)
+        write(file, product.levels)
         file.attrs["axle_force_is"] = (
             "force on the hub of a wheel that moves"
             if self.job.axle
@@ -178,7 +329,7 @@ class SpectraStage(Computed[Spectra]):
         return Spectra(
             left_out=float(file.attrs["left_out"]),
             limit=limit,
-            levels=levels.read(file),
+            levels=read(file),
             too_short=str(file.attrs["too_short"]),
             wheel=wheel,
             **kept,

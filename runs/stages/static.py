@@ -1,33 +1,157 @@
-"""Stage static: inflates the tire and presses it on the road."""
+"""Cord forces of a static state, in static.h5 and in its headline.
+
+Friction of a static state, in static.h5 and in its headline.
+
+The static state in static.h5.
+
+Stage static: inflates the tire and presses it on the road.
+"""
 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
 from typing import ClassVar
 
+import h5py
 import numpy as np
 
 from tireroad.fem.collective import collect
 from tireroad.fem.errors import ConvergenceError
-from tireroad.fem.static.diagnosis import with_cause
+from tireroad.fem.model import TireModel
 from tireroad.fem.static.equilibrium import Equilibrium, History
 from tireroad.fem.static.footprint import Footprint
 from tireroad.fem.static.load_error import UNKNOWN, load_error
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import Loader, with_cause
 from tireroad.fem.static.press import Near, place
 from tireroad.fem.static.state import StaticState, static_state
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.timing import Timing
+from tireroad.fem.tire.cord_forces import CordForce
+from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
-from tireroad.runs.stages.base import kept
-from tireroad.runs.stages.base.job import Job
-from tireroad.runs.stages.base.record import Record
-from tireroad.runs.stages.base.stage import Computed
-from tireroad.runs.stages.build.tire import road_shape
-from tireroad.runs.stages.build.turning import friction_of, rolling_shape, turning_of, wheel_slip
-from tireroad.runs.stages.stored import cords_file, friction_file, static_file
-from tireroad.runs.stages.stored.checkpoint import checkpointed, forget
+from tireroad.runs.stages import reuse
+from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.stage import Computed, Job, checkpointed, forget_checkpoint
+from tireroad.runs.stages.tire import road_shape
+from tireroad.runs.stages.turning import friction_of, rolling_shape, turning_of, wheel_slip
+
+_UNITS = {"points": "m", "force": "N", "area": "m2"}
+
+
+def fill_cords(file: h5py.File, state: StaticState) -> None:
+    """Write `cords/<name>/...`: grids (ring, along), force in N per cord."""
+    for name, cords in state.cords.items():
+        for part, unit in _UNITS.items():
+            put(file, f"cords/{name}/{part}", getattr(cords, part), unit)
+    file.attrs["mass"] = state.mass
+
+
+def read_cords(file: h5py.File) -> dict:
+    """The fields of a static state that `fill` wrote."""
+    found = {
+        name: CordForce(*(group[part][:] for part in _UNITS))
+        for name, group in file.get("cords", {}).items()
+    }
+    return {"cords": found, "mass": float(file.attrs["mass"])}
+
+
+def cord_headline(state: StaticState) -> dict[str, tuple[float, str]]:
+    """Mass, largest cord force, and the share of the ply area whose cords are in compression."""
+    figures = {"mass": (state.mass, "kg")}
+    if not state.cords:
+        return figures
+    plies = state.cords.values()
+    slack = sum(cords.area[cords.force < 0].sum() for cords in plies)
+    return figures | {
+        "largest cord force": (float(max(cords.force.max() for cords in plies)), "N"),
+        "compressed cords": (
+            float(np.round(100 * slack / sum(cords.area.sum() for cords in plies), 6)),
+            "%",
+        ),
+    }
+
+
+_SMALL = 1e-6  # of mu f: tolerance for a node that slips
+
+
+def fill_friction(file: h5py.File, state: StaticState) -> None:
+    """Write `surface/pull` (s, 2) N and the travel per radian; nothing without friction."""
+    if state.pull is None:
+        return
+    put(file, "surface/pull", state.pull, "N")
+    file.attrs["horizontal_force"] = state.pull.sum(axis=0)
+    file.attrs["moment"] = state.moment
+    if state.travel is not None:
+        file.attrs["travel"] = state.travel
+
+
+def read_friction(file: h5py.File) -> dict:
+    """The fields of a static state that `fill` wrote."""
+    if "pull" not in file["surface"]:
+        return {}
+    travel = file.attrs.get("travel")
+    return {
+        "pull": file["surface/pull"][:],
+        "travel": None if travel is None else float(travel),
+    }
+
+
+def friction_headline(state: StaticState, friction: float | None) -> dict[str, tuple[float, str]]:
+    """Horizontal force, axle torque, moment about the vertical, share of the load that sticks."""
+    if state.pull is None or friction is None:
+        return {}
+    force, size = state.pull.sum(axis=0), np.linalg.norm(state.pull, axis=1)
+    sticks = size < (1 - _SMALL) * friction * state.normal_force
+    share = state.force[sticks].sum() / state.force.sum()
+    forward, left, torque, upright = np.round([*force, *state.moment[1:]], 6)
+    return {
+        "horizontal force, forward": (float(forward), "N"),
+        "horizontal force, left": (float(left), "N"),
+        "torque on the axle": (float(torque), "N m"),
+        "moment about the vertical": (float(upright), "N m"),
+        "share of the load that sticks": (float(100 * share), "%"),
+    }
+
+
+def fill(file: h5py.File, state: StaticState, tire: TireModel) -> None:
+    """Mesh, displacement, the outer face, the footprint."""
+    lattice = tire.lattice
+    put(file, "mesh/points", lattice.points(np.arange(lattice.size)), "m")
+    put(file, "mesh/cells", lattice.cells(), "-")
+    put(file, "displacement", state.displacement, "m")
+    put(file, "surface/points", state.points, "m")
+    put(file, "surface/displacement", state.moved, "m")
+    put(file, "surface/quads", lattice.quads(), "-")
+    put(file, "surface/force", state.force, "N")
+    put(file, "surface/area", state.area, "m2")
+    put(file, "surface/half_sizes", state.half_sizes, "m")
+    put(file, "surface/ring_rate", state.ring_rate, "m/rad")
+    fill_cords(file, state)
+    fill_friction(file, state)
+    file.attrs["touch_height"] = state.touch_height
+    file.attrs["inflation"] = state.inflation
+    file.attrs["load"] = state.load
+    file.attrs["rolling_speed"] = state.rolling.speed
+    file.attrs["rolling_inertia"] = state.rolling.inertia
+    file.attrs["rolling_radius"] = state.rolling_radius()
+    if state.road_height is None:
+        return
+    file.attrs["camber"] = float(np.degrees(state.road.camber))
+    if state.road.drum_radius is not None:
+        file.attrs["drum_radius"] = state.road.drum_radius
+    near = np.flatnonzero(state.gap < tire.section.thickness)
+    put(file, "contact/index", near, "-")
+    put(file, "contact/points", state.positions[near], "m")
+    put(file, "contact/force", state.push[near], "N")
+    put(file, "contact/gap", state.gap[near], "m")
+    put(file, "contact/area", state.area[near], "m2")
+    put(file, "contact/pressure", state.pressure[near], "Pa")
+    file.attrs["road_height"] = state.road_height
+    file.attrs["deflection"] = state.deflection
+    for name, value in asdict(state.footprint()).items():
+        file.attrs[f"footprint_{name}"] = value
+
 
 _SPEEDS, _SAME_SPEED = 6, 1e-6  # most solutions at a travel speed, and when two speeds agree
 _EXTENT = "length", "width", "area"
@@ -95,7 +219,7 @@ class StaticStage(Computed[StaticState]):
             with record.timing("error estimate"):
                 state = _estimate(record, state, loader)
         _describe(record, state, loader)
-        record.headline |= friction_file.headline(state, self.job.scene.static.friction)
+        record.headline |= friction_headline(state, self.job.scene.static.friction)
         self._warn_at_rest(record)
         observe.say(f"  {record.shares}")
         return state
@@ -154,15 +278,15 @@ class StaticStage(Computed[StaticState]):
     def produce(self, key: str, record: Record) -> StaticState:
         """As any stage; also removes the last state of an earlier, failed run. Collective."""
         if self.forgets:
-            kept.forget()
+            reuse.forget()
         product = super().produce(key, record)
         on_root(self.job.comm, lambda: self.job.path("static_last").unlink(missing_ok=True))
-        forget(self.job, self.name)
+        forget_checkpoint(self.job, self.name)
         return product
 
     def write(self, file, product: StaticState) -> None:
         """Mesh, displacement, outer face and footprint."""
-        static_file.fill(file, product, self.job.tire)
+        fill(file, product, self.job.tire)
 
     def read(self, file) -> StaticState:
         """The state, with what it was computed for."""
@@ -183,8 +307,8 @@ class StaticStage(Computed[StaticState]):
             fine_extent=None if road is None else _extent(attributes),
             inflation=float(attributes["inflation"]),
             rolling=steady_rolling(self.job, float(attributes["rolling_speed"])),
-            **cords_file.read(file),
-            **friction_file.read(file),
+            **read_cords(file),
+            **read_friction(file),
         )
 
 
@@ -232,7 +356,7 @@ def _show(progress) -> None:
 def _describe(record: Record, state: StaticState, loader: Loader) -> None:
     free = 3 * len(state.displacement)
     record.headline["unknowns"] = (free, "-")
-    record.headline |= cords_file.headline(state)
+    record.headline |= cord_headline(state)
     if state.road_height is not None:
         extent = state.footprint()
         record.headline |= {

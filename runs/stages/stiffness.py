@@ -1,4 +1,7 @@
-"""Stage stiffness: load and footprint over deflection, stiffness of the non-rolling tire."""
+"""[stiffness] with friction: force over road displacement at rest, or over slip when rolling.
+
+Stage stiffness: load and footprint over deflection, stiffness of the non-rolling tire.
+"""
 
 from __future__ import annotations
 
@@ -6,21 +9,120 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import ClassVar
 
+import h5py
 import numpy as np
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.matrices.road_stiffness import RoadStiffness, road_stiffness
 from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.friction_press import Slid, Slide
 from tireroad.fem.static.load_curve import CurvePoint, load_curve, slopes
 from tireroad.fem.static.load_steps import Loader
 from tireroad.fem.static.state import StaticState
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.scene.tables.scene import deflections
-from tireroad.runs.stages.base.record import Record
-from tireroad.runs.stages.base.stage import Computed, Done
-from tireroad.runs.stages.build import sliding
+from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.stage import Computed, Done, Job
 from tireroad.runs.stages.static import steady_rolling
+from tireroad.runs.stages.turning import wheel_slip
+
+AXES = ("longitudinal", "lateral")
+_COLUMNS = ("moved", "force", "tangent", "moment", "sticks")
+# Displacement at full sliding, times initial stiffness over friction force: 1.5 for two spheres
+# (Cattaneo, Mindlin), 3 for a rolling brush.
+_STANDING, _ROLLING = 2.0, 3.0
+_MOST = 0.5  # slip
+
+Curve = Mapping[str, np.ndarray]
+
+
+def slides(job: Job, state: StaticState, stuck: RoadStiffness) -> dict[str, Curve]:
+    """The curves by the names of `AXES`; none without friction.
+
+    `start`: initial slope, with all points sticking. Leaves the body in another state. Collective.
+    """
+    wanted, friction = job.scene.stiffness, job.scene.static.friction
+    if state.pull is None or not friction or not wanted.slide_steps:
+        return {}  # friction 0 resists nothing: no displacement to slide over
+    found: dict[str, Curve] = {}
+    for axis, name in enumerate(AXES):
+        slide = Slide(job.tire.body, state, friction, axis)
+        start = slide.start(wheel_slip(job.scene))
+        rate = start if slide.rolls else getattr(stuck, name)
+        end = wanted.slip_to if slide.rolls else wanted.slide_to
+        if end is None:
+            end = (
+                (_ROLLING if slide.rolls else _STANDING)
+                * friction
+                * state.normal_force.sum()
+                / rate
+            )
+            end = min(end, _MOST) if slide.rolls else end
+        points = []
+        for point in slide.curve(
+            (end * np.arange(1, wanted.slide_steps + 1) / wanted.slide_steps).tolist()
+        ):
+            points.append(point)
+            observe.say(f"  {name}: {_told(point, slide.rolls)}")
+        columns = {key: np.array([getattr(point, key) for point in points]) for key in _COLUMNS}
+        found[name] = columns | {"start": np.array(start)}
+    return found
+
+
+def _told(point: Slid, rolls: bool) -> str:
+    way = f"slip {point.moved:.4g}" if rolls else f"{1e3 * point.moved:.4g} mm"
+    return f"{way}: {point.force:.5g} N, {100 * point.sticks:.3g} % of the load sticks"
+
+
+def units(rolls: bool) -> dict[str, str]:
+    """Units of the columns; a rolling wheel has slip instead of displacement."""
+    rate = "N" if rolls else "N/m"
+    return {
+        "moved": "-" if rolls else "m",
+        "force": "N",
+        "tangent": rate,
+        "moment": "N m",
+        "sticks": "-",
+        "start": rate,
+    }
+
+
+def fill(file: h5py.File, found: Mapping[str, Curve], rolls: bool) -> None:
+    """Write `slide/<axis>/...`."""
+    for name, curve in found.items():
+        for key, unit in units(rolls).items():
+            put(file, f"slide/{name}/{key}", curve[key], unit)
+
+
+def read(file: h5py.File) -> dict[str, Curve]:
+    """The curves that `fill` wrote."""
+    group = file.get("slide", {})
+    return {name: {key: curve[key][()] for key in curve} for name, curve in group.items()}
+
+
+def half_way(curve: Curve) -> float:
+    """Secant stiffness at half of the largest force, N/m."""
+    force, moved = (np.concatenate([[0.0], curve[key]]) for key in ("force", "moved"))
+    half = 0.5 * force.max()
+    last = int(np.argmax(force >= half))
+    return float(half / np.interp(half, force[: last + 1], moved[: last + 1]))
+
+
+def describe(record: Record, found: Mapping[str, Curve], rolls: bool) -> None:
+    """Record the headline figures."""
+    for name, curve in found.items():
+        force = float(curve["force"].max())
+        if rolls:
+            title = "cornering stiffness" if name == "lateral" else "longitudinal slip stiffness"
+            record.headline[title] = (float(curve["start"]), "N/rad" if name == "lateral" else "N")
+        else:
+            record.headline[f"{name}, secant at half of its largest force"] = (
+                half_way(curve),
+                "N/m",
+            )
+        record.headline[f"{name} force at most"] = (force, "N")
+
 
 _CURVE = {
     "deflection": "m",
@@ -56,7 +158,7 @@ class Stiffness:
     curve: dict[str, np.ndarray]
     figures: dict[str, float]
     matrix: np.ndarray | None
-    slides: Mapping[str, sliding.Curve] = field(default_factory=dict)
+    slides: Mapping[str, Curve] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,7 +194,7 @@ class StiffnessStage(Computed[Stiffness]):
             body.set_displacement(state.displacement)
         found = replace(_result(points, state, stuck), slides=slides)
         _describe(record, found, stuck)
-        sliding.describe(record, slides, state.travel is not None)
+        describe(record, slides, state.travel is not None)
         return found
 
     def _stuck(self, record: Record, nodes: np.ndarray, centre: np.ndarray) -> RoadStiffness:
@@ -102,12 +204,12 @@ class StiffnessStage(Computed[Stiffness]):
             rolling = steady_rolling(self.job)
             return road_stiffness(self.job.tire.body, inflation, nodes, centre, rolling)
 
-    def _slides(self, record: Record, stuck: RoadStiffness | None) -> Mapping[str, sliding.Curve]:
+    def _slides(self, record: Record, stuck: RoadStiffness | None) -> Mapping[str, Curve]:
         """Force over road displacement with friction, if the scene has friction. Collective."""
         if stuck is None:
             return {}
         with record.timing("sliding"):
-            return sliding.slides(self.job, self.static.product, stuck)
+            return slides(self.job, self.static.product, stuck)
 
     def _curve(self, record: Record) -> tuple[list[CurvePoint], np.ndarray]:
         """The points of the curve, and the last contact forces on own nodes, N. Collective."""
@@ -141,7 +243,7 @@ class StiffnessStage(Computed[Stiffness]):
             put(file, name, np.array(value), _FIGURES[name])
         if product.matrix is not None:
             put(file, "matrix", product.matrix, "N/m, N/rad, N m/m, N m/rad")
-        sliding.fill(file, product.slides, self.static.product.travel is not None)
+        fill(file, product.slides, self.static.product.travel is not None)
 
     def read(self, file) -> Stiffness:
         """The same, read back."""
@@ -149,7 +251,7 @@ class StiffnessStage(Computed[Stiffness]):
             {name: file[f"curve/{name}"][:] for name in _CURVE},
             {name: float(file[name][()]) for name in _FIGURES if name in file},
             file["matrix"][:] if "matrix" in file else None,
-            sliding.read(file),
+            read(file),
         )
 
 

@@ -14,10 +14,9 @@ from tireroad.fem.static.state import StaticState
 from tireroad.greens.basis import Basis
 from tireroad.greens.outputs import Surface, mean_square_velocity, radiated_power
 from tireroad.runs.files.store import put
-from tireroad.runs.stages.base.stage import Done
-from tireroad.runs.stages.build.forces import Forces
-from tireroad.runs.stages.build.whole_tire import WholeTire, replayed
 from tireroad.runs.stages.spectra import Spectra
+from tireroad.runs.stages.stage import Done
+from tireroad.runs.stages.whole_tire import Forces, WholeTire, replayed
 
 VELOCITY, POWER = 1e-9, 1e-12  # m/s, W: reference values of the levels, ISO 1683
 _LARGEST = 2e8  # bytes: largest size of the stored displacement fields

@@ -85,7 +85,7 @@ def _group(scene: Scene) -> str:
     """One key for everything that the static state and the modes depend on."""
     from mpi4py import MPI
 
-    from tireroad.runs.stages.base.job import Job
+    from tireroad.runs.stages.stage import Job
     from tireroad.runs.stages.static import StaticStage
 
     static = StaticStage(job=Job(scene, Path("."), MPI.COMM_SELF))

@@ -17,7 +17,7 @@ Definition of a sweep file: a base scene, axes, and how their values form member
 
 `samples` and `seed` belong to the latin hypercube. [slurm] holds options of sbatch (account,
 partition, time); [queue] names the template and the commands of another batch system
-(runs.sweep.queue).
+(runs.sweep.local).
 """
 
 from __future__ import annotations

@@ -29,7 +29,7 @@ from tireroad.runs.files.disk import write_text
 from tireroad.runs.process import observe
 from tireroad.runs.process.surroundings import available_memory
 from tireroad.runs.scene.estimate import memory
-from tireroad.runs.stages.base import failed
+from tireroad.runs.stages import obtained
 from tireroad.runs.sweep.definition import Member, Sweep
 
 _LOOK = 0.5  # s between two checks of the running members
@@ -118,7 +118,7 @@ class _Worker:
         self._logs.mkdir(parents=True, exist_ok=True)
         settings = {
             "TIREROAD_CACHE": str((folder / "cache").resolve()),
-            failed.VARIABLE: str(failures.resolve()),
+            obtained.VARIABLE: str(failures.resolve()),
             "OPENBLAS_NUM_THREADS": "1",  # as a run alone: runs.start
             "OMP_NUM_THREADS": "1",
         }

@@ -21,9 +21,9 @@ def work() -> int:
     from mpi4py import MPI
 
     from tireroad.runs.cli import main
-    from tireroad.runs.stages.base import kept
+    from tireroad.runs.stages import reuse
 
-    kept.begin()
+    reuse.begin()
     status = DONE
     while status != STOPPED and (told := MPI.COMM_WORLD.bcast(_told())) is not None:
         signals.stop_on_signals()

@@ -33,9 +33,9 @@ from tireroad.modal.rolling import RollingModes, rolling_modes
 from tireroad.modal.standing import fewer
 from tireroad.runs.process import observe
 from tireroad.runs.scene.load import load
-from tireroad.runs.stages.build.setup import probes, scene_setup
-from tireroad.runs.stages.build.turning import turning_of
 from tireroad.runs.stages.pipeline import Finished, run_scene
+from tireroad.runs.stages.setup import probes, scene_setup
+from tireroad.runs.stages.turning import turning_of
 from tireroad.runs.validation.tables import Table
 
 

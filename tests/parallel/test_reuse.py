@@ -46,7 +46,7 @@ def run(tmp_path_factory, ran):
 
 def receptance(folder) -> np.ndarray:
     """H (f, c, c) m/N between the contact points, of the stored states."""
-    from tireroad.runs.stages.stored.responses import read_responses
+    from tireroad.runs.stages.greens import read_responses
 
     with h5py.File(folder / "greens.h5") as file:
         return read_responses(file)["contact"].receptance(FREQUENCY)

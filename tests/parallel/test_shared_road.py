@@ -15,7 +15,7 @@ from tireroad.contact.roads.kinds.laser import LaserFile
 from tireroad.contact.roads.kinds.measured import GridFile
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.road_rules import made
-from tireroad.runs.stages.build.shared_road import share
+from tireroad.runs.stages.pipeline import share
 
 COMM = MPI.COMM_WORLD
 X, Y = 5e-4 * np.arange(400), 5e-4 * np.arange(200)

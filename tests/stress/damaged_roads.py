@@ -13,7 +13,7 @@ from matplotlib.image import imsave
 from tireroad.contact.roads.road import make_road
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.tables.contact import PatternTable
-from tireroad.runs.stages.build.pattern import make_pattern
+from tireroad.runs.stages.setup import make_pattern
 
 ENDS = ("driven", "refused", "not finite")
 LIMIT = 60.0  # s for a case

@@ -31,7 +31,7 @@ def warm() -> None:
     threadpool_limits(1)  # whatever this process began with
     mpi.start_petsc([])
     import tireroad.runs.cli
-    import tireroad.runs.stages.build.rolling.watch  # noqa: F401
+    import tireroad.runs.stages.contact  # noqa: F401
 
 
 def forked(function: Callable[[], int], output: Path, limit: float) -> tuple[int | None, str, int]:

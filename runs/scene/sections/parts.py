@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tireroad.runs.scene.sections.kind import Proportions
+from tireroad.runs.scene.tables.tire import Proportions
 
 if TYPE_CHECKING:
     from tireroad.fem.decks.compounds import Rubber

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tireroad.contact.tread.law import TREADS, TreadLaw
 from tireroad.fem.errors import InputError
@@ -26,7 +26,7 @@ from tireroad.runs.scene.schema import (
 )
 
 if TYPE_CHECKING:
-    from tireroad.runs.scene.tables.scene import Scene
+    pass
 
 
 Where = Callable[[tuple[str, ...], str], InputError]
@@ -89,24 +89,6 @@ class PatternTable:
     )
     width: float = number(0.15, "m", "width of an image, across the tire", least=1e-6, most=10)
     groove: tuple[Groove, ...] = tables(Groove, "a groove of the tread")
-
-
-def check_pattern(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    """Raise an error for an invalid pattern, or for one without a grid that resolves it."""
-    wanted = scene.pattern
-    if wanted is None:
-        return
-    if scene.contact is None or scene.contact.on_nodes:
-        raise error(
-            ("pattern",), "needs [contact] on a grid that sees it: contact.points = { dx, dy } (m)"
-        )
-    if bool(wanted.groove) == (wanted.file is not None):
-        raise error(("pattern",), "needs either [[pattern.groove]] or file")
-    if not wanted.pitch_lengths:
-        raise error(("pattern", "pitch_lengths"), "must have one number at least")
-    for number_, groove in enumerate(wanted.groove):
-        if groove.span[0] >= groove.span[1]:
-            raise error(("pattern", "groove", str(number_), "span"), "must ascend")
 
 
 @dataclass(frozen=True, kw_only=True)

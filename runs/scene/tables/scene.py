@@ -16,7 +16,7 @@ The tables of a scene, key by key, with units, ranges and defaults (contract: Sc
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -44,7 +44,7 @@ from tireroad.runs.scene.schema import (
     vector,
 )
 from tireroad.runs.scene.tables.contact import Contact, PatternTable, Time
-from tireroad.runs.scene.tables.tire import Tire
+from tireroad.runs.scene.tables.tire import Cavity, Tire
 
 
 @dataclass(frozen=True)
@@ -706,3 +706,16 @@ class Scene:
         if rotation is None or self.modes.rim == "free":
             return False
         return rotation.shapes and rotation.method == "projected"
+
+
+def filled(scene: Scene) -> Scene:
+    """The scene with air included by default, for every section but the torus of the thesis."""
+    tire = scene.tire
+    if not tire.shape.air or tire.cavity is not None:
+        return scene
+    return replace(scene, tire=replace(tire, cavity=Cavity()))
+
+
+def has_air(scene: Scene) -> bool:
+    """Whether the air in the tire is modelled."""
+    return scene.tire.cavity is not None and scene.tire.cavity.gas != "none"

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, ClassVar
 from tireroad.runs.scene.outputs import OUTPUTS, Curves, Output
 
 if TYPE_CHECKING:
-    from tireroad.runs.stages.base.record import Record
-    from tireroad.runs.stages.build.driven import Driven
+    from tireroad.runs.stages.driven import Driven
+    from tireroad.runs.stages.record import Record
 
 
 @OUTPUTS.register("velocity", "velocity of the driven points, in scenes without [contact]")

@@ -19,7 +19,7 @@ from tireroad.runs.scene.estimate import estimate
 from tireroad.runs.search.journal import Journal, Trial, worst
 from tireroad.runs.search.search import Search, seconds
 from tireroad.runs.search.settings import Ladders, Settings, applied
-from tireroad.runs.stages.build.rolling.run_in import run_in
+from tireroad.runs.stages.rolling import run_in
 from tireroad.runs.validation.tables import Table
 from tireroad.tests.bench.parts.kept import Records, every_case
 from tireroad.tests.bench.parts.rolling_cases import (

@@ -6,7 +6,7 @@ import pytest
 from tireroad.contact.tread.pattern import Heights, Pattern, pitch_starts
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.tables.contact import Groove, PatternTable
-from tireroad.runs.stages.build.pattern import make_pattern
+from tireroad.runs.stages.setup import make_pattern
 from tireroad.runs.validation import contact_closed_forms
 from tireroad.runs.validation.contact_closed_forms import AROUND, grooves, rolled
 

@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from tireroad.contact.tread.compliance import rectangle_potential
 from tireroad.fem.errors import ConvergenceError, InputError
-from tireroad.runs.arguments import REPRODUCE
+from tireroad.runs.cli import REPRODUCE
 from tireroad.runs.scene.load import load
 from tireroad.tests.thesis.claim import UNEXPLAINED, Claim, verdict
 from tireroad.tests.thesis.command import known, reproduce

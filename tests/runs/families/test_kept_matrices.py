@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
-from tireroad.runs.stages.base import kept
+from tireroad.runs.stages import reuse
 
 SCENE = """
 [tire]
@@ -39,11 +39,11 @@ import os, sys
 import tireroad
 from tireroad.fem import model
 from tireroad.runs.cli import main
-from tireroad.runs.stages.base import kept
+from tireroad.runs.stages import reuse
 made = []
 real = model.SmallMotions.__init__
 model.SmallMotions.__init__ = lambda *given, **named: (made.append(1), real(*given, **named))[1]
-kept.begin()
+reuse.begin()
 for speed in (40.0, 45.0, 50.0):
     assert main(["run", sys.argv[1], "--out", f"{sys.argv[2]}/{speed:g}", "--set", f"rotation.speed={speed}"]) == 0
     print("made", len(made))
@@ -52,22 +52,22 @@ for speed in (40.0, 45.0, 50.0):
 
 @pytest.fixture(autouse=True)
 def nothing_kept(monkeypatch):
-    monkeypatch.setattr(kept, "_kept", None)
+    monkeypatch.setattr(reuse, "_kept", None)
 
 
 def test_the_last_two_are_kept() -> None:
     made = []
 
     def once(key: str) -> str:
-        return kept.once("kind", key, lambda: made.append(key) or key)
+        return reuse.once("kind", key, lambda: made.append(key) or key)
 
     once("alone"), once("alone")
     assert made == ["alone", "alone"]  # of a run by itself nothing is
-    kept.begin()
+    reuse.begin()
     for key in ("run", "coarser", "run", "coarser", "other", "coarser", "run"):
         assert once(key) == key
     assert made[2:] == ["run", "coarser", "other", "run"]
-    kept.forget()
+    reuse.forget()
     once("run")
     assert made[-1] == "run" and len(made) == 7
 

@@ -10,8 +10,8 @@ from mpi4py import MPI
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.runs.files.cache import NO_CACHE
-from tireroad.runs.stages.base import failed
-from tireroad.runs.stages.stored.obtained import obtained
+from tireroad.runs.stages import obtained as stages_obtained
+from tireroad.runs.stages.obtained import obtained
 
 
 class Folding:
@@ -36,9 +36,7 @@ class Folding:
 
 def messages(folder: Path, monkeypatch) -> tuple[list[str], list[str]]:
     """What three members say, the last of another load, and which of them tried."""
-    monkeypatch.setattr(
-        "tireroad.runs.stages.stored.obtained.solver_settings", lambda name, scene: ""
-    )
+    monkeypatch.setattr("tireroad.runs.stages.obtained.solver_settings", lambda name, scene: "")
     tried: list[str] = []
     said = []
     for scene, load in (("one", 6e4), ("two", 6e4), ("three", 7e4)):
@@ -50,7 +48,7 @@ def messages(folder: Path, monkeypatch) -> tuple[list[str], list[str]]:
 
 def test_a_failure_is_told_to_the_members_with_the_same_inputs(tmp_path, monkeypatch) -> None:
     """Three members of one static state failed after two minutes each."""
-    monkeypatch.setenv(failed.VARIABLE, str(tmp_path))
+    monkeypatch.setenv(stages_obtained.VARIABLE, str(tmp_path))
     said, tried = messages(tmp_path, monkeypatch)
     assert tried == ["one", "three"]
     assert said[0] == said[2] == "static: it folds"
@@ -58,6 +56,6 @@ def test_a_failure_is_told_to_the_members_with_the_same_inputs(tmp_path, monkeyp
 
 
 def test_a_run_by_itself_tries_again(tmp_path, monkeypatch) -> None:
-    monkeypatch.delenv(failed.VARIABLE, raising=False)
+    monkeypatch.delenv(stages_obtained.VARIABLE, raising=False)
     said, tried = messages(tmp_path, monkeypatch)
     assert tried == ["one", "two", "three"] and set(said) == {"static: it folds"}

@@ -4,7 +4,7 @@ import h5py
 import numpy as np
 import pytest
 
-from tireroad.runs.files.packed import Packer, create
+from tireroad.runs.stages.contact_file import Packer, create
 
 
 @pytest.mark.parametrize("shape", [(3,), (5, 2)])

@@ -7,8 +7,8 @@ import pytest
 from tireroad.contact.loop import equal_steps, steps_of
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.tables.scene import Motion, Road
-from tireroad.runs.stages.build.rolling.stepping import passing_period
 from tireroad.runs.stages.contact import beyond_unique
+from tireroad.runs.stages.rolling import passing_period
 
 SCENE = """
 name = "time"

@@ -19,8 +19,8 @@ from tireroad.runs.scene.schema import collection_of, variant_of, walk
 from tireroad.runs.scene.tables import tire as tire_tables
 from tireroad.runs.scene.tables.contact import PatternTable
 from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.stages.build.pattern import make_pattern
 from tireroad.runs.stages.pipeline import run_scene
+from tireroad.runs.stages.setup import make_pattern
 
 TIRE = """
 [tire]

@@ -15,13 +15,10 @@ from tireroad.fem.errors import InputError
 from tireroad.runs.files.disk import Refused
 from tireroad.runs.process import observe
 from tireroad.runs.scene.load import load
-from tireroad.runs.stages.base.job import Job
-from tireroad.runs.stages.build.setup import points_of
-from tireroad.runs.stages.build.wall import backed
-from tireroad.runs.stages.companions.coarser import coarser, coarser_job
-from tireroad.runs.stages.companions.given import Given
-from tireroad.runs.stages.companions.runs import companions
+from tireroad.runs.stages.companions import Given, backed, coarser, coarser_job, companions
 from tireroad.runs.stages.pipeline import run_scene
+from tireroad.runs.stages.setup import points_of
+from tireroad.runs.stages.stage import Job
 
 pytestmark = pytest.mark.slow
 

@@ -12,7 +12,7 @@ from tireroad.fem.errors import InputError
 from tireroad.runs.process import observe
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.tables.scene import axle_of
-from tireroad.runs.stages.build import corner
+from tireroad.runs.stages import corner
 from tireroad.runs.stages.pipeline import run_scene
 
 SCENE = """

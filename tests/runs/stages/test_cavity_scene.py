@@ -6,7 +6,8 @@ import pytest
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.load import load
-from tireroad.runs.scene.tables.tire import Cavity, has_air
+from tireroad.runs.scene.tables.scene import has_air
+from tireroad.runs.scene.tables.tire import Cavity
 
 SCENE = """
 [tire]

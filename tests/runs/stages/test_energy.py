@@ -2,8 +2,8 @@
 
 import pytest
 
-from tireroad.runs.stages.base.record import Record
-from tireroad.runs.stages.build.energy import _rolling, negligible
+from tireroad.runs.stages.contact import _rolling, negligible
+from tireroad.runs.stages.record import Record
 
 SCENE = """
 name = "energy"

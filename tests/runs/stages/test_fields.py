@@ -15,8 +15,8 @@ from tireroad.fem.model import SmallMotions
 from tireroad.modal.standing import solved
 from tireroad.runs.files.cache import Cache
 from tireroad.runs.scene.load import load
-from tireroad.runs.stages.base.job import Job
-from tireroad.runs.stages.stored import fields_file
+from tireroad.runs.stages import modes as stages_modes
+from tireroad.runs.stages.stage import Job
 
 COMM = MPI.COMM_WORLD
 SCENE = '[tire]\nsegments = 8\nelements_arc = 4\n[modal]\ncount = 6\nrim = "RIM"\n'
@@ -44,22 +44,22 @@ def test_fields_come_back_as_they_were_solved(folder, rim: str, monkeypatch) -> 
     modes = solved(operators, count=6)
     own = SimpleNamespace(own=6)
     basis = SimpleNamespace(projection=own, shape=operators.trace(modes.vectors))
-    assert fields_file.kept(job, "a", operators, basis) is None
-    fields_file.keep(job, "a", operators, modes)
-    again = fields_file.kept(job, "a", operators, basis)
+    assert stages_modes.kept(job, "a", operators, basis) is None
+    stages_modes.keep(job, "a", operators, modes)
+    again = stages_modes.kept(job, "a", operators, basis)
     for item in fields(modes):
         one, two = getattr(modes, item.name), getattr(again, item.name)
         if item.name == "vectors":  # a free rim's six unknowns come out of its nodes
             np.testing.assert_allclose(two, one, atol=1e-12 * np.abs(one).max())
         else:
             assert np.array_equal(one, two), item.name
-    assert fields_file.kept(job, "b", operators, basis) is None
+    assert stages_modes.kept(job, "b", operators, basis) is None
     COMM.Barrier()
     left = sorted(os.listdir(folder))
     # What comes next brings files into the folder for a moment: none may begin before all have looked.
     COMM.Barrier()
     assert left == ["cache", "scene.toml"]
     other = SimpleNamespace(projection=own, shape=basis.shape * [1, 1, -1, 1, 1, 1])
-    assert fields_file.kept(job, "a", operators, other) is None  # modes.h5 of another solution
-    monkeypatch.setattr(fields_file, "LARGEST", 0.0)
-    assert fields_file.kept(job, "a", operators, basis) is None
+    assert stages_modes.kept(job, "a", operators, other) is None  # modes.h5 of another solution
+    monkeypatch.setattr(stages_modes, "LARGEST", 0.0)
+    assert stages_modes.kept(job, "a", operators, basis) is None

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from tireroad.contact.results.spectra import SILENT, third_octaves
-from tireroad.runs.stages.base.record import Record
+from tireroad.runs.stages import spectra
+from tireroad.runs.stages.contact_file import ContactHistory
+from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.spectra import too_short
-from tireroad.runs.stages.stored import levels
-from tireroad.runs.stages.stored.contact_file import ContactHistory
 
 STEP = 1e-4
 
@@ -35,7 +35,7 @@ def history() -> ContactHistory:
 
 
 def test_every_quantity_has_its_level_weighted_and_not(history: ContactHistory) -> None:
-    found = levels.levels_of(history, 0, 400.0)
+    found = spectra.levels_of(history, 0, 400.0)
     band = list(found["third_octave/nominal"]).index(100.0)
     for name, exact in (
         ("contact_level", 20 * np.log10(2 / np.sqrt(2))),
@@ -53,7 +53,7 @@ def test_every_quantity_has_its_level_weighted_and_not(history: ContactHistory) 
 
 
 def test_nothing_is_beyond_the_limit_and_all_is_of_one_length(history: ContactHistory) -> None:
-    found = levels.levels_of(history, 0, 400.0)
+    found = spectra.levels_of(history, 0, 400.0)
     assert found["third_octave/centre"][-1] * 10**0.05 <= 400.0
     assert found["density/frequency"][-1] <= 400.0
     for name, values in found.items():
@@ -64,26 +64,26 @@ def test_nothing_is_beyond_the_limit_and_all_is_of_one_length(history: ContactHi
 
 
 def test_stored_and_read_again_with_units(history: ContactHistory, tmp_path: Path) -> None:
-    found = levels.levels_of(history, 0, 400.0)
+    found = spectra.levels_of(history, 0, 400.0)
     with h5py.File(tmp_path / "spectra.h5", "w") as file:
-        levels.write(file, found)
+        spectra.write(file, found)
         assert file["third_octave/point_velocity_level"].attrs["unit"] == "dB re 1 nm/s"
         assert file["third_octave/level_a_weighted"].attrs["unit"] == "dB(A) re 1 N"
         assert file["density/hub_moment"].attrs["unit"] == "N2 m2/Hz"
-        again = levels.read(file)
+        again = spectra.read(file)
     assert again.keys() == found.keys()
     assert all((again[name] == values).all() for name, values in found.items())
 
 
 def test_a_record_too_short_for_bands_says_so(history: ContactHistory) -> None:
     record = Record()
-    levels.describe(record, levels.levels_of(history, 9500, 200.0), history, 9500, 200.0)
+    spectra.describe(record, spectra.levels_of(history, 9500, 200.0), history, 9500, 200.0)
     assert record.headline["bands left out, narrower than three lines"][0] == "20 to 160 Hz"
 
 
 def test_sums_have_names_that_do_not_change_with_the_bands(history: ContactHistory) -> None:
     record = Record()
-    levels.describe(record, levels.levels_of(history, 0, 400.0), history, 0, 400.0)
+    spectra.describe(record, spectra.levels_of(history, 0, 400.0), history, 0, 400.0)
     assert record.headline["bands"][0].endswith(" to 315 Hz")
     value, unit = record.headline["level of the vertical contact force"]
     assert (value, unit) == (pytest.approx(20 * np.log10(2 / np.sqrt(2)), abs=0.05), "dB re 1 N")
@@ -95,7 +95,7 @@ def test_totals_count_lines_of_bands_too_narrow_for_a_level(history: ContactHist
     force = np.zeros((500, 3))
     force[:, 2] = 500.0 + np.sin(2 * np.pi * 20.0 * time)
     short = replace(history, time=time, total_force=force, axle_force=None, driven=None, wheel={})
-    levels.describe(record, levels.levels_of(short, 0, 400.0), short, 0, 400.0)
+    spectra.describe(record, spectra.levels_of(short, 0, 400.0), short, 0, 400.0)
     value = record.headline["level of the vertical contact force"][0]
     assert value == pytest.approx(10 * np.log10(0.5), abs=2.0)
     assert not record.warnings
@@ -113,15 +113,15 @@ def test_a_force_that_does_not_vary_has_no_level(history: ContactHistory) -> Non
         driven=None,
         wheel={},
     )
-    found = levels.levels_of(flat, 0, 400.0)
+    found = spectra.levels_of(flat, 0, 400.0)
     for name in ("contact_level", "level", "level_a_weighted"):
         assert (found[f"third_octave/{name}"] < SILENT).all(), name
-    levels.describe(record, found, flat, 0, 400.0)
+    spectra.describe(record, found, flat, 0, 400.0)
     for what in ("contact force", "force on the axle"):
         for kind in ("level", "A-weighted level"):
             assert record.headline[f"{kind} of the vertical {what}"][0] == "none: it does not vary"
     small = replace(flat, axle_force=force + 2e-6 * np.sin(np.arange(5000))[:, None])
-    levels.describe(record, levels.levels_of(small, 0, 400.0), small, 0, 2000.0)
+    spectra.describe(record, spectra.levels_of(small, 0, 400.0), small, 0, 2000.0)
     value = record.headline["level of the vertical force on the axle"][0]
     assert value == pytest.approx(10 * np.log10(2e-12), abs=0.1)
 
@@ -136,7 +136,7 @@ def test_an_impact_warns_that_its_level_depends_on_when(
     since = np.maximum(time - at, 0.0)
     force[:, 2] = 500.0 + 100.0 * np.exp(-200.0 * since) * np.sin(600.0 * since)
     hit = replace(history, time=time, total_force=force, axle_force=None, driven=None, wheel={})
-    levels.describe(record, levels.levels_of(hit, 0, 400.0), hit, 0, 400.0)
+    spectra.describe(record, spectra.levels_of(hit, 0, 400.0), hit, 0, 400.0)
     assert len(record.warnings) == 1
     assert words in record.warnings[0] and "road.position" in record.warnings[0]
 

@@ -9,7 +9,7 @@ import pytest
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.tables.scene import Stiffness, deflections
-from tireroad.runs.stages.build.sliding import slides
+from tireroad.runs.stages.stiffness import slides
 
 TIRE = """
 [tire]

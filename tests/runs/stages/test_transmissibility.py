@@ -10,9 +10,9 @@ from mpi4py import MPI
 from tireroad.fem.errors import InputError
 from tireroad.runs.process import observe
 from tireroad.runs.scene.load import load
-from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.outputs.transmissibility import apart, compare
 from tireroad.runs.stages.pipeline import run_scene
+from tireroad.runs.stages.record import Record
 
 SCENE = """
 [tire]

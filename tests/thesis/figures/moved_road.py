@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tireroad.runs.stages.build.setup import probes
+from tireroad.runs.stages.setup import probes
 from tireroad.runs.validation.full_elements import Trial, follow
 from tireroad.tests.thesis.claim import Claim
 from tireroad.tests.thesis.figure import Reproduced, figure
@@ -16,7 +16,7 @@ from tireroad.tests.thesis.runner import Scenes
 
 SCENE = "figure-6.5"
 ROAD = 1e-4  # m: amplitude of the road, section 6.3
-RADIUS = 0.5  # spectral radius of the finite elements' scheme, as in runs.validation.tires
+RADIUS = 0.5  # spectral radius of the finite elements' scheme, as in runs.validation.full_elements
 SOURCE = "section 6.3, figure 6.5"
 
 

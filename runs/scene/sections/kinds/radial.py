@@ -13,7 +13,6 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import integer, text
 from tireroad.fem.sections.ring import Ring
 from tireroad.runs.scene.resolved import literal
-from tireroad.runs.scene.sections.kind import Proportions, SectionKind, section_kind
 from tireroad.runs.scene.sections.parts import (
     cords_of,
     losses_of,
@@ -22,6 +21,7 @@ from tireroad.runs.scene.sections.parts import (
     spelt,
 )
 from tireroad.runs.scene.source import Source
+from tireroad.runs.scene.tables.tire import Proportions, SectionKind, section_kind
 
 if TYPE_CHECKING:
     from tireroad.fem.sections.construction import Construction

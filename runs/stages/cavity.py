@@ -13,13 +13,13 @@ from tireroad.fem.model import SmallMotions
 from tireroad.modal.basis import Air, ModalBasis
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
-from tireroad.runs.scene.tables.tire import has_air
-from tireroad.runs.stages.base.job import Job
-from tireroad.runs.stages.base.record import Record
-from tireroad.runs.stages.base.stage import Done, Shared
+from tireroad.runs.scene.tables.scene import has_air
+from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.stage import Done, Job, Shared
 
 if TYPE_CHECKING:
     from tireroad.fem.cavity.column import Column
+
 
 _SHOWN = 4
 _MOSTLY = 0.3  # share of a state's energy above which it counts as an air resonance

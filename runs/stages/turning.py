@@ -9,7 +9,7 @@ from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.turning import Turning
 from tireroad.modal.damping import Damping, Proportional, StrainEnergy
 from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.stages.base.job import Job
+from tireroad.runs.stages.stage import Job
 
 
 def damping_of(job: Job) -> Damping:

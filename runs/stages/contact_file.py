@@ -1,26 +1,203 @@
-"""contact.h5, written during the time loop, and the checkpoint from which a loop continues."""
+"""Compressed datasets whose rows a thread packs while the loop continues.
+
+HDF5's own filters hold Python's lock while they deflate; zlib does not. Whole chunks are therefore
+packed by zlib and written directly. HDF5 itself is only called from the caller's thread.
+
+What is stored and reported of the road: its texture, and the processing of a measured road.
+
+How much of the road's relief the contact points of a run see.
+
+contact.h5, written during the time loop, and the checkpoint from which a loop continues.
+"""
 
 from __future__ import annotations
 
 import shutil
+import zlib
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import h5py
 import numpy as np
 
 from tireroad.contact.loop import Instant
 from tireroad.contact.results.chatter import Chosen
+from tireroad.contact.roads.cell_mean import CellMean
+from tireroad.contact.roads.under_tire import NOTHING, is_level
 from tireroad.contact.setup import ContactSetup
-from tireroad.runs.files import packed, store
+from tireroad.runs.files import store
 from tireroad.runs.files.disk import part_of, replacing, seal
+from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
-from tireroad.runs.stages.base.job import Job
-from tireroad.runs.stages.build import corner, pattern
-from tireroad.runs.stages.stored import road_file
+from tireroad.runs.scene.road_rules import foot, never_met, within_run_in, without_relief
+from tireroad.runs.scene.tables.scene import Road
+from tireroad.runs.stages import corner
+from tireroad.runs.stages import setup as stages_setup
+from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.stage import Job
+
+LEVEL = 1  # higher levels take several times as long for a few percent
+
+
+def create(file: h5py.File, name: str, rows: int, width: tuple[int, ...]) -> h5py.Dataset:
+    """An empty, growing dataset (0, *width) in compressed chunks of `rows` rows.
+
+    Single precision, relative error 1e-7: half of the bytes.
+    """
+    return file.create_dataset(
+        name,
+        (0, *width),
+        dtype="f4",
+        maxshape=(None, *width),
+        chunks=(rows, *width),
+        compression="gzip",
+        compression_opts=LEVEL,
+        shuffle=True,
+    )
+
+
+class Packer:
+    """Appends rows to datasets of `create`; `wait` before reading the file, `close` at the end."""
+
+    def __init__(self) -> None:
+        self._thread = ThreadPoolExecutor(1)
+        self._put: list[tuple[Callable, tuple[int, ...], Future]] = []
+
+    def append(self, dataset: h5py.Dataset, values: np.ndarray) -> None:
+        """Append rows: whole chunks at a chunk boundary by the thread, others at once by HDF5."""
+        first, chunk = len(dataset), dataset.chunks[0]
+        dataset.resize(first + len(values), axis=0)
+        whole = 0 if first % chunk else len(values) - len(values) % chunk
+        for start in range(0, whole, chunk):
+            rows = values[start : start + chunk]
+            packed = self._thread.submit(_packed, rows, dataset.dtype)
+            offset = (first + start, *[0] * (values.ndim - 1))
+            self._put.append((dataset.id.write_direct_chunk, offset, packed))
+        if whole < len(values):
+            dataset[first + whole :] = values[whole:]
+
+    def wait(self) -> None:
+        """Write what the thread has packed."""
+        for write, offset, packed in self._put:
+            write(offset, packed.result())
+        self._put.clear()
+
+    def close(self) -> None:
+        """End the thread; anything not waited for is lost."""
+        self._thread.shutdown(cancel_futures=True)
+
+
+def _packed(values: np.ndarray, kind: np.dtype) -> bytes:
+    """HDF5's shuffle filter (first bytes of all values, then second ones, ...) and deflate."""
+    octets = np.ascontiguousarray(values, kind).view(np.uint8).reshape(-1, kind.itemsize)
+    return zlib.compress(np.ascontiguousarray(octets.T).data, LEVEL)
+
+
+# Share of the road's standard deviation that the points have to see.
+_SEEN = 0.5
+# Share of its height from which on an obstacle counts as whole.
+_WHOLE = 0.98
+
+
+def describe(record: Record, setup: ContactSetup, road: Road) -> None:
+    """Record the mean profile depth; report the processing of a measured road in words.
+
+    Warns if the `road` of the scene is flat where the run passes, or flat to its points.
+    """
+    for note in setup.road.notes:
+        observe.say(f"  road: {note}")
+    texture = setup.road.texture
+    if texture is not None and texture.depth is not None:
+        record.headline["mean profile depth"] = (texture.depth, "m")
+    first, last = setup.road.passed
+    if last <= first:
+        record.warnings.extend(never_met(road))
+    elif road.kind != "flat" and nothing_met(setup):
+        record.warnings.append(without_relief(road, first, last))
+    elif (place := foot(road)) is not None and (share := setup.road.share(place)) < _WHOLE:
+        record.warnings.append(within_run_in(road, place, share))
+    elif (relief := relief_seen(setup)) is not None:
+        _describe_smoothing(record, setup, relief)
+
+
+def _describe_smoothing(record: Record, setup: ContactSetup, relief: Relief) -> None:
+    """Record the road's relief and what the points see of it; warn if that is less than half."""
+    record.indicators["standard deviation of the road"] = (relief.road, "m")
+    record.indicators["of the road as the points see it"] = (relief.points, "m")
+    if relief.points < _SEEN * relief.road:
+        along, across = 1e3 * setup.patch.spacing
+        record.warnings.append(
+            f"contact points {along:.3g} × {across:.3g} mm apart see {1e3 * relief.points:.2g} of the road's "
+            f"{1e3 * relief.road:.2g} mm (standard deviation): waves shorter than two spacings are averaged over each "
+            "point's rectangle, so most of this road has no effect; take points a quarter of its waves apart or less "
+            "(contact.points), or a road of longer waves"
+        )
+
+
+def fill(file: h5py.File, setup: ContactSetup) -> None:
+    """Write the texture's third octaves; mean profile depth and notes as attributes."""
+    road = setup.road
+    if road.notes:
+        file.attrs["road_notes"] = "; ".join(road.notes)
+    if road.texture is None or not len(road.texture.level):
+        return
+    put(file, "road/wavelength", road.texture.wavelength, "m")
+    put(file, "road/texture_level", road.texture.level, "dB re 1 um")
+    if road.texture.depth is not None:
+        file.attrs["mean_profile_depth"] = road.texture.depth
+
+
+_LONGEST = 1.0  # m of road that is sampled
+_MOST = 8000  # samples along
+
+
+class Relief(NamedTuple):
+    """Standard deviation (m) of the heights of the `road`, and of those that the `points` see."""
+
+    road: float
+    points: float
+
+
+def nothing_met(setup: ContactSetup) -> bool:
+    """Whether all heights that the patch passes over are the same, by the road's own bounds."""
+    _, x1, y0, y1 = setup.patch.extent
+    return is_level(setup.road, x1, setup.road.end, y0, y1)
+
+
+def relief_seen(setup: ContactSetup) -> Relief | None:
+    """The relief along up to three rows of points that touch, before and after smoothing.
+
+    After the run-in, over at most 1 m; None if the points resolve the road, which is then not
+    smoothed, or if there is nothing to see.
+    """
+    patch, road = setup.patch, setup.road
+    held = np.flatnonzero(patch.force > 0)
+    x = _places(setup)
+    if not setup.fine or not len(held) or not len(x):
+        return None
+    order = held[np.argsort(patch.points[held, 1], kind="stable")]
+    chosen = order[[0, len(order) // 2, -1]]
+    y, half = patch.points[chosen, 1], patch.half_sizes[chosen]
+    given = np.repeat(x[:, None], 3, axis=1), np.broadcast_to(y, (len(x), 3))
+    raw, seen = road.height(*given), CellMean(road, y, half).height(*given)
+    found = Relief(float(raw.std(axis=0).max()), float(seen.std(axis=0).max()))
+    return found if found.road > NOTHING else None
+
+
+def _places(setup: ContactSetup) -> np.ndarray:
+    """Places (n,) m along a run, behind its run-in if half of it is left."""
+    first, end = setup.patch.extent[1], setup.road.end
+    grown = setup.road.grown
+    first = grown if grown < 0.5 * (first + end) else first
+    length = min(end - first, _LONGEST)
+    count = int(np.clip(4 * length / setup.road.spacing, 0, _MOST))
+    return first + length * (np.arange(count) + 0.5) / max(count, 1)
+
 
 BLOCK = 512  # steps kept in memory between two writes
 CHECKPOINT = "checkpoint.h5"
@@ -120,7 +297,7 @@ class ContactFile:
         return state
 
     def _open(self, stack: ExitStack, path: Path) -> tuple[int, dict[str, np.ndarray] | None]:
-        self._path, self._packer = path, packed.Packer()
+        self._path, self._packer = path, Packer()
         stack.callback(self._packer.close)
         provenance = self._job.provenance("contact", self._key)
         going_on = not self._job.fresh and self._usable(provenance.input_hash)
@@ -146,8 +323,8 @@ class ContactFile:
         store.put(self._file, "points", patch.points, "m")
         store.put(self._file, "area", patch.area, "m2")
         store.put(self._file, "static_force", patch.force, "N")
-        pattern.fill(self._file, self._setup)
-        road_file.fill(self._file, self._setup)
+        stages_setup.fill(self._file, self._setup)
+        fill(self._file, self._setup)
         forces = len(self._job.scene.force)
         driven: dict[str, tuple[tuple, str]] = {DRIVEN: ((forces, 3), "m")} if forces else {}
         driven |= corner.layout(self._job)
@@ -156,7 +333,7 @@ class ContactFile:
         for name, (shape, unit) in (self._layout | driven).items():
             width = tuple(c if n is None else n for n in shape)
             if width[:1] == (c,):
-                dataset = packed.create(self._file, name, rows, width)
+                dataset = create(self._file, name, rows, width)
             else:
                 sizes = {"maxshape": (None, *width), "chunks": (BLOCK, *width)}
                 dataset = self._file.create_dataset(name, (0, *width), "f8", **sizes)

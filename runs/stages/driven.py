@@ -15,15 +15,12 @@ from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.standing import standing_modes
-from tireroad.runs.stages.base.job import Job
-from tireroad.runs.stages.base.stage import Done
-from tireroad.runs.stages.build.point_forces import directions, histories
-from tireroad.runs.stages.build.rolling.scheme import recursive
-from tireroad.runs.stages.build.rolling.stepping import Integration
-from tireroad.runs.stages.build.setup import driven_points
-from tireroad.runs.stages.build.turning import turning_of
+from tireroad.runs.stages.contact_file import ContactHistory
 from tireroad.runs.stages.greens import Responses
-from tireroad.runs.stages.stored.contact_file import ContactHistory
+from tireroad.runs.stages.rolling import Integration, directions, histories, recursive
+from tireroad.runs.stages.setup import driven_points
+from tireroad.runs.stages.stage import Done, Job
+from tireroad.runs.stages.turning import turning_of
 
 Array = np.ndarray
 

@@ -1,1 +1,0 @@
-"""Base classes of stages, the job they belong to, and their records."""

@@ -1,1 +1,0 @@
-"""The time loop of a scene: its excitation, time steps, and stopping."""

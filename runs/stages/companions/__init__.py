@@ -1,1 +1,0 @@
-"""Companion runs, whose differences from a run estimate its errors, and what they may cost."""

@@ -1,0 +1,333 @@
+"""The prescribed forces of a scene as functions of time.
+
+The run-in, while the road grows from flat: it is left out of a run's figures.
+
+The time steps of a run: given by the scene, or derived from what must be resolved.
+
+A scene's time loop: the driven tire, the normal solver, the brush.
+
+The integration scheme: as the scene says, or as the contact's oscillation requires.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from tireroad.contact.grid_patch import OnPoints
+from tireroad.contact.loop import Driven, Loop, equal_steps, roll, steps_of
+from tireroad.contact.model import step_solver, tread_memory, tread_shear
+from tireroad.contact.patch import Patch
+from tireroad.contact.results.chatter import Chosen, choose, oscillation
+from tireroad.contact.roads.under_tire import is_level
+from tireroad.contact.setup import ContactSetup
+from tireroad.contact.solver.stick_slip import Friction
+from tireroad.contact.tread.brush import Brush, BrushLaw
+from tireroad.contact.tread.free_rolling import free_slip
+from tireroad.greens.convolution import Convolution
+from tireroad.greens.recursion import Recursion, sharers
+from tireroad.greens.response import Response
+from tireroad.runs.process import observe
+from tireroad.runs.scene.tables.contact import Time
+from tireroad.runs.scene.tables.scene import PointForce, Road, Scene
+from tireroad.runs.stages import corner
+from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.stage import Job
+
+
+def directions(forces: Sequence[PointForce]) -> np.ndarray:
+    """Unit vectors of the forces, (k, 3)."""
+    given = np.array([force.direction for force in forces]).reshape(-1, 3)
+    return given / np.linalg.norm(given, axis=1, keepdims=True)
+
+
+def histories(forces: Sequence[PointForce], time: np.ndarray, order: int = 0) -> np.ndarray:
+    """The forces (nt, k) N: amplitude sin(2 pi f t), or the constant amplitude if f = 0.
+
+    `order`: order of the time derivative, N/s^order.
+    """
+    columns = [_history(force, time, order) for force in forces]
+    return np.stack(columns, axis=-1) if columns else np.zeros((len(time), 0))
+
+
+def shortest_period(forces: Sequence[PointForce]) -> float:
+    """Period of the fastest force, s; infinite if all are constant."""
+    fastest = max((force.frequency for force in forces), default=0.0)
+    return 1 / fastest if fastest else np.inf
+
+
+def _history(force: PointForce, time: np.ndarray, order: int) -> np.ndarray:
+    if force.frequency == 0:
+        return np.full(len(time), force.amplitude if order == 0 else 0.0)
+    omega = 2 * np.pi * force.frequency
+    return force.amplitude * omega**order * np.sin(omega * time + order * np.pi / 2)
+
+
+def run_in(setup: ContactSetup, road: Road) -> float:
+    """Time (s) until the whole patch is past the run-in; 0 if there is none.
+
+    There is none either where the road is level up to its end, as before a cleat: nothing grows,
+    and the impact would be left out with it.
+    """
+    return 0.0 if road.kind == "flat" else grown(setup, road.run_in)
+
+
+def grown(setup: ContactSetup, length: float) -> float:
+    """The same for a run-in of this length (m) on a road of any kind."""
+    speed, whole = setup.rolled.speed, setup.road.grown
+    x0, x1, y0, y1 = setup.patch.extent
+    if speed == 0 or is_level(setup.road, min(x0, whole), whole, y0, y1):
+        return 0.0
+    return (length + x1 - x0) / speed
+
+
+def first_step(setup: ContactSetup, road: Road, time: np.ndarray) -> int:
+    """Index of the first step past the run-in; 0 if that is half the run or more."""
+    start = int(np.searchsorted(time, run_in(setup, road)))
+    return start if start < len(time) // 2 else 0
+
+
+# Radians that a kept mode may turn per automatic step: at 0.3 its phase error is below 1 %.
+_TURN = 0.3
+_LEAST_STEPS = 200
+_PER_PERIOD = 16  # steps per shortest period of the excitation
+
+
+def run_time(time: Time) -> float:
+    """Duration of the run, s: whole steps, so slightly longer than one that is not a multiple."""
+    if isinstance(time.step, str):
+        return time.duration
+    return steps_of(time.duration, time.step).duration
+
+
+@dataclass(frozen=True)
+class Planned:
+    """`steps` steps of `step` s, and the `response` of the states that they resolve."""
+
+    response: Response
+    step: float
+    steps: int
+
+
+@dataclass(frozen=True)
+class Integration:
+    """The time integrator `tire`, for `steps` steps of `step` s with a `scheme`."""
+
+    tire: Recursion | Convolution
+    step: float
+    steps: int
+    scheme: str
+
+
+def planned(job: Job, record: Record, response: Response, shortest: float) -> Planned:
+    """The steps from the scene's table [time]; the choice is reported. Collective.
+
+    `shortest` (s): shortest period of the excitation.
+    """
+    wanted = job.scene.time
+    fastest = np.abs(response.every).max(initial=0.0)
+    if isinstance(wanted.step, str):
+        limits = [wanted.duration / _LEAST_STEPS, shortest / _PER_PERIOD]
+        if fastest > 0:
+            limits.append(_TURN / fastest)
+        steps = equal_steps(wanted.duration, min(limits))
+    else:
+        steps = steps_of(wanted.duration, wanted.step)
+    kept = response.resolved(steps.size)
+    moved = len(response.every) - len(kept.every)
+    observe.say(
+        f"  step {steps.size:.4g} s, {steps.count} steps; fastest mode {fastest:.4g} 1/s, "
+        f"{moved} states too fast for the step respond statically"
+    )
+    if steps.duration > wanted.duration * (1 + 1e-9):
+        observe.say(
+            f"  the run ends at {steps.duration:.6g} s: {wanted.duration:.6g} s is not a multiple of the step"
+        )
+    record.indicators["states moved to the residual"] = (moved, "-")
+    return Planned(kept, steps.size, steps.count)
+
+
+def integration(job: Job, plan: Planned, scheme: str) -> Integration:
+    """The integrator at t = 0 for the planned steps. Collective."""
+    tire: Recursion | Convolution
+    if scheme == "convolution":
+        tire = Convolution(response=plan.response, step=plan.step, steps=plan.steps)
+    else:
+        comm = sharers(plan.response, job.comm)
+        tire = Recursion(
+            response=plan.response, step=plan.step, scheme=scheme, comm=comm, look_ahead=True
+        )
+        if comm.size < job.comm.size:
+            observe.say("  each process computes the whole loop: it is too small to distribute")
+    return Integration(tire, plan.step, plan.steps, scheme)
+
+
+def passing_period(road: Road, spacing: float, speed: float) -> float:
+    """Shortest period (s) of the road's excitation at `speed` (m/s).
+
+    Of the shortest wave that its `spacing` (m) resolves, the sine of its motion, or the
+    acceleration of its ramp (one wave long).
+    """
+    motion = road.motion
+    periods = [2 * spacing / speed if speed else np.inf]
+    if motion.kind == "sine":
+        periods.append(1 / motion.frequency)
+    elif motion.kind == "ramp":
+        periods.append(motion.duration)
+    return min(periods)
+
+
+def driven_tire(job: Job, chosen: Integration) -> Driven | None:
+    """The tire under prescribed forces and with wheel readings; None if the scene has neither."""
+    forces = job.scene.force
+    if not forces and not corner.readings(job):
+        return None
+    time = chosen.step * np.arange(chosen.steps + 1)
+    return Driven(chosen.tire, histories(forces, time), directions(forces), chosen.scheme)
+
+
+def make_loop(spec, setup: ContactSetup, tire, step: float) -> Loop:
+    """The loop of tire, normal solver and friction, from the table [contact]."""
+    patch = setup.patch
+    p = len(patch.index)
+    memory = tread_memory(spec, patch, setup.rolled.speed, step)
+    at_once = memory.at_once if memory else 1.0
+    solver = step_solver(spec, patch, tire.same_step[:p, :p], at_once)
+    friction = None
+    if spec.rubs:
+        friction = _friction(spec, setup, tire, step, at_once)
+    if patch.weights is not None:
+        tire = OnPoints(tire, patch.weights, 1 if friction is None else 3)
+    return Loop(tire, solver, friction, memory)
+
+
+def bristles(spec, patch: Patch):
+    """Bristle stiffness (N/m) per point, or (c,); inf if rigid, None without horizontal forces."""
+    if not spec.rubs:
+        return None
+    if spec.brush_stiffness_per_area is not None:
+        return spec.brush_stiffness_per_area * patch.area
+    return spec.brush_stiffness or np.inf
+
+
+def _friction(spec, setup: ContactSetup, tire, step: float, at_once: float) -> Friction:
+    """The brush of the scene, at rest.
+
+    Shear of the tread by pressure counts from the static state, like all motion. If the slip of the
+    static shape counts (free rolling), the shear of its tread does too, except for a tread that
+    creeps.
+    """
+    patch, stiffness = setup.patch, bristles(spec, setup.patch)
+    shear, pressed, moved = tread_shear(spec, patch, at_once), None, None
+    if shear is not None and setup.shape_slip is not None and spec.law.creep is None:
+        drag = shear.drag(patch.force)
+        pressed, moved = np.zeros(len(patch.points)), np.stack([drag.real, drag.imag], axis=-1)
+    law = BrushLaw(stiffness, spec.friction, setup.slips, spec.brush)
+    brush = Brush(law, patch.points[:, 0], patch.line, setup.rolled.speed, step)
+    brush.begin(patch.force > 0, moved)
+    return Friction(brush, tire.same_step, patch.weights, shear, pressed)
+
+
+def freely_rolling(
+    job: Job, setup: ContactSetup, response: Response, step: float, scheme: str
+) -> tuple[ContactSetup, float]:
+    """The setup (settled) with the slip of free rolling on a smooth road, and that slip.
+
+    Found with the time loop itself, over six passages of the patch. Raises ConvergenceError if
+    there is none. Collective.
+    """
+    x0, x1, _, _ = setup.patch.extent
+    steps = max(int(np.ceil(6 * (x1 - x0) / setup.rolled.speed / step)), 20)
+    smooth, load = setup.smooth(steps * step), float(setup.patch.force.sum())
+
+    def drag(slip: float) -> float:
+        found = forces(job, smooth.with_slip(slip), response, step, steps, scheme).contact
+        return float(found[-max(steps // 6, 1) :, 0].mean())
+
+    slip = free_slip(drag, load)
+    return setup.with_slip(slip), slip
+
+
+class Forces(NamedTuple):
+    """Forces (n, 3) N of the road on the tire (`contact`) and of the tire on the axle (`axle`).
+
+    After each of n steps of `step` s.
+    """
+
+    contact: np.ndarray
+    axle: np.ndarray
+    step: float
+
+
+def forces(
+    job: Job,
+    setup: ContactSetup,
+    response: Response,
+    step: float,
+    steps: int,
+    scheme: str,
+    contact=None,
+) -> Forces:
+    """Run the loop of the job's scene with another response, step or setup (settled), in memory.
+
+    `scheme`: see greens.recursion; `contact` replaces the scene's table. Raises ConvergenceError
+    if the road touches outside the patch. Collective.
+    """
+    kept = response.resolved(step)
+    comm = sharers(kept, job.comm)
+    tire = Recursion(response=kept, step=step, scheme=scheme, comm=comm, look_ahead=True)
+    spec = contact or job.scene.contact
+    driven = driven_tire(job, Integration(tire, step, steps, scheme))
+    loop = make_loop(spec, setup, driven or tire, step)
+    (total, axle), every = np.zeros((2, steps, 3)), np.ones(len(setup.patch.points))
+    given = setup.patch, setup.drive, step, steps
+    with threadpool_limits(1, "blas"):
+        for k, instant in enumerate(
+            roll(loop.tire, loop.solver, *given, loop.friction, 0, loop.memory, motion=False)
+        ):
+            total[k, :2] = every @ instant.horizontal
+            total[k, 2], axle[k] = instant.force.sum(), instant.axle_force
+            if instant.force[setup.patch.edge].any():
+                setup.patch.check_edge(instant.force[None], np.array([instant.time]), setup.reach)
+    return Forces(total, axle, step)
+
+
+def chosen_scheme(
+    job: Job, record: Record, setup: ContactSetup, plan: Planned, begun: Chosen | None
+) -> Chosen:
+    """The scheme and the reason for it; both are reported.
+
+    `begun`: the choice stored in the checkpoint that the loop continues from, or None.
+    """
+    wanted = job.scene.time.scheme
+    spec, patch = job.scene.contact, setup.patch
+    steps = oscillation(spec, patch, plan.response, plan.step, bristles(spec, patch))
+    if math.isfinite(steps):
+        record.indicators["steps in the fastest oscillation of the contact"] = (steps, "-")
+    given = Chosen(wanted, f'time.scheme = "{wanted}"')
+    return reported(record, begun or (choose(steps) if wanted == "auto" else given))
+
+
+def reported(record: Record, chosen: Chosen) -> Chosen:
+    """Report the choice in the terminal and the record; returns it."""
+    observe.say(f"  scheme {chosen.scheme}: {chosen.reason}")
+    record.indicators["reason for the scheme"] = (chosen.reason, "-")
+    return chosen
+
+
+def recursive(scheme: str) -> str:
+    """The scheme of a recursion that repeats a run: a convolution approximates linear forces."""
+    return "linear" if scheme == "convolution" else scheme
+
+
+def of_given_forces(scene: Scene) -> str:
+    """The scheme for prescribed forces without contact.
+
+    They cannot chatter, and linear over the step has the higher order.
+    """
+    return "linear" if scene.time.scheme == "auto" else scene.time.scheme

@@ -1,0 +1,329 @@
+"""A job: one run of one scene, shared unchanged by all its stages.
+
+A stage: a function of typed inputs whose frozen product is written to a file and read back.
+
+Checkpoints of the stages static and modes, for runs that are stopped or killed.
+
+Each process stores its own results, part by part, in
+`<stage>_checkpoint/<rank>of<size>-<number>.h5`, where `number` is that of the part's first result.
+Parts carry a checksum and the key of the stage's inputs; reading ends at the first part that is
+absent, damaged or of other inputs.
+"""
+
+from __future__ import annotations
+
+import shutil
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import MISSING, dataclass, field, fields
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar, Generic, TypeVar
+
+import numpy as np
+from mpi4py import MPI
+
+from tireroad.fem.axle import Axle
+from tireroad.fem.model import TireModel
+from tireroad.fem.static.checkpoint import Entry, Journal
+from tireroad.fem.static.state import StaticState
+from tireroad.runs.files import store
+from tireroad.runs.files.cache import NO_CACHE, Cache
+from tireroad.runs.process import observe
+from tireroad.runs.process.mpi import on_root
+from tireroad.runs.process.signals import Stopped
+from tireroad.runs.scene.resolved import dumps
+from tireroad.runs.scene.tables.scene import Scene, axle_of
+from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.tire import make_tire
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Job:
+    """The scene, its result folder, and the processes that compute it.
+
+    `fresh`: reuse nothing; `cache`: finished stages shared with other runs, by default none.
+    """
+
+    scene: Scene
+    directory: Path
+    comm: MPI.Comm
+    fresh: bool = False
+    cache: Cache = NO_CACHE
+    found: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def speed(self) -> float:
+        """Speed of rotation, rad/s; 0 for a wheel at rest.
+
+        For a scene with a travel speed it is a first guess until the static state gives the rolling
+        radius.
+        """
+        if "speed" in self.found:
+            return self.found["speed"]
+        return self.scene.rotation.speed if self.scene.rotation else 0.0
+
+    def free_speed(self, state: StaticState) -> float:
+        """Speed (rad/s) of a wheel with this rolling radius, rolling freely at the travel speed.
+
+        The job's own speed if the scene has no travel speed.
+        """
+        rotation = self.scene.rotation
+        if rotation is None or rotation.travel_speed is None:
+            return self.speed
+        return rotation.travel_speed / (rotation.rolling_radius or state.rolling_radius())
+
+    def settle(self, done: Mapping[str, Any]) -> None:
+        """At a travel speed, adopt the static state's wheel speed once it is `done`. Collective."""
+        rotation = self.scene.rotation
+        if rotation is None or not rotation.travel_speed or self.found or "static" not in done:
+            return
+        state = done["static"].product
+        self.found["speed"] = state.rolling.speed or self.free_speed(state)
+
+    @cached_property
+    def axle(self) -> Axle | None:
+        """The moving wheel; None if the axle is held."""
+        return axle_of(self.scene)
+
+    @cached_property
+    def tire(self) -> TireModel:
+        """The scene's tire, unloaded."""
+        return make_tire(self.comm, self.scene.tire)
+
+    def path(self, stage: str) -> Path:
+        """The file of a stage."""
+        return self.directory / f"{stage}.h5"
+
+    def provenance(self, stage: str, key: str) -> store.Provenance:
+        """Provenance of a stage's file; `key` is the hash of the stage's inputs."""
+        return store.Provenance(self.scene.name, dumps(self.scene), stage, key, self.comm.size)
+
+    def write(self, path: Path, provenance: store.Provenance, fill: Callable[[Any], None]) -> None:
+        """Write a file with `fill(file)` on the root process. Collective."""
+
+        def write() -> None:
+            with store.writing(path, provenance) as file:
+                fill(file)
+
+        on_root(self.comm, write)
+
+    def read(self, path: Path, pick: Callable[[Any], T]) -> T:
+        """The value of `pick(file)`, on every process. Collective."""
+
+        def opened() -> T:
+            with store.opened(path) as file:
+                return pick(file)
+
+        return on_root(self.comm, opened)
+
+
+P = TypeVar("P")
+
+
+class Done(Generic[P]):
+    """A product with the `key` (hash) of all its inputs; the key is "" if the product has no file.
+
+    It is computed or read on first use, so that an unused product is never read. That use is
+    collective.
+    """
+
+    def __init__(self, key: str, make: Callable[[], P]) -> None:
+        self.key, self._make = key, make
+
+    @cached_property
+    def product(self) -> P:
+        """The product itself."""
+        return self._make()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Part(ABC, Generic[P]):
+    """A part of the pipeline. Apart from `job`, its fields are the parts it takes, by name."""
+
+    name: ClassVar[str]
+    job: Job
+
+    @classmethod
+    def taken(cls, job: Job, done: Mapping[str, Done]) -> Part | None:
+        """The part with its inputs from `done`; None if a required input is missing."""
+        given: dict[str, Any] = {}
+        for item in fields(cls):
+            if item.name == "job":
+                continue
+            if item.name in done:
+                given[item.name] = done[item.name]
+            elif item.default is MISSING:
+                return None
+        return cls(job=job, **given)
+
+
+class Shared(Part[P]):
+    """A part used by several stages, made on first use and not stored in a file."""
+
+    @abstractmethod
+    def make(self) -> P:
+        """The product. Collective where its parts are."""
+
+
+class Stage(Part[P]):
+    """A part whose product is stored in `<name>.h5` and reused while its inputs are unchanged."""
+
+    @abstractmethod
+    def inputs(self) -> Mapping[str, Any]:
+        """Everything the product depends on, including the keys of other products. Collective."""
+
+    @abstractmethod
+    def produce(self, key: str, record: Record) -> P:
+        """Make the product and write its file; figures go into the record. Collective."""
+
+    @abstractmethod
+    def read(self, file: Any) -> Any:
+        """The content of the product's file. Root process only."""
+
+    def restored(self, held: Any) -> P:
+        """The product from its file's content, by default that content. On every process."""
+        return held
+
+    def stored(self) -> P:
+        """The product as stored in its file. Collective."""
+        return self.restored(self.job.read(self.job.path(self.name), self.read))
+
+    @classmethod
+    def instead(cls, job: Job, done: Mapping[str, Done]) -> Done[P] | None:
+        """What later parts receive if this stage is skipped; None: nothing."""
+        return None
+
+
+class Computed(Stage[P]):
+    """A stage whose product is first computed, then written."""
+
+    @abstractmethod
+    def compute(self, record: Record) -> P:
+        """Compute the product; figures go into the record. Collective."""
+
+    @abstractmethod
+    def write(self, file: Any, product: P) -> None:
+        """Write the product into an empty file. Root process only."""
+
+    def produce(self, key: str, record: Record) -> P:
+        """Compute the product and write its file. Collective."""
+        product = self.compute(record)
+        provenance = self.job.provenance(self.name, key)
+        self.job.write(self.job.path(self.name), provenance, lambda file: self.write(file, product))
+        return product
+
+
+WORTH = 60.0  # results are written once computing them has taken this many times the writing
+LEAST = 1.0  # s of computing
+_COLUMNS = "by_columns"
+_RATE = 2e8  # bytes per second, until a large part has been written
+_LARGE = 1e6  # bytes from which the write rate is measured: below, opening the file dominates
+
+
+@contextmanager
+def checkpointed(stage: Stage, what: str) -> Iterator[Journal]:
+    """The journal of a stage, of results named `what`; a stop writes them. Collective."""
+    job = stage.job
+    parts = _Parts(job, stage.name, store.wanted_hash(stage.name, stage.inputs()))
+    found = parts.read()
+    journal = Journal(found, parts.keep)
+    least = min(job.comm.allgather(len(found)))
+    if least:
+        observe.say(f"  goes on from the checkpoint after {least} {what}")
+    try:
+        yield journal
+    except Stopped:
+        parts.flush()
+        raise
+
+
+def forget_checkpoint(job: Job, stage: str) -> None:
+    """Remove the checkpoint of a finished stage. Collective."""
+    job.comm.Barrier()
+    on_root(job.comm, lambda: shutil.rmtree(_folder(job, stage), ignore_errors=True))
+
+
+def _folder(job: Job, stage: str) -> Path:
+    return job.directory / f"{stage}_checkpoint"
+
+
+class _Parts:
+    """The checkpoint files of this process."""
+
+    def __init__(self, job: Job, stage: str, key: str) -> None:
+        self._job, self._stage, self._key = job, stage, key
+        self._folder = _folder(job, stage)
+        self._waiting: list[Entry] = []
+        self._first, self._written = 0, time.monotonic()
+        self._rate = _RATE
+
+    def _path(self, number: int) -> Path:
+        comm = self._job.comm
+        return self._folder / f"{comm.rank}of{comm.size}-{number:04d}.h5"
+
+    def read(self) -> list[Entry]:
+        """Results stored for the same inputs and process count; reports others. Collective."""
+        found: list[Entry] = []
+        reason = "" if self._job.fresh else self._read(found)
+        reasons = [one for one in self._job.comm.allgather(reason) if one not in ("", "absent")]
+        if reasons:
+            observe.say(f"  {self._folder.name} exists, but {reasons[0]}: only part of it is used")
+        return found
+
+    def _read(self, found: list[Entry]) -> str:
+        """Append the usable parts to `found`; returns why the next one is not."""
+        wanted = self._job.provenance(self._stage, self._key).input_hash
+        while not (reason := store.why_not(self._path(len(found)), wanted, self._stage)):
+            with store.opened(self._path(len(found))) as file:
+                found += [_entry(file[name]) for name in sorted(file)]
+        return reason
+
+    def keep(self, number: int, entry: Entry) -> None:
+        """Store a result; it is written with those before it once that pays off."""
+        if not self._waiting:
+            self._first = number
+        self._waiting.append(entry)
+        size = sum(array.nbytes for one in self._waiting for array in one.values())
+        if time.monotonic() - self._written > max(LEAST, WORTH * size / self._rate):
+            began = time.monotonic()
+            self.flush()
+            if size > _LARGE:
+                self._rate = size / max(time.monotonic() - began, 1e-3)
+
+    def flush(self) -> None:
+        """Write the results that are waiting."""
+        if not self._waiting:
+            return
+        provenance = self._job.provenance(self._stage, self._key)
+        # If the result folder was removed, writing the file reports it.
+        with suppress(FileNotFoundError):
+            self._folder.mkdir(exist_ok=True)
+        with store.writing(self._path(self._first), provenance) as file:
+            for k, entry in enumerate(self._waiting):
+                group = file.create_group(f"{k:04d}")
+                for name, array in entry.items():
+                    by_columns = array.flags.f_contiguous and not array.flags.c_contiguous
+                    group[name] = array.T if by_columns else array
+                    group[name].attrs[_COLUMNS] = by_columns
+        self._waiting, self._written = [], time.monotonic()
+
+
+def _entry(group) -> Entry:
+    """The arrays of a result by name, including groups.
+
+    Their memory order is restored, because the rounding of sums of products depends on it.
+    """
+    found: dict[str, np.ndarray] = {}
+
+    def add(name: str, one) -> None:
+        if hasattr(one, "shape"):
+            array = np.asarray(one[()])
+            found[name] = array.T if one.attrs[_COLUMNS] else array
+
+    group.visititems(add)
+    return found
