@@ -4,9 +4,9 @@ from tireroad.fem.exports import exported
 
 _HOMES = {
     "ContactSetup": "setup",
-    "EndlessRoad": "roads.kind",
+    "EndlessRoad": "roads.road",
     "Patch": "patch",
-    "RoadKind": "roads.kind",
+    "RoadKind": "roads.road",
     "RoadUnderTire": "roads.under_tire",
     "Rolled": "setup",
     "TreadLaw": "tread.law",
@@ -15,7 +15,7 @@ _HOMES = {
     "equal_steps": "loop",
     "make_patch": "patch",
     "make_road": "roads.road",
-    "road_kind": "roads.kind",
+    "road_kind": "roads.road",
     "roll": "loop",
     "step_solver": "model",
     "third_octaves": "results.spectra",

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from tireroad.contact.patch import Patch
 from tireroad.contact.solver.active_set import make_solver
 from tireroad.contact.solver.conditions import ContactSolver
-from tireroad.contact.solver.grid_compliance import Compliance, SpreadCompliance
+from tireroad.contact.solver.projected_cg import Compliance, SpreadCompliance
 from tireroad.contact.tread.creep import TreadMemory, steady
 from tireroad.contact.tread.kernel import KernelTread
 from tireroad.contact.tread.law import TreadLaw

@@ -13,7 +13,7 @@ from tireroad.contact.loop import Drive
 from tireroad.contact.model import Spec, static_solver
 from tireroad.contact.patch import LEAST_REACH, Patch, make_patch
 from tireroad.contact.roads.cell_mean import CellMean
-from tireroad.contact.roads.kinds.flat import Flat
+from tireroad.contact.roads.kinds.shapes import Flat
 from tireroad.contact.roads.under_tire import PreparedRoad, RoadUnderTire
 from tireroad.contact.tread.pattern import Pattern
 from tireroad.fem.static.road import RoadShape
@@ -186,7 +186,7 @@ def contact_setup(
         reach = _reach(face, road, rolled)
     patch = nodes_within(face, reach)
     if spacing is not None:
-        from tireroad.fem.static.tread_surface import TreadSurface
+        from tireroad.fem.static.footprint import TreadSurface
 
         assert face.road_height is not None, "contact needs a tire that stands on a road"
         surface = surface or TreadSurface(lattice, face.seen)

@@ -10,8 +10,8 @@ import ufl
 import tireroad as tr
 from tireroad.fem.parameters import number
 from tireroad.fem.tire.invariants import dilatation, isochoric
-from tireroad.fem.tire.law import MATERIALS, material_law
 from tireroad.fem.tire.laws.elastic import Elastic
+from tireroad.fem.tire.material import MATERIALS, material_law
 
 
 @material_law("gent", "Gent's rubber, which stiffens towards its limit of stretch")

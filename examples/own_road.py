@@ -12,7 +12,7 @@ import numpy as np
 from mpi4py import MPI
 
 import tireroad
-from tireroad.contact.roads.kind import EndlessRoad, road_kind
+from tireroad.contact.roads.road import EndlessRoad, road_kind
 from tireroad.contact.tread.law import TreadLaw, tread_law
 from tireroad.fem.parameters import ParameterError, number
 from tireroad.runs.scene.load import load

@@ -17,7 +17,7 @@ from tireroad.fem.static.press import press
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.sections.kinds.torus import TorusSection
 from tireroad.runs.scene.tables.tire import SECTIONS, section_kind
-from tireroad.runs.stages.tire import make_tire
+from tireroad.runs.stages.stage import make_tire
 
 
 @section_kind("ellipse", "the torus, stretched along the axle")

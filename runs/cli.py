@@ -18,7 +18,7 @@ from typing import Any
 from tireroad.fem import form_cache
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.runs.process import mpi, observe, signals
-from tireroad.runs.process.signals import DONE, handed_over, processes_here, rank_before_mpi
+from tireroad.runs.process.signals import DONE, INPUT, handed_over, processes_here, rank_before_mpi
 from tireroad.runs.process.surroundings import check_surroundings, crowded
 from tireroad.runs.scene.plan import STAGES
 from tireroad.runs.version import PROGRAM, VERSION
@@ -508,7 +508,10 @@ def main(argv: list[str]) -> int:
     """Run a command line; returns the exit status."""
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # mutes its remarks on the home folder
     if argv[:1] == ["test"] and argv[1:] not in (["-h"], ["--help"]):
-        from tireroad.runs.process.testing import run_tests
+        if not (Path(__file__).resolve().parents[1] / "tests").is_dir():
+            print("error: the tests are not installed: run them in a checkout", file=sys.stderr)
+            return INPUT
+        from tireroad.tests.run_tests import run_tests
 
         return run_tests(argv[1:])  # pytest parses all of its arguments
     options: list[str] = []

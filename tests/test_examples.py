@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from started import environment
 
-from tireroad.fem.tire.law import MATERIALS
+from tireroad.fem.tire.material import MATERIALS
 from tireroad.runs.scene.outputs import OUTPUTS
 from tireroad.runs.scene.tables.tire import SECTIONS
 
@@ -148,7 +148,7 @@ def test_own_road_and_tread(capsys: pytest.CaptureFixture[str]) -> None:
     """Registered classes serve in a scene as ours do; pinned when it was written."""
     import own_road
 
-    from tireroad.contact.roads.kind import ROADS
+    from tireroad.contact.roads.road import ROADS
     from tireroad.contact.tread.law import TREADS
 
     try:

@@ -59,8 +59,7 @@ from tireroad.contact.solver.conditions import (
     complementarity_residual,
     penetration,
 )
-from tireroad.contact.solver.grid_compliance import Compliance, MatrixCompliance
-from tireroad.contact.solver.projected_cg import ProjectedCG
+from tireroad.contact.solver.projected_cg import Compliance, MatrixCompliance, ProjectedCG
 from tireroad.fem.errors import ConvergenceError, InputError
 
 # Number of changes above which a new factor costs less: k right-hand sides each time against 2/3

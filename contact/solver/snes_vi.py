@@ -21,7 +21,7 @@ from tireroad.contact.solver.conditions import (
     complementarity_residual,
     penetration,
 )
-from tireroad.contact.solver.grid_compliance import Compliance, MatrixCompliance
+from tireroad.contact.solver.projected_cg import Compliance, MatrixCompliance
 from tireroad.fem.errors import ConvergenceError
 
 Array = NDArray[np.float64]

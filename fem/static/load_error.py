@@ -5,7 +5,7 @@ Transfer of a static state to another mesh of the same tire, as a close start.
 A tire in equilibrium on the road, and near that state on another mesh, for mesh errors.
 
 Half of the ring is used where a half turn leaves the state unchanged
-(fem.static.half_model).
+(fem.static.symmetric).
 
 Error of the load from two companions: refined at the footprint, and of another order.
 
@@ -31,9 +31,9 @@ from tireroad.fem.sections.ring import Ring
 from tireroad.fem.sections.split import interpolation, locate, split_ring
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.footprint import Footprint, footprint, nodal_area
-from tireroad.fem.static.half_model import HalfTurnEquilibrium, looks_the_same
 from tireroad.fem.static.load_steps import Loader, balance_near, cords_strained
 from tireroad.fem.static.state import StaticState, static_state
+from tireroad.fem.static.symmetric import HalfTurnEquilibrium, looks_the_same
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.mesh import Lattice, field_lattice

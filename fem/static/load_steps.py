@@ -48,10 +48,14 @@ from mpi4py import MPI
 
 from tireroad.fem.errors import ConvergenceError, InputError, LoadingStopped
 from tireroad.fem.parallel import on_root
-from tireroad.fem.static.axisymmetric import RoundEquilibrium, inflated
 from tireroad.fem.static.equilibrium import Drag, Equilibrium, Step
-from tireroad.fem.static.half_model import HalfTurnEquilibrium, looks_the_same
-from tireroad.fem.static.tread_surface import TreadSurface
+from tireroad.fem.static.footprint import TreadSurface
+from tireroad.fem.static.symmetric import (
+    HalfTurnEquilibrium,
+    RoundEquilibrium,
+    inflated,
+    looks_the_same,
+)
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.body import Body
 

@@ -22,8 +22,7 @@ from tireroad.fem.sections import mesh2d
 from tireroad.fem.sections.grid import Patch
 from tireroad.fem.sections.ring import Ring
 from tireroad.fem.sections.torus import Torus
-from tireroad.fem.tire.law import MATERIALS, MaterialLaw
-from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.material import MATERIALS, Material, MaterialLaw
 
 __all__ = ["INNER", "RIM", "TREAD", "Lattice", "TireMesh", "Torus", "build", "field_lattice"]
 

@@ -147,7 +147,7 @@ class Modes:
 
     `squares` omega^2 (m,) 1/s2, ascending; `vectors`: this process's rows (n, m) of the
     mass-normalised shapes, kg^-1/2, with signs and bases of repeated frequencies by rule
-    (modal.solver.canonical); `residual` (m,) ||K phi - lambda M phi|| / ||lambda M phi||, a bound
+    (modal.solver.fields); `residual` (m,) ||K phi - lambda M phi|| / ||lambda M phi||, a bound
     on twice the relative error of the frequency; `inertia_count` eigenvalues below `counted_below`
     (1/s2) by Sylvester's law, equal to the number found there; `rigid`: the number of modes without
     stiffness among them, whose square is 0; `sectors`: sizes of the independent problems that the

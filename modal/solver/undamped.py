@@ -19,15 +19,16 @@ from petsc4py import PETSc
 from tireroad.fem.collective import summed
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.static.checkpoint import Journal
-from tireroad.modal.solver.canonical import ordered, turn_to_rule
 from tireroad.modal.solver.circulant import repeated
 from tireroad.modal.solver.fields import (
     CHUNK,
     collect,
     multiply,
+    ordered,
     orthonormalise,
     row_sum,
     scaled_by,
+    turn_to_rule,
 )
 from tireroad.modal.solver.slicing import Bottom, Modes, Part, Slice, Spectrum, Team
 from tireroad.modal.solver.symmetry import Sites, sectors, symmetries, whole

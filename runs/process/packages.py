@@ -35,7 +35,7 @@ def installation() -> dict[str, str]:
 
     from tireroad.fem import compat, form_cache
     from tireroad.runs.files.cache import Cache
-    from tireroad.runs.files.identity import libraries
+    from tireroad.runs.files.store import libraries
     from tireroad.runs.version import PROGRAM, VERSION
 
     folder = Cache.of_user().folder

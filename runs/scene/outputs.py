@@ -26,8 +26,8 @@ class Output(Parameters):
 
     `of`: "points" for the driven points, which needs a [[force]], or "contact"; `in_contact`:
     whether it is available in a scene with [contact]. `check` reports what a scene lacks; `curves`
-    is given what the run computed at the points (runs.stages.driven.Driven) and where to note figures
-    (runs.stages.record.Record). Their types are not imported: a scene knows nothing of the stages.
+    is given what the run computed at the points (runs.stages.response.Driven) and where to note figures
+    (runs.stages.stage.Record). Their types are not imported: a scene knows nothing of the stages.
     """
 
     owner = "output"

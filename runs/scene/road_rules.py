@@ -5,10 +5,9 @@ from collections.abc import Callable
 from typing import Any
 
 from tireroad.contact.roads.grid import Grid
-from tireroad.contact.roads.kind import RoadKind
-from tireroad.contact.roads.kinds.obstacle import Edges
+from tireroad.contact.roads.kinds.shapes import Edges
 from tireroad.contact.roads.placement import begun_at, moved_start, shown
-from tireroad.contact.roads.road import placed
+from tireroad.contact.roads.road import RoadKind, placed
 from tireroad.contact.roads.under_tire import Road, is_level
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.tables.scene import Road as Table

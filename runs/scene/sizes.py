@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tireroad.contact.patch import ON_A_NODE
-from tireroad.contact.roads.kinds.obstacle import Edges
+from tireroad.contact.roads.kinds.shapes import Edges
 from tireroad.contact.roads.placement import begun_at
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections.mesh2d import SectionMesh

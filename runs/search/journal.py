@@ -25,7 +25,7 @@ from tireroad.contact.results.error_bars import CAUSES
 from tireroad.runs.files import store
 from tireroad.runs.files.disk import signed, write_text
 from tireroad.runs.files.folder import CHOSEN, make_folder
-from tireroad.runs.files.identity import identity
+from tireroad.runs.files.store import identity
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.tables.scene import Accuracy as Wanted
 from tireroad.runs.scene.tables.scene import Scene

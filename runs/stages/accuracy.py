@@ -1,4 +1,14 @@
-"""Upper frequency up to which the results of a run are valid.
+"""Local compliance, between the nodes of the mesh, of the rubber under a scene's contact.
+
+What companion runs have in common: the run that they repeat in part.
+
+The same scene on elements of twice the size, up to its Green's functions.
+
+What companion runs may cost: the steps that they repeat, and the points that may touch.
+
+Companion runs: error estimates for a run's time step, contact points, modes and mesh.
+
+Upper frequency up to which the results of a run are valid.
 
 Stage accuracy: error estimates of a run's forces from cheap companion runs of known orders.
 """
@@ -6,28 +16,489 @@ Stage accuracy: error estimates of a run's forces from cheap companion runs of k
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import ClassVar
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from tireroad.contact.results.error_bars import CAUSES, Bars, Measured, measured, total
+from tireroad.contact.grid_patch import MOST, finer_touching, halved, ratio, thinned
+from tireroad.contact.results.chatter import choose, oscillation
+from tireroad.contact.results.error_bars import (
+    CAUSES,
+    Bars,
+    Measured,
+    bars,
+    measured,
+    orders,
+    random_share,
+    share,
+    total,
+)
 from tireroad.contact.results.limits import Limit, limits, lowest, pitch
-from tireroad.contact.setup import ContactSetup
+from tireroad.contact.setup import ContactSetup, on_shape
+from tireroad.contact.tread.between_nodes import Backed, on_nodes, over_rectangles, unsettled
+from tireroad.contact.tread.compliance import Influence
+from tireroad.contact.tread.law import TreadLaw
+from tireroad.contact.tread.laws.elastic import HalfSpace, Layer
 from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.fem.sections.ring import Ring
+from tireroad.fem.static.load_error import carried_over
 from tireroad.fem.static.state import StaticState
+from tireroad.greens.response import Response
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.disk import Refused
+from tireroad.runs.files.folder import make_folder
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
-from tireroad.runs.stages.companions import COARSER, Budget, Given, companions, least_steps
+from tireroad.runs.scene.estimate import estimate
+from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.scene.tables.tire import Tire
+from tireroad.runs.stages.cavity import AirColumn
 from tireroad.runs.stages.contact_file import ContactHistory
-from tireroad.runs.stages.greens import Responses
-from tireroad.runs.stages.record import Record
-from tireroad.runs.stages.rolling import first_step, recursive
-from tireroad.runs.stages.stage import Computed, Done
+from tireroad.runs.stages.greens import GreensStage, Responses
+from tireroad.runs.stages.modes import Fields, ModesStage, Motions
+from tireroad.runs.stages.obtained import obtained
+from tireroad.runs.stages.rolling import Forces, bristles, first_step, forces, recursive
+from tireroad.runs.stages.rotating import FullMatrices, RotatingStage
+from tireroad.runs.stages.setup import Setup, points_of, tread_surface
+from tireroad.runs.stages.stage import Computed, Done, Job, Part, Record, Shared, Stage
+from tireroad.runs.stages.static import StaticStage
+
+_WHOLE = 0.9  # share of the wall from which a compound counts as all of it
+
+
+@dataclass(frozen=True, kw_only=True)
+class Normal:
+    """The attributes of [contact] that the loop needs if all forces are normal to the road."""
+
+    law: TreadLaw
+    solver: str
+    sheared: bool = False
+    rubs: bool = False
+
+
+class Backing(NamedTuple):
+    """Replacements for the run's own contact, setup (not settled) and response."""
+
+    contact: Normal
+    setup: ContactSetup
+    response: Response
+
+
+def backed(job: Job, static: StaticState, setup: ContactSetup, response: Response) -> Backing:
+    """Contact, setup (not settled) and response with the outer rubber's local compliance.
+
+    The tread is backed by all of that rubber; the nodes' residual loses the part that the mesh
+    already has. Raises InputError where this is not known: points at nodes, a road that is not a
+    plane, horizontal forces, a tread that creeps.
+    """
+    contact, patch = job.scene.contact, setup.patch
+    if patch.weights is None or patch.frames is not None or contact.rubs or contact.law.creep:
+        raise InputError(
+            "the compliance of the wall between nodes is known only for a grid of points on a plane road and normal forces"
+        )
+    wall = over_rectangles(_outer(job.scene.tire, job.tire.section))
+    known = on_nodes(patch, static.area, wall)
+    count = len(patch.index)
+    residual = response.residual.copy()
+    residual[:count, :count] -= known
+    patch = unsettled(patch, known, static.normal_force[patch.index])
+    spec = Normal(law=Backed(law=contact.law, wall=wall), solver=contact.solver)
+    return Backing(spec, replace(setup, patch=patch), replace(response, residual=residual))
+
+
+def _outer(tire: Tire, ring: Ring) -> Influence:
+    """Influence of the crown's compound: a half-space if it is the whole wall, else a layer."""
+    section = ring.section
+    cell = section.outer[len(section.outer) // 2, 0]
+    material = tire.shape.rubbers(tire)[section.regions[section.region[cell]]]
+    modulus = material.dynamic * material.law.youngs
+    middle = section.nodes[section.cells].mean(axis=1)
+    low, high = np.sort(section.nodes[section.cells[cell], 1])[[0, -1]]
+    under = (section.region == section.region[cell]) & (middle[:, 1] > low) & (middle[:, 1] < high)
+    thickness = float(np.ptp(section.nodes[section.cells[under], 0]))
+    rubber = {"youngs_modulus": modulus, "poisson_ratio": material.law.poisson}
+    law = (
+        HalfSpace(**rubber)
+        if thickness > _WHOLE * ring.thickness
+        else Layer(**rubber, thickness=thickness)
+    )
+    return law.influence(np.inf)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Given:
+    """The run that companions repeat in part.
+
+    Its `job`, static state, patch and road (`setup`, not settled), response and rolling modes; the
+    first `steps` of `step` s of its loop, integrated by `scheme`. `free_slip`: the slip of free
+    rolling, already in `setup`; another setup of the scene needs it too. `most`: touching points
+    that a companion may have (contact.grid_patch.ratio).
+    """
+
+    job: Job
+    static: Done[StaticState]
+    setup: ContactSetup
+    response: Response
+    rolling: RollingModes
+    step: float
+    steps: int
+    scheme: str = "linear"
+    free_slip: float = 0.0
+    most: float = MOST
+
+    @property
+    def points_ratio(self) -> float:
+        """Spacing of the points of their companion over the run's."""
+        return ratio(self.settled.patch, self.most)
+
+    @cached_property
+    def settled(self) -> ContactSetup:
+        """The setup with its patch in the static state."""
+        return settled(self.job, self.setup, self.response, self.static.product.normal_force)
+
+    @cached_property
+    def longer(self) -> Forces:
+        """The run repeated with twice its time step. Collective."""
+        return self.repeated(self.settled, self.response, coarser=2)
+
+    @cached_property
+    def base(self) -> Forces | None:
+        """Reference for the companions of points, modes and mesh: the run with twice the step.
+
+        It halves their cost. None if the longer step drops a state or does not resolve the
+        contact's oscillation although the run's own step does; the run itself is then the
+        reference. Collective.
+        """
+        step, spec = 2 * self.step, self.job.scene.contact
+        kept = self.response.resolved(step)
+        if len(kept.every) < len(self.response.resolved(self.step).every):
+            return None
+        patch = self.settled.patch
+        steps = oscillation(spec, patch, kept, step, bristles(spec, patch))
+        if self.scheme == "linear" and choose(steps).scheme != "linear":
+            return None
+        try:
+            return self.longer
+        except (ConvergenceError, InputError):
+            return None
+
+    def first(self, steps: int) -> Given:
+        """The same for fewer steps."""
+        return self._keeping("settled", steps=steps)
+
+    def of(self, job: Job) -> Given:
+        """The same with another job; `base` stays that of the run."""
+        return self._keeping("base", job=job)
+
+    def _keeping(self, name: str, **changes: Any) -> Given:
+        """The same with `changes`, and the cached property `name` as here."""
+        other = replace(self, **changes)
+        other.__dict__[name] = getattr(self, name)
+        return other
+
+    def repeated(
+        self,
+        setup: ContactSetup,
+        response: Response,
+        coarser: int | None = None,
+        contact: Normal | None = None,
+    ) -> Forces:
+        """Repeat the loop with another setup (settled), response or `contact`.
+
+        `coarser`: factor on the time step, by default that of `base`. Collective.
+        """
+        times = coarser or (1 if self.base is None else 2)
+        step, steps = times * self.step, self.steps // times
+        return forces(self.job, setup, response, step, steps, self.scheme, contact)
+
+
+def settled(job: Job, setup: ContactSetup, response: Response, force: np.ndarray) -> ContactSetup:
+    """The setup with its patch in the static state under the nodal forces (s,) N."""
+    return setup.settled(response, force, job.scene.contact)[0]
+
+
+STATIC_TO_GREENS: tuple[type[Part], ...] = (
+    Motions,
+    Setup,
+    ModesStage,
+    AirColumn,
+    Fields,
+    FullMatrices,
+    RotatingStage,
+    GreensStage,
+)
+COARSER = "coarser"  # folder, in the run's own, of the coarser companion's stages
+LEAST = (8, 4)  # fewest elements around and along of a companion's mesh
+
+
+@dataclass(frozen=True, kw_only=True)
+class CoarserStatic(StaticStage):
+    """The static state on the coarser mesh, reached in a few steps from that of the `run`.
+
+    It is computed from the undeformed tire if the scene prescribes a deflection, which counts from
+    this mesh's own first contact, or if those steps do not converge.
+    """
+
+    forgets: ClassVar[bool] = False  # the run's own matrices are kept for the next member
+    run: Job
+    near: Done[StaticState]
+
+    def inputs(self) -> dict:
+        """Those of any static state, and the state it starts from."""
+        return super().inputs() | {"near": self.near.key}
+
+    def compute(self, record: Record) -> StaticState:
+        """The static state. Collective."""
+        wanted = self.job.scene.static
+        if wanted.deflection is None:
+            given = self.near.product, self.run.tire, self.job.tire, wanted.load
+            if (found := carried_over(*given)) is not None:
+                return found
+        return super().compute(record)
+
+
+def coarser(run: Job, static: Done[StaticState]) -> tuple[Job, dict[str, Done]]:
+    """The coarser job, and its parts from the static state to the Green's functions. Collective."""
+    job, done = coarser_job(run), dict[str, Done]()
+    if (contact := job.scene.contact) is not None:
+        # Contact points as in the run, not those its own footprint would ask for.
+        contact = replace(contact, points=points_of(run, static.product))
+        job = replace(job, scene=replace(job.scene, contact=contact))
+    on_root(job.comm, lambda: make_folder(job.directory))
+    chain: tuple[type[Part], ...] = (StaticStage, *STATIC_TO_GREENS)
+    for kind in chain:
+        part = (
+            CoarserStatic(job=job, run=run, near=static)
+            if kind is StaticStage
+            else kind.taken(job, done)
+        )
+        if (found := _made(job, kind, part, done)) is not None:
+            done[kind.name] = found
+    return job, done
+
+
+def coarser_job(job: Job) -> Job:
+    """The same scene with half the elements around and, where given, from bead to bead.
+
+    Its stages are cached like those of any run, in a subfolder of the run's. Raises InputError if
+    the mesh is too coarse to be halved.
+    """
+    tire, static = job.scene.tire, job.scene.static
+    coarse, segments = tire, tire.segments // 2
+    if segments >= LEAST[0]:
+        coarse = replace(tire, segments=segments, shape=tire.shape.coarser(tire))
+    if coarse is tire or coarse.proportions().along < LEAST[1]:
+        around, along = (2 * least for least in LEAST)
+        raise InputError(
+            f"the mesh is too coarse to be halved: that needs {around} elements around and {along} along"
+        )
+    rotation = job.scene.rotation
+    if rotation is not None:  # the speed of the run's own wheel, whatever the travel speed
+        rotation = replace(rotation, speed=job.speed, travel_speed=None)
+    scene = replace(
+        job.scene,
+        rotation=rotation,
+        tire=coarse,
+        static=replace(static, error_estimate=False),
+    )
+    return replace(job, scene=scene, directory=job.directory / COARSER, found={})
+
+
+def _made(job: Job, kind: type[Part], part: Part | None, done: dict[str, Done]) -> Done | None:
+    """The result of one part of the chain; None if it has none. Collective."""
+    if kind is RotatingStage and not job.speed:
+        return RotatingStage.instead(job, done)
+    if isinstance(part, Stage):
+        return obtained(part).done
+    return Done("", part.make) if isinstance(part, Shared) else None
+
+
+SHARE = 0.33  # of the run's own cost: budget of all companion runs together
+_FEWEST, _PERIODS = 64, 2  # least steps after the run-in, and periods of `up_to`, to repeat
+# Cost of five companion runs in time loops per repeated step, by the spacing of that of the points.
+_LOOPS = {2.0: 3.5, 0.5: 6.0}
+_COARSE = 0.14  # cost on elements of twice the size, as a share of the run's cost before the loop
+# Cost of a step per touching point, from `MOST` of them on: conjugate gradients (radial tire on
+# cobblestones, 1,840 points: 84 ms).
+_TOUCHING = 5e-5
+
+
+def least_steps(step: float, up_to: float) -> int:
+    """Fewest steps of `step` s after the run-in, for histories compared up to `up_to` Hz."""
+    return max(_FEWEST, int(np.ceil(_PERIODS / (up_to * step))))
+
+
+@dataclass(frozen=True)
+class Budget:
+    """Cost of a run in operations (scene.extent.estimate): `before` its loop, and per step of it.
+
+    `steps`: of its loop.
+    """
+
+    before: float
+    loop: float
+    steps: int
+
+    @classmethod
+    def of(cls, scene: Scene, steps: int) -> Budget:
+        """Of a scene that takes so many steps."""
+        work = estimate(scene).work
+        loop = work["contact loop"]
+        return cls(sum(work.values()) - loop, loop / steps, steps)
+
+    @property
+    def _whole(self) -> float:
+        return SHARE * (self.before + self.loop * self.steps)
+
+    def most_touching(self, least: int) -> float:
+        """Touching points that the companion of the points may have, repeating `least` steps.
+
+        As many as take half the budget of all companions, with twice the time step.
+        """
+        return max(MOST, self._whole / (_TOUCHING * least))
+
+    def window(self, least: int, given: Given) -> int:
+        """Last step of companion runs: `least`, more as far as the budget goes; even."""
+        spacing = given.points_ratio
+        each = _LOOPS[spacing] * self.loop
+        if spacing < 1 and (finer := finer_touching(given.settled.patch)) > MOST:
+            each += _TOUCHING * finer / 2
+        count = round((self._whole - _COARSE * self.before) / each)
+        count = int(np.clip(count, min(least, self.steps), self.steps))
+        return count - count % 2
+
+
+FEWER = 1 / np.sqrt(2)  # share of the highest mode up to which the companion keeps states
+
+
+def longer_step(given: Given) -> Forces:
+    """Twice the time step. Collective."""
+    return given.longer
+
+
+def other_points(given: Given) -> Forces:
+    """Every other point of the grid both ways or, where affordable, twice as many. Collective."""
+    job, patch = given.job, given.setup.patch
+    if patch.places is None:
+        raise InputError(
+            "the points are nodes of the mesh: take a grid, contact.points = { dx, dy }"
+        )
+    coarser = given.points_ratio > 1
+    brush = job.scene.contact.brush_stiffness
+    if brush is not None:  # stiffness of a point that stands for four, or for a quarter
+        contact = replace(job.scene.contact, brush_stiffness=brush * (4 if coarser else 0.25))
+        job = replace(job, scene=replace(job.scene, contact=contact))
+    if coarser:
+        patch = thinned(patch)
+    else:
+        surface = tread_surface(job, given.static.product, given.static.key)
+        height = given.static.product.road_height
+        assert height is not None
+        patch = halved(patch, surface, height, given.setup.reach)
+        patch = on_shape(patch, given.static.product.road)
+    setup = replace(given.setup, patch=patch)
+    setup = settled(job, setup, given.response, given.static.product.normal_force)
+    return given.of(job).repeated(setup, given.response)
+
+
+def fewer_modes(given: Given) -> Forces:
+    """States up to `FEWER` of the highest mode; those from there to the highest are static.
+
+    States above the highest mode are kept: they belong to the shapes that joined the modes, without
+    which the band below would shift. Collective.
+    """
+    highest = given.rolling.highest
+    joined = given.rolling.basis.projection.shapes > 0
+    limits = FEWER * highest, highest if joined else np.inf
+    kept = given.response.keeping_where(
+        lambda s: (np.abs(s) <= limits[0]) | (np.abs(s) > limits[1])
+    )
+    if len(kept.every) == len(given.response.every):
+        raise InputError("all states lie far below the highest mode: none can be left out")
+    return given.repeated(given.settled, kept)
+
+
+def coarser_mesh(given: Given) -> Forces:
+    """Elements of twice the size, from the static state on. Collective."""
+    job, done = coarser(given.job, given.static)
+    response, state = done["greens"].product.contact, done["static"].product
+    setup = done["setup"].product.with_slip(given.free_slip)
+    setup = settled(job, setup, response, state.normal_force)
+    return given.of(job).repeated(setup, response)
+
+
+def finer_wall(given: Given) -> Forces:
+    """With the local flexibility of the wall between nodes below the contact points added.
+
+    A coarser mesh does not show this part: halving the elements changes the far field of a point
+    eight times and more, but its near field only twice. Collective.
+    """
+    force = given.static.product.normal_force
+    made = backed(given.job, given.static.product, given.setup, given.response)
+    setup = made.setup.settled(made.response, force, made.contact)[0]
+    return given.repeated(setup, made.response, contact=made.contact)
+
+
+COMPANIONS: dict[str, Callable[[Given], Forces]] = {
+    "step": longer_step,
+    "points": other_points,
+    "modes": fewer_modes,
+    "mesh": coarser_mesh,
+}
+"""By the cause of the error that each estimates (contact.results.error_bars.CAUSES)."""
+
+
+class Companion(NamedTuple):
+    """The `forces` of a companion run and their reference `beside` (None: the run itself).
+
+    `share`: the fraction of their difference that is the error.
+    """
+
+    forces: Forces
+    beside: Forces | None
+    share: float
+
+    def bars(
+        self, run: Mapping[str, Measured], since: float, limit: float, up_to: float
+    ) -> dict[str, Bars]:
+        """Error bars of a `run` after `since` s; see contact.results.error_bars.measured."""
+        off = _figures(self.forces, since, limit, up_to)
+        other = _figures(self.beside, since, limit, up_to) if self.beside else run
+        return {name: bars(other[name], off[name], self.share) for name in run}
+
+
+def _figures(forces: Forces, since: float, limit: float, up_to: float) -> dict[str, Measured]:
+    first = round(since / forces.step)
+    both = {"contact_force": forces.contact, "axle_force": forces.axle}
+    return {
+        name: measured(values[first:], forces.step, limit, up_to) for name, values in both.items()
+    }
+
+
+def companions(cause: str, given: Given) -> list[Companion]:
+    """Companion runs for one cause, without terminal output; their errors add as squares.
+
+    Raises InputError or ConvergenceError if the cause has none. Collective.
+    """
+    with observe.quiet():
+        beside = None if cause == "step" else given.base
+        found = [Companion(COMPANIONS[cause](given), beside, _share(cause, given))]
+        if cause == "mesh":
+            with suppress(InputError, ConvergenceError):
+                found.append(Companion(finer_wall(given), beside, 1.0))
+    return found
+
+
+def _share(cause: str, given: Given) -> float:
+    points = given.points_ratio if cause == "points" else 2.0
+    size = {"step": 2.0, "points": points, "modes": 1 / FEWER, "mesh": 2.0}[cause]
+    order = orders(given.job.tire.section.order, given.scheme)[cause]
+    return (random_share if cause == "points" else share)(size, order)
 
 
 def all_limits(setup: ContactSetup, rolling: RollingModes, step: float) -> tuple[Limit, ...]:

@@ -14,8 +14,7 @@ from tireroad.modal.basis import Air, ModalBasis
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
 from tireroad.runs.scene.tables.scene import has_air
-from tireroad.runs.stages.record import Record
-from tireroad.runs.stages.stage import Done, Job, Shared
+from tireroad.runs.stages.stage import Done, Job, Record, Shared
 
 if TYPE_CHECKING:
     from tireroad.fem.cavity.column import Column

@@ -25,12 +25,12 @@ from tireroad.contact.results.chatter import LIMIT, ROAD, Chatter, Chosen, warni
 from tireroad.contact.results.energy import (
     Circulation,
     Motion,
+    Totals,
     Work,
     energy_left,
     own_states,
     springs,
 )
-from tireroad.contact.results.totals import Totals
 from tireroad.contact.setup import ContactSetup
 from tireroad.fem.static.footprint import Footprint
 from tireroad.fem.static.state import StaticState
@@ -49,7 +49,6 @@ from tireroad.runs.stages.contact_file import (
     forget_checkpoint,
 )
 from tireroad.runs.stages.greens import Responses
-from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.rolling import (
     Integration,
     Planned,
@@ -63,7 +62,7 @@ from tireroad.runs.stages.rolling import (
     reported,
     shortest_period,
 )
-from tireroad.runs.stages.stage import Done, Stage
+from tireroad.runs.stages.stage import Done, Record, Stage
 
 # Fewest point spacings per footprint width. Measured on cobblestones on two tires: deviation 23 %
 # too large at 1.8, 2 % at 2.4 (torus.toml), 5 % too small at 2.5, 3 % at 3.6. Only on a mesh

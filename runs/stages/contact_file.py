@@ -38,8 +38,7 @@ from tireroad.runs.scene.road_rules import foot, never_met, within_run_in, witho
 from tireroad.runs.scene.tables.scene import Road
 from tireroad.runs.stages import corner
 from tireroad.runs.stages import setup as stages_setup
-from tireroad.runs.stages.record import Record
-from tireroad.runs.stages.stage import Job
+from tireroad.runs.stages.stage import Job, Record
 
 LEVEL = 1  # higher levels take several times as long for a few percent
 
@@ -222,7 +221,7 @@ class ContactHistory:
     """The contact over n steps of `step` s ending at `time` (n,) s: `total_force` (n, 3) N;
     `axle_force` (n, 3) N if stored; `driven` (n, k, 3) m: displacement at driven points, if any;
     `wheel`: hub moments, and motions of a moving wheel, by the names of
-    runs.stages.build.corner; `free_slip`: slip added so that the wheel rolls freely."""
+    runs.stages.corner; `free_slip`: slip added so that the wheel rolls freely."""
 
     step: float
     scheme: str

@@ -15,8 +15,7 @@ from tireroad.greens.outputs import disagreement
 from tireroad.modal.corner import ARRAYS, SEEN, Corner
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
-from tireroad.runs.stages.record import Record
-from tireroad.runs.stages.stage import Job
+from tireroad.runs.stages.stage import Job, Record
 
 MOMENTS = 3  # hub moments: the last readings of every wheel
 BESIDE = SEEN + MOMENTS  # columns of the probes after those of the outer face

@@ -21,9 +21,8 @@ from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
 from tireroad.runs.scene.tables.scene import PointForce, has_air
 from tireroad.runs.stages import cavity, corner
-from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.setup import components, points_of, probes
-from tireroad.runs.stages.stage import Computed, Done
+from tireroad.runs.stages.stage import Computed, Done, Record
 from tireroad.runs.stages.turning import turning_of
 
 _UNITS = {

@@ -33,8 +33,15 @@ from tireroad.runs.process.mpi import on_root
 from tireroad.runs.process.surroundings import available_memory
 from tireroad.runs.scene.estimate import estimate
 from tireroad.runs.stages import cavity, corner, reuse
-from tireroad.runs.stages.record import Record
-from tireroad.runs.stages.stage import Computed, Done, Job, Shared, checkpointed, forget_checkpoint
+from tireroad.runs.stages.stage import (
+    Computed,
+    Done,
+    Job,
+    Record,
+    Shared,
+    checkpointed,
+    forget_checkpoint,
+)
 from tireroad.runs.stages.turning import damping_of, shapes_of
 
 _UNITS = {

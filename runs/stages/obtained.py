@@ -31,8 +31,7 @@ from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.process.signals import Stopped
 from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.stages.record import Record
-from tireroad.runs.stages.stage import Done, Stage
+from tireroad.runs.stages.stage import Done, Record, Stage
 
 VARIABLE = "TIREROAD_FAILURES"
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from mpi4py import MPI
 
-from tireroad.contact.roads.kind import RoadKind
+from tireroad.contact.roads.road import RoadKind
 from tireroad.contact.roads.under_tire import Road
 from tireroad.contact.setup import ContactSetup
 from tireroad.fem.collective import broadcast
@@ -45,8 +45,7 @@ from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.road_rules import check_road, keep, made
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.stages import obtained as stages_obtained
-from tireroad.runs.stages.accuracy import AccuracyStage
-from tireroad.runs.stages.companions import STATIC_TO_GREENS
+from tireroad.runs.stages.accuracy import STATIC_TO_GREENS, AccuracyStage
 from tireroad.runs.stages.contact import ContactStage
 from tireroad.runs.stages.greens import Responses
 from tireroad.runs.stages.motion import MotionStage

@@ -36,8 +36,7 @@ from tireroad.runs.process import observe
 from tireroad.runs.scene.tables.contact import Time
 from tireroad.runs.scene.tables.scene import PointForce, Road, Scene
 from tireroad.runs.stages import corner
-from tireroad.runs.stages.record import Record
-from tireroad.runs.stages.stage import Job
+from tireroad.runs.stages.stage import Job, Record
 
 
 def directions(forces: Sequence[PointForce]) -> np.ndarray:

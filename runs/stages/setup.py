@@ -31,13 +31,12 @@ from tireroad.runs.scene.road_rules import made
 from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.scene.tables.contact import PatternTable
 from tireroad.runs.stages import corner, reuse
-from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.rolling import run_time
-from tireroad.runs.stages.stage import Done, Job, Shared
+from tireroad.runs.stages.stage import Done, Job, Record, Shared
 from tireroad.runs.stages.turning import wheel_slip
 
 if TYPE_CHECKING:
-    from tireroad.fem.static.tread_surface import TreadSurface
+    from tireroad.fem.static.footprint import TreadSurface
 
 
 MOST = 20_000_000  # most depths in a file
@@ -152,7 +151,7 @@ class Setup(Shared[ContactSetup | None]):
 
 def tread_surface(job: Job, state: StaticState, key: str) -> TreadSurface:
     """The deformed tread of the static state with this key."""
-    from tireroad.fem.static.tread_surface import TreadSurface  # not needed for points at nodes
+    from tireroad.fem.static.footprint import TreadSurface  # not needed for points at nodes
 
     return reuse.once("surface", key, lambda: TreadSurface(job.tire.lattice, state.seen))
 

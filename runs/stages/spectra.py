@@ -35,9 +35,8 @@ from tireroad.runs.process import observe
 from tireroad.runs.stages import corner
 from tireroad.runs.stages.accuracy import Accuracy, all_limits
 from tireroad.runs.stages.contact_file import ContactHistory
-from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.rolling import first_step, run_in
-from tireroad.runs.stages.stage import Computed, Done
+from tireroad.runs.stages.stage import Computed, Done, Record
 
 # name in `third_octave/`: name in `density/`, reference of the level, its unit, unit of the
 # density, whether the rate is taken

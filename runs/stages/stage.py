@@ -1,4 +1,8 @@
-"""A job: one run of one scene, shared unchanged by all its stages.
+"""The record of a stage: figures, warnings, and time by part.
+
+From the scene's tire to its section, lattice of nodes and finite-element body.
+
+A job: one run of one scene, shared unchanged by all its stages.
 
 A stage: a function of typed inputs whose frozen product is written to a file and read back.
 
@@ -12,15 +16,16 @@ absent, damaged or of other inputs.
 
 from __future__ import annotations
 
+import math
 import shutil
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import MISSING, dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 from mpi4py import MPI
@@ -29,6 +34,7 @@ from tireroad.fem.axle import Axle
 from tireroad.fem.model import TireModel
 from tireroad.fem.static.checkpoint import Entry, Journal
 from tireroad.fem.static.state import StaticState
+from tireroad.fem.timing import Timing
 from tireroad.runs.files import store
 from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.process import observe
@@ -36,8 +42,77 @@ from tireroad.runs.process.mpi import on_root
 from tireroad.runs.process.signals import Stopped
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.tables.scene import Scene, axle_of
-from tireroad.runs.stages.record import Record
-from tireroad.runs.stages.tire import make_tire
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+    from tireroad.fem.sections.ring import Ring
+    from tireroad.fem.static.road import RoadShape
+    from tireroad.fem.tire.body import Body
+    from tireroad.runs.scene.tables.scene import Scene
+    from tireroad.runs.scene.tables.tire import Tire
+
+
+Figures = dict[str, tuple[Any, str]]
+
+
+@dataclass
+class Record:
+    """The record of a stage: figures as name: (value, unit), seconds by part."""
+
+    headline: Figures = field(default_factory=dict)
+    indicators: Figures = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)
+    cost: Timing = field(default_factory=Timing)
+
+    def line(self) -> str:
+        """The headline figures in one line."""
+        return ", ".join(
+            f"{name} {_shown(v)} {unit}".rstrip(" -") for name, (v, unit) in self.headline.items()
+        )
+
+    def timing(self, part: str) -> AbstractContextManager[None]:
+        """Add the seconds spent inside the context to a part of the stage's cost."""
+        return self.cost(part)
+
+    @property
+    def shares(self) -> str:
+        """Seconds of each part, the largest first."""
+        total = sum(self.cost.values()) or 1.0
+        parts = sorted(self.cost.items(), key=lambda part: -part[1])
+        return "time: " + ", ".join(f"{k} {v:.2g} s ({v / total:.0%})" for k, v in parts)
+
+
+def _shown(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def make_tire(comm: MPI.Comm, tire: Tire):
+    """The tire without loads; its finite elements are made on first use."""
+    from tireroad.fem.model import TireModel
+
+    section = tire.ring()
+    return TireModel(section, lambda: make_body(comm, tire, section))
+
+
+def road_shape(scene: Scene) -> RoadShape:
+    """The road's shape under the tire: the wheel's camber, and the drum if there is one."""
+    from tireroad.fem.static.road import RoadShape
+
+    drum = scene.road.drum_radius if scene.road else None
+    return RoadShape(
+        camber=math.radians(scene.static.camber),
+        drum_radius=drum,
+        inside=drum is not None and scene.road.drum == "inside",
+    )
+
+
+def make_body(comm: MPI.Comm, tire: Tire, section: Ring) -> Body:
+    """The finite-element body, undeformed. Collective."""
+    from tireroad.fem.tire.body import Body
+
+    return Body(comm, section, tire.shape.rubbers(tire), cords=tire.shape.cords(tire))
+
 
 T = TypeVar("T")
 

@@ -31,9 +31,14 @@ from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.stages import reuse
-from tireroad.runs.stages.record import Record
-from tireroad.runs.stages.stage import Computed, Job, checkpointed, forget_checkpoint
-from tireroad.runs.stages.tire import road_shape
+from tireroad.runs.stages.stage import (
+    Computed,
+    Job,
+    Record,
+    checkpointed,
+    forget_checkpoint,
+    road_shape,
+)
 from tireroad.runs.stages.turning import friction_of, rolling_shape, turning_of, wheel_slip
 
 _UNITS = {"points": "m", "force": "N", "area": "m2"}

@@ -22,8 +22,7 @@ from tireroad.fem.static.state import StaticState
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.scene.tables.scene import deflections
-from tireroad.runs.stages.record import Record
-from tireroad.runs.stages.stage import Computed, Done, Job
+from tireroad.runs.stages.stage import Computed, Done, Job, Record
 from tireroad.runs.stages.static import steady_rolling
 from tireroad.runs.stages.turning import wheel_slip
 

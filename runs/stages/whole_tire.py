@@ -25,10 +25,9 @@ from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import opened
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.stages.contact_file import ContactHistory
-from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.rolling import histories, of_given_forces, recursive
 from tireroad.runs.stages.setup import components, probes
-from tireroad.runs.stages.stage import Computed, Done, Job
+from tireroad.runs.stages.stage import Computed, Done, Job, Record
 
 _ROWS = 4096  # steps read at a time
 

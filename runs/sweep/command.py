@@ -13,8 +13,7 @@ from tireroad.runs.process import observe
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.sweep import local
 from tireroad.runs.sweep.definition import Member, Sweep, read
-from tireroad.runs.sweep.gather import gather, write
-from tireroad.runs.sweep.page import write_page
+from tireroad.runs.sweep.page import gather, write, write_page
 
 
 def sweep(path: Path, out: Path | None, *, at_once: int, batch: bool, only_gather: bool) -> None:

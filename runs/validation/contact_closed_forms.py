@@ -40,7 +40,7 @@ from scipy.optimize import brentq, root_scalar
 from tireroad.contact import closed_forms as exact
 from tireroad.contact.loop import roll
 from tireroad.contact.patch import Patch
-from tireroad.contact.roads.kinds.flat import Flat
+from tireroad.contact.roads.kinds.shapes import Flat
 from tireroad.contact.roads.under_tire import RoadUnderTire
 from tireroad.contact.setup import ContactSetup, Rolled
 from tireroad.contact.solver.active_set import ActiveSet

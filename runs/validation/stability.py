@@ -28,11 +28,9 @@ from scipy import linalg, sparse
 
 from tireroad.contact.grid_patch import OnPoints
 from tireroad.contact.loop import Drive, roll
-from tireroad.contact.roads.kinds.flat import Flat
-from tireroad.contact.roads.kinds.obstacle import Cleat, Step
+from tireroad.contact.roads.kinds.shapes import Cleat, Flat, Step
 from tireroad.contact.solver.active_set import ActiveSet
-from tireroad.contact.solver.grid_compliance import SpreadCompliance
-from tireroad.contact.solver.projected_cg import ProjectedCG
+from tireroad.contact.solver.projected_cg import ProjectedCG, SpreadCompliance
 from tireroad.contact.solver.stick_slip import Friction
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import (

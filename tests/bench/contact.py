@@ -8,7 +8,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from tireroad.contact.loop import Drive, roll
-from tireroad.contact.roads.kinds.flat import Flat
+from tireroad.contact.roads.kinds.shapes import Flat
 from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.solver.stick_slip import Friction
 from tireroad.contact.tread.brush import Brush, BrushLaw

@@ -21,9 +21,9 @@ from tireroad.contact.literature import (
 from tireroad.contact.results.spectra import distance, third_octaves
 from tireroad.contact.tread.law import TREADS
 from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.footprint import TreadSurface
 from tireroad.fem.static.load_steps import Loader
 from tireroad.fem.static.state import StaticState, static_state
-from tireroad.fem.static.tread_surface import TreadSurface
 from tireroad.runs.validation.full_elements import Trial
 from tireroad.runs.validation.tables import Table
 from tireroad.tests.bench.accuracy.rough_road import BAND, Mesh, Prepared, modal, prepared

@@ -6,7 +6,7 @@ from mpi4py import MPI
 
 from tireroad.contact.loop import Drive, Driven, roll
 from tireroad.contact.patch import Patch
-from tireroad.contact.roads.kinds.flat import Flat
+from tireroad.contact.roads.kinds.shapes import Flat
 from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response

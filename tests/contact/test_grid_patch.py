@@ -21,7 +21,7 @@ from tireroad.contact.solver.active_set import ActiveSet, UsualSet
 from tireroad.contact.solver.projected_cg import ProjectedCG
 from tireroad.contact.tread.laws.elastic import HalfSpace
 from tireroad.fem.errors import InputError
-from tireroad.fem.static.tread_surface import TreadSurface
+from tireroad.fem.static.footprint import TreadSurface
 from tireroad.fem.tire.mesh import field_lattice
 from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.scene.tables.contact import Contact

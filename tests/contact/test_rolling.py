@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 from tireroad.contact.loop import Drive, _roads, roll
 from tireroad.contact.results.energy import Work
-from tireroad.contact.roads.kinds.flat import Flat
+from tireroad.contact.roads.kinds.shapes import Flat
 from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.tread.compliance import half_space_compliance
 from tireroad.fem.errors import ConvergenceError

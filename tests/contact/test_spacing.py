@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tireroad.contact.patch import make_patch, spacing
-from tireroad.contact.roads.kinds.flat import Flat
+from tireroad.contact.roads.kinds.shapes import Flat
 from tireroad.contact.roads.road import make_road
 from tireroad.contact.roads.under_tire import RoadUnderTire
 from tireroad.contact.setup import ContactSetup, Rolled

@@ -7,7 +7,7 @@ from mpi4py import MPI
 from scipy import linalg
 
 from tireroad.modal.solver import undamped
-from tireroad.modal.solver.canonical import ordered, turn_to_rule
+from tireroad.modal.solver.fields import ordered, turn_to_rule
 from tireroad.modal.solver.symmetry import Sites
 
 COMM = MPI.COMM_WORLD

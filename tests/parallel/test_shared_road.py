@@ -10,9 +10,9 @@ import pytest
 from mpi4py import MPI
 
 from tireroad.contact.roads import grid
-from tireroad.contact.roads.kind import RoadKind
 from tireroad.contact.roads.kinds.laser import LaserFile
 from tireroad.contact.roads.kinds.measured import GridFile
+from tireroad.contact.roads.road import RoadKind
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.road_rules import made
 from tireroad.runs.stages.pipeline import share

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from matplotlib.image import imsave
 
-from tireroad.contact.roads.kind import ROADS
+from tireroad.contact.roads.road import ROADS
 from tireroad.contact.tread.law import TREADS
-from tireroad.fem.tire.law import MATERIALS
+from tireroad.fem.tire.material import MATERIALS
 from tireroad.runs.scene.schema import walk
 from tireroad.runs.scene.tables.scene import Scene
 

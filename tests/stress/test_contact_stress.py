@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from tireroad.contact.loop import Drive, roll
-from tireroad.contact.roads.kinds.flat import Flat
+from tireroad.contact.roads.kinds.shapes import Flat
 from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.tread.compliance import half_space_compliance
 from tireroad.greens.recursion import Recursion

@@ -15,8 +15,7 @@ from tireroad.contact.closed_forms import (
     westergaard_pressure,
 )
 from tireroad.contact.solver.active_set import ActiveSet
-from tireroad.contact.solver.grid_compliance import MatrixCompliance
-from tireroad.contact.solver.projected_cg import ProjectedCG
+from tireroad.contact.solver.projected_cg import MatrixCompliance, ProjectedCG
 from tireroad.contact.tread.compliance import half_space_compliance
 
 YOUNG, POISSON = 3.4e6, 0.49

@@ -12,7 +12,7 @@ from tireroad.fem.static.load_steps import Loader
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.symmetry import Sites
 from tireroad.runs.scene.load import load
-from tireroad.runs.stages.tire import make_body
+from tireroad.runs.stages.stage import make_body
 from tireroad.tests.bench.series.inflated import InflatedRing, lowest
 
 PRESSURE = 2.2e5

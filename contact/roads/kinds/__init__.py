@@ -1,1 +1,1 @@
-"""The kinds of roads, one file each: `road.kind` of a scene selects one (contact.roads.kind)."""
+"""The kinds of roads: `road.kind` of a scene selects one (contact.roads.road)."""

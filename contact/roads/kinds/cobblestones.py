@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.contact.roads.kind import Levelled, road_kind
+from tireroad.contact.roads.road import Levelled, road_kind
 from tireroad.fem.parameters import ParameterError, flag, integer, number
 
 Array = NDArray[np.float64]

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from tireroad.contact.roads.grid import Grid, check_count
 from tireroad.contact.roads.grid_file import UNITS
-from tireroad.contact.roads.kind import Levelled, road_kind
-from tireroad.contact.roads.texture.measured_line import cleaned, memory, widened
+from tireroad.contact.roads.random_texture import cleaned, memory, widened
+from tireroad.contact.roads.road import Levelled, road_kind
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import ParameterError, choice, filename, integer, number
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 from tireroad.contact.roads.grid import Grid
 from tireroad.contact.roads.grid_file import UNITS, read_grid
-from tireroad.contact.roads.kind import Levelled, road_kind
 from tireroad.contact.roads.opencrg import read_opencrg
+from tireroad.contact.roads.road import Levelled, road_kind
 from tireroad.fem.parameters import ParameterError, choice, filename
 
 _LAYOUT = (

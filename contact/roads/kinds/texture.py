@@ -1,7 +1,7 @@
 """A self-affine road texture: blended random tiles with a given spectrum; nothing repeats."""
 
-from tireroad.contact.roads.kind import RoadKind, road_kind
-from tireroad.contact.roads.texture.random_surface import MOST_PLACES, Tiles, tile_places, tile_size
+from tireroad.contact.roads.random_texture import MOST_PLACES, Tiles, tile_places, tile_size
+from tireroad.contact.roads.road import RoadKind, road_kind
 from tireroad.fem.parameters import ParameterError, integer, number
 
 

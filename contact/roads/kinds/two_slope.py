@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from tireroad.contact.roads.kind import Levelled, road_kind
 from tireroad.contact.roads.kinds.iso8608 import CLASSES, Iso8608
-from tireroad.contact.roads.texture.random_surface import (
+from tireroad.contact.roads.random_texture import (
     MOST_PLACES,
     MOST_SKEW,
     Layered,
@@ -13,6 +12,7 @@ from tireroad.contact.roads.texture.random_surface import (
     textured,
     tile_places,
 )
+from tireroad.contact.roads.road import Levelled, road_kind
 from tireroad.fem.parameters import Limits, ParameterError, choice, integer, number, numbers
 
 # A typical stone mastic asphalt of 11 mm (chosen within the 38 to 48 dB at 5 mm of asphalts; at

@@ -1,1 +1,1 @@
-"""The material laws; `model` of a material in a scene selects one (fem.tire.law)."""
+"""The material laws; `model` of a material in a scene selects one (fem.tire.material)."""

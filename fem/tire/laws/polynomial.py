@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from ufl.core.expr import Expr
 
 from tireroad.fem.parameters import number
-from tireroad.fem.tire.law import MaterialLaw, material_law
+from tireroad.fem.tire.material import MaterialLaw, material_law
 
 
 @dataclass(frozen=True, kw_only=True)

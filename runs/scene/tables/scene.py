@@ -21,8 +21,8 @@ from typing import Any
 
 import numpy as np
 
-from tireroad.contact.roads.kind import ROADS, RoadKind
 from tireroad.contact.roads.placement import Placement
+from tireroad.contact.roads.road import ROADS, RoadKind
 from tireroad.contact.roads.under_tire import Motion
 from tireroad.fem.axle import DIRECTIONS, Axle
 from tireroad.fem.errors import InputError

@@ -6,18 +6,22 @@ keys, `check`, the key reference and the range tests derive from it.
 The table [tire.cavity]: keys, when air is included by default, and incompatible settings.
 
 The table of the tire, key by key, with units, ranges and defaults (contract: Scene).
+
+Shared by the kinds of section: cords and compounds of a scene's tables, sizes of a ring.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar, Self
+
+import numpy as np
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Parameters, Registry
 from tireroad.fem.sections.ring import SIZE
-from tireroad.fem.tire.law import MATERIALS, MaterialLaw
+from tireroad.fem.tire.material import MATERIALS, MaterialLaw
 from tireroad.runs.scene.schema import (
     Variants,
     choice,
@@ -33,6 +37,8 @@ from tireroad.runs.scene.schema import (
 from tireroad.runs.scene.source import Source
 
 if TYPE_CHECKING:
+    from tireroad.fem.decks.compounds import Rubber
+    from tireroad.fem.sections.mesh2d import SectionMesh
     from tireroad.fem.sections.ring import Ring
     from tireroad.fem.tire.cords import Cords as BodyCords
     from tireroad.fem.tire.material import Material as BodyMaterial
@@ -333,3 +339,41 @@ class Tire(Variants):
     def free_unknowns(self) -> int:
         """Displacement unknowns of the mesh, without those held by the rim."""
         return self.shape.free_unknowns(self)
+
+
+def cords_of(line: Cords) -> BodyCords:
+    """The cords of a [[tire.cords]], without their place in the section."""
+    from tireroad.fem.tire.cords import Cords as BodyCords
+
+    values = {k: v for k, v in vars(line).items() if k not in ("depth", "arc", "angle")}
+    return BodyCords(angle=float(np.radians(line.angle)), **values)
+
+
+def spelt(lines: Sequence[Cords], names: Iterable[str]) -> list[Cords]:
+    """The [[tire.cords]] with names spelt as the section's plies are."""
+    own = {name.upper(): name for name in names}
+    return [replace(line, name=own.get(line.name.upper(), line.name)) for line in lines]
+
+
+def region_of(tire: Tire, name: str) -> Region | None:
+    """The scene's [[tire.region]] of that name, or None."""
+    return next((r for r in tire.region if r.name and r.name.upper() == name.upper()), None)
+
+
+def losses_of(part: Region | Rubber | None) -> dict[str, float]:
+    """Dynamic modulus and loss factor of a region or a file's compound, if not 1 and 0."""
+    given = {} if part is None else {"dynamic": part.dynamic, "loss_factor": part.loss_factor}
+    neutral = {"dynamic": 1.0, "loss_factor": 0.0}
+    return {key: value for key, value in given.items() if value != neutral[key]}
+
+
+def proportions_of(ring: Ring, drawn: SectionMesh) -> Proportions:
+    """Sizes of a ring from its section as drawn, of any element order."""
+    return Proportions(
+        outer_radius=float(drawn.nodes[:, 0].max()),
+        height=ring.height / 2,
+        thickness=ring.thickness,
+        half_angle=float(np.degrees(np.abs(ring.arc_corners).max())),
+        along=len(drawn.outer),
+        through=max(1, round(len(drawn.cells) / len(drawn.outer))),
+    )

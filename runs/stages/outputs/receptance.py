@@ -18,8 +18,8 @@ from tireroad.runs.scene.outputs import (
 
 if TYPE_CHECKING:
     from tireroad.runs.scene.tables.scene import Scene
-    from tireroad.runs.stages.driven import Driven
-    from tireroad.runs.stages.record import Record
+    from tireroad.runs.stages.response import Driven
+    from tireroad.runs.stages.stage import Record
 
 
 @OUTPUTS.register("receptance", "receptances between the driven points")

@@ -19,8 +19,8 @@ from tireroad.runs.scene.tables.scene import has_air
 
 if TYPE_CHECKING:
     from tireroad.runs.scene.tables.scene import Scene
-    from tireroad.runs.stages.driven import Driven
-    from tireroad.runs.stages.record import Record
+    from tireroad.runs.stages.response import Driven
+    from tireroad.runs.stages.stage import Record
 
 # Of the highest mode. For a tire of 48 MPa with 60, 120 and 250 modes (311, 448, 687 Hz) the two
 # methods differ by 0.5, 0.25 and 0.2 % up to half of it, and by 40, 3 and 0.2 % up to 300 Hz.

@@ -16,7 +16,7 @@ from tireroad.contact.results.error_bars import measured
 from tireroad.contact.results.spectra import distance
 from tireroad.fem.timing import by_processor
 from tireroad.runs.files.cache import Cache
-from tireroad.runs.files.identity import identity
+from tireroad.runs.files.store import identity
 from tireroad.runs.process import observe
 from tireroad.runs.validation.tables import Table
 from tireroad.tests.bench.accuracy.rough_road import TEXTURE, Mesh, Rolled, rolled

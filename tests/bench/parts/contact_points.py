@@ -12,8 +12,7 @@ from scipy import sparse
 
 from tireroad.contact.roads.kinds.texture import Texture
 from tireroad.contact.solver.active_set import ActiveSet
-from tireroad.contact.solver.grid_compliance import SpreadCompliance
-from tireroad.contact.solver.projected_cg import ProjectedCG
+from tireroad.contact.solver.projected_cg import ProjectedCG, SpreadCompliance
 from tireroad.contact.tread.compliance import half_space_influence
 from tireroad.contact.tread.kernel import GridPlaces, KernelTread
 from tireroad.runs.validation.tables import Table

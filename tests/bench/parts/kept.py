@@ -9,7 +9,7 @@ from typing import Any
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.runs.files.disk import write_text
-from tireroad.runs.files.identity import identity
+from tireroad.runs.files.store import identity
 from tireroad.runs.process import observe
 from tireroad.tests.bench.parts import apart
 from tireroad.tests.bench.parts.rolling_cases import Case

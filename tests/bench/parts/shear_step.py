@@ -13,7 +13,7 @@ from scipy import sparse
 from tireroad.contact.grid_patch import OnPoints
 from tireroad.contact.loop import Drive, roll
 from tireroad.contact.solver.active_set import ActiveSet
-from tireroad.contact.solver.grid_compliance import SpreadCompliance
+from tireroad.contact.solver.projected_cg import SpreadCompliance
 from tireroad.contact.solver.stick_slip import Friction
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import half_space_compliance, half_space_influence

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from tireroad.contact.results.chatter import Chatter
-from tireroad.contact.results.totals import Totals
+from tireroad.contact.results.energy import Totals
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.static.footprint import Footprint
 from tireroad.runs.stages.contact import excursion, points
-from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.stage import Record
 from tireroad.runs.validation.cases import oval_patch
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tireroad.contact.roads.kinds.laser import LaserFile
+from tireroad.contact.roads.random_texture import memory, widened
 from tireroad.contact.roads.road import make_road
-from tireroad.contact.roads.texture.measured_line import memory, widened
 from tireroad.fem.errors import InputError
 
 PITCH = 5e-4

@@ -7,7 +7,7 @@ import pytest
 from scipy import signal
 
 from tireroad.contact.roads.kinds.iso8608 import CHUNK, CLASSES, Iso8608
-from tireroad.contact.roads.kinds.obstacle import Cleat
+from tireroad.contact.roads.kinds.shapes import Cleat
 from tireroad.contact.roads.kinds.texture import Texture
 from tireroad.contact.roads.road import make_road
 from tireroad.fem.errors import InputError

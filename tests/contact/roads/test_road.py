@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tireroad.contact.roads.grid import Grid
-from tireroad.contact.roads.kinds.sine import Sine
+from tireroad.contact.roads.kinds.shapes import Sine
 from tireroad.contact.roads.road import make_road
 from tireroad.contact.roads.under_tire import PreparedRoad, RoadUnderTire, make_motion
 from tireroad.fem.errors import InputError

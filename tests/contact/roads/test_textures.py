@@ -7,8 +7,7 @@ import pytest
 
 from tireroad.contact.roads.grid import Grid
 from tireroad.contact.roads.kinds.two_slope import TwoSlope
-from tireroad.contact.roads.road import make_road
-from tireroad.contact.roads.texture.random_surface import (
+from tireroad.contact.roads.random_texture import (
     Skewed,
     Tiles,
     band_power,
@@ -16,6 +15,7 @@ from tireroad.contact.roads.texture.random_surface import (
     profile_power,
     surface_density,
 )
+from tireroad.contact.roads.road import make_road
 from tireroad.contact.roads.under_tire import (
     RoadUnderTire,
     mean_profile_depth,

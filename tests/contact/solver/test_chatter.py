@@ -21,7 +21,7 @@ from tireroad.contact.results.chatter import (
     choose,
     oscillation,
 )
-from tireroad.contact.roads.kinds.flat import Flat
+from tireroad.contact.roads.kinds.shapes import Flat
 from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.solver.stick_slip import Friction
 from tireroad.contact.tread.brush import Brush, BrushLaw

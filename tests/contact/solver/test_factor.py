@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from tireroad.contact.solver.active_set import ActiveFactor, ActiveSet
-from tireroad.contact.solver.grid_compliance import MatrixCompliance
+from tireroad.contact.solver.projected_cg import MatrixCompliance
 from tireroad.fem.errors import ConvergenceError
 from tireroad.greens.recursion import LoadedColumns
 

@@ -7,10 +7,9 @@ import pytest
 from mpi4py import MPI
 
 from tireroad.contact.loop import Drive, Loop, roll
-from tireroad.contact.roads.kinds.flat import Flat
+from tireroad.contact.roads.kinds.shapes import Flat
 from tireroad.contact.solver.active_set import ActiveSet
-from tireroad.contact.solver.grid_compliance import MatrixCompliance
-from tireroad.contact.solver.projected_cg import ProjectedCG
+from tireroad.contact.solver.projected_cg import MatrixCompliance, ProjectedCG
 from tireroad.contact.solver.stick_slip import Friction, Stiffness, stick_slip
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import half_space_compliance, rectangle_potential

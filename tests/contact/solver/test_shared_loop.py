@@ -6,7 +6,7 @@ from mpi4py import MPI
 
 from tireroad.contact.loop import Drive, Solved, Together, roll
 from tireroad.contact.solver.active_set import make_solver
-from tireroad.contact.solver.grid_compliance import MatrixCompliance
+from tireroad.contact.solver.projected_cg import MatrixCompliance
 from tireroad.contact.solver.stick_slip import Friction
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import half_space_compliance

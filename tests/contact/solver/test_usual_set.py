@@ -5,7 +5,7 @@ import pytest
 
 from tireroad.contact.solver import active_set
 from tireroad.contact.solver.active_set import ActiveSet, Pivot, UsualSet
-from tireroad.contact.solver.grid_compliance import MatrixCompliance
+from tireroad.contact.solver.projected_cg import MatrixCompliance
 from tireroad.contact.tread.compliance import half_space_compliance
 from tireroad.fem.errors import ConvergenceError, InputError
 

@@ -6,8 +6,7 @@ from scipy import sparse, special
 from scipy.interpolate import CubicSpline
 
 from tireroad.contact.solver.active_set import ActiveSet
-from tireroad.contact.solver.grid_compliance import MatrixCompliance, SpreadCompliance
-from tireroad.contact.solver.projected_cg import ProjectedCG
+from tireroad.contact.solver.projected_cg import MatrixCompliance, ProjectedCG, SpreadCompliance
 from tireroad.contact.tread.compliance import dense_compliance, half_space_influence
 from tireroad.contact.tread.kernel import GridPlaces, KernelTread
 from tireroad.contact.tread.layer import LayerInfluence, transform_ratio

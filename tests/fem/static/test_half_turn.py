@@ -9,8 +9,8 @@ from mpi4py import MPI
 from tireroad.fem.sections.grid import PlyLine
 from tireroad.fem.static import load_steps
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.half_model import looks_the_same
 from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.symmetric import looks_the_same
 from tireroad.fem.static.tangent import HeldSystem
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.cords import Cords

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.footprint import TreadSurface
 from tireroad.fem.static.load_steps import Loader
-from tireroad.fem.static.tread_surface import TreadSurface
 from tireroad.fem.tire.mesh import Lattice, position
 from tireroad.runs.validation.cases import thesis_torus
 

@@ -9,8 +9,7 @@ from mpi4py import MPI
 
 from tireroad.fem import compat
 from tireroad.fem.errors import InputError
-from tireroad.fem.tire.law import MATERIALS
-from tireroad.fem.tire.material import compound
+from tireroad.fem.tire.material import MATERIALS, compound
 from tireroad.fem.tire.mesh import Region
 
 F = np.array([[1.2, 0.1, -0.05], [0.2, 0.9, 0.1], [0.0, -0.15, 1.1]])

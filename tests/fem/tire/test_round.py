@@ -6,9 +6,9 @@ from mpi4py import MPI
 
 from tireroad.fem.errors import LoadingStopped
 from tireroad.fem.sections.grid import PlyLine
-from tireroad.fem.static.axisymmetric import RoundEquilibrium, inflated
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.symmetric import RoundEquilibrium, inflated
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.cords import Cords
 from tireroad.fem.tire.material import compound

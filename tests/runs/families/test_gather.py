@@ -14,7 +14,7 @@ from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.search.journal import Journal, Trial
 from tireroad.runs.search.settings import Ladders, applied
 from tireroad.runs.sweep.definition import Sweep, read
-from tireroad.runs.sweep.gather import gather, write
+from tireroad.runs.sweep.page import gather, write
 
 BASE = "[static]\nload = 300.0\n[rotation]\nspeed = {speed}\n"
 FAMILY = 'scene = "base.toml"\n[[axis]]\nkey = "static.load"\nvalues = [300.0, 500.0]\n'

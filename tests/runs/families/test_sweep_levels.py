@@ -4,8 +4,15 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tireroad.runs.sweep.gather import Column, Gathered
-from tireroad.runs.sweep.page import TOTAL, _chosen, _figures, levels, write_page
+from tireroad.runs.sweep.page import (
+    TOTAL,
+    Column,
+    Gathered,
+    _chosen,
+    _page_figures,
+    levels,
+    write_page,
+)
 
 LOUD = np.array([[0.0, 10.0], [1.0, 12.0], [-1.0, 11.0], [0.5, 10.5]])
 
@@ -63,13 +70,13 @@ def test_the_caption_counts_the_seeds_that_have_levels() -> None:
     """It counted failed seeds too: "3 to 3 seeds" of a mean over two."""
     level = np.vstack([LOUD[:3], LOUD[:3] + 3.0, np.full((3, 2), np.nan)])
     given = {"damping.mass": (1,) * 3 + (2,) * 3 + (3,) * 3, "road.seed": (1, 2, 3) * 3}
-    assert any("over 3 seeds" in text for _, text in _figures(table(given, level, None)))
+    assert any("over 3 seeds" in text for _, text in _page_figures(table(given, level, None)))
     level[1] = np.nan
-    assert any("over 2 to 3 seeds" in text for _, text in _figures(table(given, level, None)))
+    assert any("over 2 to 3 seeds" in text for _, text in _page_figures(table(given, level, None)))
 
 
 def test_the_page_draws_the_differences() -> None:
-    shown = _figures(table({"static.load": (1.0, 2.0, 3.0, 4.0)}, LOUD, None))
+    shown = _page_figures(table({"static.load": (1.0, 2.0, 3.0, 4.0)}, LOUD, None))
     assert any("difference from the first" in text for _, text in shown)
 
 
@@ -84,7 +91,7 @@ def test_members_without_bands_are_drawn_as_far_as_they_go(recwarn) -> None:
     apart, _ = levels(full).differences()
     np.testing.assert_allclose(apart[:, 0], [np.nan, 0.0, -2.0, -0.5])
     assert _chosen(full) == [total]
-    shown = [text for _, text in _figures(full)]
+    shown = [text for _, text in _page_figures(full)]
     assert any("first that has bands, m1, in dB" in text for text in shown)
     assert sum(TOTAL in text for text in shown) == 1 and not recwarn.list
 

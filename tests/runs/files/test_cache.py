@@ -11,7 +11,7 @@ from tireroad.runs.cli import main
 from tireroad.runs.files import cache as shared
 from tireroad.runs.files.cache import Cache
 from tireroad.runs.files.disk import Refused
-from tireroad.runs.stages import companions
+from tireroad.runs.stages import accuracy
 
 SCENE = """
 [tire]
@@ -95,7 +95,7 @@ def test_another_road_takes_the_coarser_companion_of_the_first(
     assert [one.stage for one in Cache.of_user().entries()].count("static") == 2
     assert not (home / "one" / "coarser").exists()
     with monkeypatch.context() as patched:
-        patched.setattr(companions, "carried_over", None)  # would fail if it were called
+        patched.setattr(accuracy, "carried_over", None)  # would fail if it were called
         second = run(home, "two", *until, up_to="accuracy")
     assert "greens    reused" in second and "not estimated" not in second
     monkeypatch.setenv("TIREROAD_CACHE", "off")

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.files import disk, identity
+from tireroad.runs.files import disk, store
 from tireroad.runs.files.disk import write_text
 from tireroad.runs.files.store import (
     Provenance,
@@ -112,44 +112,44 @@ def test_code_and_libraries_are_part_of_what_a_stage_is_computed_from(
     with writing(path, replace(ORIGIN, input_hash=written)):
         pass
     assert why_not(path, wanted_hash("static", inputs), "static") == ""
-    libraries = identity.libraries()
-    monkeypatch.setattr(identity, "libraries", lambda: libraries | {"scipy": "0.1"})
+    libraries = store.libraries()
+    monkeypatch.setattr(store, "libraries", lambda: libraries | {"scipy": "0.1"})
     now = wanted_hash("static", inputs)
     assert now != written
     assert "scipy" in why_not(path, now, "static") and "-> 0.1" in why_not(path, now, "static")
     monkeypatch.undo()
     copy = tmp_path / "program"
     for folder in ("fem", "runs/stages"):
-        shutil.copytree(identity.ROOT / folder, copy / folder)
+        shutil.copytree(store.ROOT / folder, copy / folder)
     source = next((copy / "fem").rglob("equilibrium.py"))
     source.write_text(source.read_text() + "FACTOR = 0.5\n")
-    monkeypatch.setattr(identity, "ROOT", copy)
-    identity._code.cache_clear()
+    monkeypatch.setattr(store, "ROOT", copy)
+    store._code.cache_clear()
     now = wanted_hash("static", inputs)
     assert now != written
     assert why_not(path, now, "static") == "the program's code has changed since"
-    identity._code.cache_clear()
+    store._code.cache_clear()
 
 
 def test_identity_is_cheap() -> None:
     """In processor time: the machine may be busy."""
-    identity.identity("contact")
-    identity._code.cache_clear()
-    identity.libraries.cache_clear()
+    store.identity("contact")
+    store._code.cache_clear()
+    store.libraries.cache_clear()
     began = time.process_time()
-    identity.identity("contact")
+    store.identity("contact")
     assert time.process_time() - began < 0.1
 
 
-@pytest.mark.parametrize("stage", [*identity.PACKAGES, "contact"])
+@pytest.mark.parametrize("stage", [*store.PACKAGES, "contact"])
 def test_a_stage_imports_only_what_its_hash_covers(stage: str) -> None:
     """By the import statements of its module and of all that these lead to, functions' own included."""
-    covered = identity.PACKAGES.get(stage, identity._ALL)
+    covered = store.PACKAGES.get(stage, store._ALL)
     passive = ("runs/files", "runs/process", "runs/scene", "runs/report", "runs/version.py")
-    seen, left = set(), [identity.ROOT / "runs" / "stages" / f"{stage}.py"]
+    seen, left = set(), [store.ROOT / "runs" / "stages" / f"{stage}.py"]
     while left:
         path = left.pop()
-        name = path.relative_to(identity.ROOT).as_posix()
+        name = path.relative_to(store.ROOT).as_posix()
         if path in seen or name.startswith(passive):
             continue
         seen.add(path)
@@ -163,7 +163,7 @@ def _imported(path: Path) -> list[Path]:
     for node in ast.walk(ast.parse(path.read_text())):
         if not isinstance(node, ast.ImportFrom) or not (node.module or "").startswith("tireroad."):
             continue
-        base = identity.ROOT / Path(*node.module.split(".")[1:])
+        base = store.ROOT / Path(*node.module.split(".")[1:])
         places = [base, *(base / alias.name for alias in node.names)]
         found += [file for p in places if (file := p.with_suffix(".py")).is_file()]
     return found
@@ -220,15 +220,15 @@ def test_signed_texts_tell_a_change() -> None:
 def test_libraries_in_a_wheel_have_its_version(monkeypatch: pytest.MonkeyPatch) -> None:
     """The wheel holds dolfinx, PETSc and SLEPc without distributions of their own: they were unknown, and
     what another wheel had computed was reused."""
-    installed = {identity.WHEEL: "0.11.0", "numpy": "2.5"}
+    installed = {store.WHEEL: "0.11.0", "numpy": "2.5"}
 
     def version(name: str) -> str:
         if name not in installed:
-            raise identity.metadata.PackageNotFoundError(name)
+            raise store.metadata.PackageNotFoundError(name)
         return installed[name]
 
-    monkeypatch.setattr(identity.metadata, "version", version)
-    found = identity.libraries.__wrapped__()
+    monkeypatch.setattr(store.metadata, "version", version)
+    found = store.libraries.__wrapped__()
     assert found["numpy"] == "2.5" and found["scipy"] == "unknown"
     for name in ("dolfinx", "PETSc", "SLEPc"):
-        assert found[name] == f"in {identity.WHEEL} 0.11.0"
+        assert found[name] == f"in {store.WHEEL} 0.11.0"

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tireroad.runs.process.testing import _chosen
+from tireroad.tests.run_tests import _chosen
 
 SUITE = """
 import pytest

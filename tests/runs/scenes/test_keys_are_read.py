@@ -12,8 +12,8 @@ from matplotlib.image import imsave
 from mpi4py import MPI
 from scene_keys import KEYS
 
-from tireroad.contact.roads.kind import ROADS
-from tireroad.fem.tire.law import MATERIALS
+from tireroad.contact.roads.road import ROADS
+from tireroad.fem.tire.material import MATERIALS
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.schema import collection_of, variant_of, walk
 from tireroad.runs.scene.tables import tire as tire_tables

@@ -1,15 +1,15 @@
 """The whole schema: both ends of every range, the key reference, and that every key is read by a run."""
 
 from pathlib import Path
+from runpy import run_path
 from typing import Any
 
 import numpy as np
 import pytest
 from scene_keys import KEYS
 
-from tireroad.contact.roads.kind import ROADS
+from tireroad.contact.roads.road import ROADS
 from tireroad.fem.parameters import ParameterError
-from tireroad.runs.scene.reference import reference
 
 
 @pytest.mark.parametrize("name", [name for name, key in KEYS.items() if key.limits])
@@ -54,5 +54,7 @@ def test_constructors_check_like_scenes() -> None:
 
 
 def test_reference_is_current(root: Path) -> None:
-    """After a change of keys: python3 -m tireroad.runs.scene.reference docs/keys.md"""
-    assert (root / "docs" / "keys.md").read_text(encoding="utf-8") == reference()
+    """After a change of keys: ./tireroad python docs/scene_keys.py docs/keys.md"""
+    assert (root / "docs" / "keys.md").read_text(encoding="utf-8") == run_path(
+        str(root / "docs" / "scene_keys.py")
+    )["reference"]()

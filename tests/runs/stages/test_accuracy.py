@@ -15,7 +15,7 @@ from tireroad.fem.errors import InputError
 from tireroad.runs.files.disk import Refused
 from tireroad.runs.process import observe
 from tireroad.runs.scene.load import load
-from tireroad.runs.stages.companions import Given, backed, coarser, coarser_job, companions
+from tireroad.runs.stages.accuracy import Given, backed, coarser, coarser_job, companions
 from tireroad.runs.stages.pipeline import run_scene
 from tireroad.runs.stages.setup import points_of
 from tireroad.runs.stages.stage import Job

@@ -3,7 +3,7 @@
 import pytest
 
 from tireroad.runs.stages.contact import _rolling, negligible
-from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.stage import Record
 
 SCENE = """
 name = "energy"

@@ -12,8 +12,8 @@ import pytest
 from tireroad.contact.results.spectra import SILENT, third_octaves
 from tireroad.runs.stages import spectra
 from tireroad.runs.stages.contact_file import ContactHistory
-from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.spectra import too_short
+from tireroad.runs.stages.stage import Record
 
 STEP = 1e-4
 

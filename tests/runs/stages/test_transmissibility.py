@@ -12,7 +12,7 @@ from tireroad.runs.process import observe
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.outputs.transmissibility import apart, compare
 from tireroad.runs.stages.pipeline import run_scene
-from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.stage import Record
 
 SCENE = """
 [tire]

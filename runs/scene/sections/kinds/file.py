@@ -14,9 +14,17 @@ import numpy as np
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import choice, filename, flag, text, texts
-from tireroad.runs.scene.sections.parts import cords_of, losses_of, proportions_of, region_of, spelt
 from tireroad.runs.scene.source import Source
-from tireroad.runs.scene.tables.tire import Proportions, SectionKind, section_kind
+from tireroad.runs.scene.tables.tire import (
+    Proportions,
+    SectionKind,
+    cords_of,
+    losses_of,
+    proportions_of,
+    region_of,
+    section_kind,
+    spelt,
+)
 
 if TYPE_CHECKING:
     from tireroad.fem.decks.compounds import Rubber

@@ -13,15 +13,17 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import integer, text
 from tireroad.fem.sections.ring import Ring
 from tireroad.runs.scene.resolved import literal
-from tireroad.runs.scene.sections.parts import (
+from tireroad.runs.scene.source import Source
+from tireroad.runs.scene.tables.tire import (
+    Proportions,
+    SectionKind,
     cords_of,
     losses_of,
     proportions_of,
     region_of,
+    section_kind,
     spelt,
 )
-from tireroad.runs.scene.source import Source
-from tireroad.runs.scene.tables.tire import Proportions, SectionKind, section_kind
 
 if TYPE_CHECKING:
     from tireroad.fem.sections.construction import Construction

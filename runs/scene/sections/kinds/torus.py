@@ -13,9 +13,14 @@ from tireroad.fem.parameters import choice, integer, number
 from tireroad.fem.sections.grid import Patch, PlyLine
 from tireroad.fem.sections.ring import Ring
 from tireroad.fem.sections.torus import Torus
-from tireroad.runs.scene.sections.parts import cords_of, losses_of
 from tireroad.runs.scene.source import Source
-from tireroad.runs.scene.tables.tire import Proportions, SectionKind, section_kind
+from tireroad.runs.scene.tables.tire import (
+    Proportions,
+    SectionKind,
+    cords_of,
+    losses_of,
+    section_kind,
+)
 
 if TYPE_CHECKING:
     from tireroad.fem.tire.cords import Cords

@@ -1,4 +1,9 @@
-"""A step or a cleat on a flat road, perpendicular to the rolling direction or at an angle."""
+"""A flat road: every height is 0.
+
+A sine road with crests across the rolling direction.
+
+A step or a cleat on a flat road, perpendicular to the rolling direction or at an angle.
+"""
 
 import math
 from dataclasses import dataclass
@@ -6,10 +11,55 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.contact.roads.kind import RoadKind, road_kind
+from tireroad.contact.roads.road import EndlessRoad, RoadKind, road_kind
 from tireroad.fem.parameters import ParameterError, number
 
 Array = NDArray[np.float64]
+
+
+@road_kind("flat", "flat: all heights are 0")
+class Flat(EndlessRoad):
+    """Heights 0 m, endless."""
+
+    def height(self, x: Array, y: Array) -> Array:
+        """Zeros in the shape of x, m."""
+        return np.zeros(np.shape(x))
+
+    def highest(self, x0: float, x1: float, y0: float, y1: float) -> float:
+        """0 m."""
+        return 0.0
+
+    def lowest(self, x0: float, x1: float, y0: float, y1: float) -> float:
+        """0 m."""
+        return 0.0
+
+
+@road_kind("sine", "sine waves, their crests across the rolling direction")
+class Sine(EndlessRoad):
+    """z = a sin(2 pi x/L + phase): amplitude a and wavelength L in m, phase in degrees; endless."""
+
+    amplitude: float = number(1.0e-3, "m", "amplitude of the waves", least=0, most=1)
+    wavelength: float = number(0.1, "m", "wavelength", least=1e-3, most=1e4)
+    phase: float = number(0.0, "deg", "phase of the waves at x = 0", least=-360, most=360)
+
+    @property
+    def spacing(self) -> float:
+        """Half the wavelength, m: two points per wave."""
+        return 0.5 * self.wavelength
+
+    def height(self, x: Array, y: Array) -> Array:
+        """Heights (m) at x, m, for any y."""
+        wavenumber = 2.0 * np.pi / self.wavelength
+        return self.amplitude * np.sin(wavenumber * np.asarray(x) + math.radians(self.phase))
+
+    def highest(self, x0: float, x1: float, y0: float, y1: float) -> float:
+        """The amplitude, m, the upper bound of any strip."""
+        return self.amplitude
+
+    def lowest(self, x0: float, x1: float, y0: float, y1: float) -> float:
+        """Minus the amplitude, m."""
+        return -self.amplitude
+
 
 SHARP = 1e-3  # m: assumed length of an edge without a ramp
 

@@ -3,7 +3,7 @@
 Tests marked `long` run with `--all`, or if named; with `--fast` only tests on one process that are
 not marked `slow` run, a few seconds each at most. A test under mpirun fails if it fails on any
 process. If it fails on one while the others wait in a collective call, all are ended together. Run
-as a module, this file is the worker: `python3 -m tireroad.runs.process.testing FOLDER PROCESSES
+as a module, this file is the worker: `python3 -m tireroad.tests.run_tests FOLDER PROCESSES
 [pytest arguments]`.
 """
 
@@ -18,7 +18,7 @@ from typing import Any
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[1]
 PARALLEL = (2, 3)
 LONGEST = 4 * 3600.0
 """Seconds after which a whole run under mpirun counts as hung."""
@@ -103,7 +103,7 @@ def _at_once(arguments: list[str]) -> list[str]:
 
 
 def _command(processes: int) -> list[str]:
-    here = [sys.executable, "-P", "-m", "tireroad.runs.process.testing"]
+    here = [sys.executable, "-P", "-m", "tireroad.tests.run_tests"]
     if processes == 1:
         return here
     return ["mpirun", "-n", str(processes), *here]
@@ -169,11 +169,8 @@ def _chosen(arguments: list[str]) -> tuple[list[str], tuple[int, ...]]:
 def run_tests(arguments: list[str]) -> int:
     """Run the whole suite and print `N passed, N failed, N skipped` over all runs.
 
-    Exit status 0 or 1; 2 for a usage error or if the tests are not installed.
+    Exit status 0 or 1; 2 for a usage error.
     """
-    if not (ROOT / "tests").is_dir():
-        print("error: the tests are not installed: run them in a checkout", file=sys.stderr)
-        return 2
     arguments, counts = _chosen(arguments)
     arguments = [_from_root(argument) for argument in arguments]
     if not sys.stdout.isatty():  # mpirun gives its processes a terminal of their own

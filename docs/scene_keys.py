@@ -1,6 +1,6 @@
 """Generates the key reference of the documentation from the scene's schema.
 
-  PYTHONPATH=. python3 -m tireroad.runs.scene.reference docs/keys.md
+  ./tireroad python docs/scene_keys.py docs/keys.md
 
 A test compares the file in the repository with the output.
 """
@@ -19,7 +19,7 @@ HEAD = """\
 # Keys of a scene
 
 All keys of a scene file with default, unit, range and meaning. The page is generated from the schema by
-`python3 -m tireroad.runs.scene.reference docs/keys.md`; `tireroad check SCENE.toml` prints the same for the keys
+`./tireroad python docs/scene_keys.py docs/keys.md`; `tireroad check SCENE.toml` prints the same for the keys
 of one scene, with their values. Times are in s, lengths in m, forces in N, stresses in Pa, speeds of rotation in
 rad/s. An absent key has its default. A table marked "absent by default" is optional, and the stage that needs it
 does not run without it. An unknown key is an error. In `--set` and in sweeps, tables that can be repeated are counted

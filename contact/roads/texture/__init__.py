@@ -1,1 +1,0 @@
-"""Texture of roads: random fields with a given spectrum, profile analysis, and levels."""
