@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable
 from contextlib import ExitStack, redirect_stderr, redirect_stdout, suppress
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -301,7 +301,7 @@ def _together(function: Callable[[Any], None]) -> int:
     observe.set_root(comm.rank == 0)
     _only_warnings()
     signals.stop_on_signals()
-    return mpi.guarded(comm, lambda: function(comm))
+    return mpi.guarded(comm, partial(function, comm))
 
 
 @cache
@@ -314,7 +314,7 @@ def _only_warnings() -> None:
 
 def _run(args: argparse.Namespace, petsc_options: list[str]) -> int:
     """The command `run`. Collective over all processes."""
-    return _together(lambda comm: _run_inside(args, petsc_options, comm))
+    return _together(partial(_run_inside, args, petsc_options))
 
 
 def _run_inside(args: argparse.Namespace, petsc_options: list[str], comm) -> None:
@@ -530,5 +530,5 @@ def main(argv: list[str]) -> int:
     if args.command == "run":
         return handed_over(_run(args, options))
     if args.command == "reproduce":
-        return handed_over(_together(lambda comm: _reproduce(args, comm)))
+        return handed_over(_together(partial(_reproduce, args)))
     return _alone(args)

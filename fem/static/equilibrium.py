@@ -27,6 +27,7 @@ import math
 import weakref
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from dolfinx import fem
@@ -305,7 +306,7 @@ class Equilibrium(Forces):
         self, road_height: float | None = None, load: float | None = None, allowed: float = 0.0
     ) -> Step:
         """`_solve`, or its result from the `history` of an interrupted computation. Collective."""
-        return self.history.solve(self, lambda: self._solve(road_height, load, allowed))
+        return self.history.solve(self, partial(self._solve, road_height, load, allowed))
 
     def _solve(self, road_height: float | None, load: float | None, allowed: float) -> Step:
         """Equilibrium with the road at the given height (m), or without a road (None). Collective.

@@ -175,21 +175,24 @@ def march(
     show: Show,
     fall: Attempt | None = None,
     enough: Callable[[], bool] = lambda: False,
+    seen: Callable[[Step, float, Show], None] = lambda step, target, show: None,
 ) -> None:
     """From a converged `start` to `end` in steps, the first of size `first`. Collective.
 
-    If steps keep failing, `fall` searches for a state not near the last one (path.snap). Ends
-    before `end` after a converged step that is `enough`. Raises LoadingStopped if steps of a
-    ten-thousandth of the first do not converge either.
+    If steps keep failing, `fall` searches for a state not near the last one. Ends before `end`
+    after a converged step that is `enough`. `seen` is told of each step. Raises LoadingStopped if
+    steps of a ten-thousandth of the first do not converge either.
     """
     done, size, failures = start, first, 0
     while True:
         left = end - done
         target = end if abs(left) <= size * (1 + 1e-12) else done + math.copysign(size, left)
         step = attempt(target)
+        seen(step, target, show)
         failures = 0 if step.converged else failures + 1
         if fall is not None and failures == _STUCK:
             step = fall(target)
+            seen(step, target, show)
         if step.converged:
             done, failures = target, 0
             if done == end or enough():
@@ -606,19 +609,13 @@ class Loader:
         fall: Attempt | None = None,
         enough: Callable[[], bool] = lambda: False,
     ) -> None:
-        """`path.stepping.march` that counts all steps and reports the converged ones."""
+        """`march` that counts all steps and reports the converged ones. Collective."""
+        march(attempt, start, end, first, show, fall, enough, self._seen)
 
-        def seen(attempt: Attempt) -> Attempt:
-            def tried(target: float) -> Step:
-                step = attempt(target)
-                self.newton_steps += step.iterations
-                if step.converged:
-                    self.tell(show.what, target * show.scale, show.unit, step)
-                return step
-
-            return tried
-
-        march(seen(attempt), start, end, first, show, fall and seen(fall), enough)
+    def _seen(self, step: Step, target: float, show: Show) -> None:
+        self.newton_steps += step.iterations
+        if step.converged:
+            self.tell(show.what, target * show.scale, show.unit, step)
 
     def tell(self, what: str, value: float, unit: str, step: Step) -> None:
         upright = self.equilibrium.shape.upright  # told along the road's normal, as in the results

@@ -51,34 +51,32 @@ KEPT = "what was finished is kept, the same command or resume goes on"
 def judged(function: Callable[[], None], kept: str = KEPT) -> tuple[int, str]:
     """Run `function`; returns the resulting exit status and the message for the user.
 
-    `kept`: what the user is told after a stop that does not say so itself.
+    `kept`: what the user is told after a stop that does not say so itself. What fails because of a
+    stop that came meanwhile is that stop.
     """
-    status, message = _judged(function, kept)
-    if status == BUG and raised():
-        return STOPPED, f"stopped by {raised()}: {kept}"
-    return status, message
-
-
-def _judged(function: Callable[[], None], kept: str) -> tuple[int, str]:
+    status, message = DONE, ""
     try:
         function()
     except (ConvergenceError, Removed, Refused) as error:
-        return GAVE_UP, f"error: {error}"
+        status, message = GAVE_UP, f"error: {error}"
     except InputError as error:
-        return INPUT, f"error: {error}"
+        status, message = INPUT, f"error: {error}"
     except Stopped as stop:
-        return STOPPED, f"stopped by {stop}: {stop.kept or kept}"
+        status, message = STOPPED, f"stopped by {stop}: {stop.kept or kept}"
     except MemoryError as error:
-        return GAVE_UP, f"error: out of memory ({error}): use a coarser mesh, fewer modes or points"
+        message = f"error: out of memory ({error}): use a coarser mesh, fewer modes or points"
+        status = GAVE_UP
     except FailedOnRoot:
-        return BUG, ""
+        status = BUG
     except ModuleNotFoundError as error:
         message = missing(error)
-        return (INPUT, message) if message else (BUG, traceback.format_exc())
+        status, message = (INPUT, message) if message else (BUG, traceback.format_exc())
     except Exception as error:
         clear = explained(error, getattr(error, "filename", None) or "the result folder")
-        return (GAVE_UP, f"error: {clear}") if clear else (BUG, traceback.format_exc())
-    return DONE, ""
+        status, message = (GAVE_UP, f"error: {clear}") if clear else (BUG, traceback.format_exc())
+    if status == BUG and raised():
+        return STOPPED, f"stopped by {raised()}: {kept}"
+    return status, message
 
 
 def guarded(comm: Any, function: Callable[[], None]) -> int:

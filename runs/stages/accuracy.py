@@ -616,12 +616,10 @@ class AccuracyStage(Computed[Accuracy]):
         _describe(record, product, exact, limit)
         return product
 
-    def produce(self, key: str, record: Record) -> Accuracy:
-        """As any stage; also removes the coarser companion's folder, kept to resume. Collective."""
-        product = super().produce(key, record)
+    def end(self, key: str, product: Accuracy) -> None:
+        """Remove the coarser companion's folder, kept to resume. Collective."""
         folder = self.job.directory / COARSER
         on_root(self.job.comm, lambda: shutil.rmtree(folder, ignore_errors=True))
-        return product
 
     @property
     def _at_rest(self) -> bool:

@@ -243,13 +243,11 @@ class ModesStage(Computed[ModalBasis]):
             _say_names(modes.frequency, labels)
         return replace(basis, labels=labels)
 
-    def produce(self, key: str, record: Record) -> ModalBasis:
-        """As any stage; also caches the fields for other members of a family. Collective."""
-        basis = super().produce(key, record)
-        if self.job.scene.greens.residual == "attachment" and basis.modes is not None:
-            keep(self.job, key, self.motions.product.operators, basis.modes)
+    def end(self, key: str, product: ModalBasis) -> None:
+        """Cache the fields for other members of a family. Collective."""
+        if self.job.scene.greens.residual == "attachment" and product.modes is not None:
+            keep(self.job, key, self.motions.product.operators, product.modes)
         forget_checkpoint(self.job, self.name)
-        return basis
 
     def _teams(self, record: Record) -> int:
         """Number of process teams: as many as free memory holds factors. Collective."""

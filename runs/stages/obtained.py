@@ -180,17 +180,19 @@ def obtained(stage: Stage) -> Obtained:
         if settings := solver_settings(name, job.scene):
             observe.log(settings)
         record = Record()
-        product = _produced(stage, key, record)
+        with _remembering(stage, key):
+            product = stage.produce(key, record)
         collect(job.comm)
         figures = vars(record).copy()
         on_root(job.comm, lambda: job.cache.keep(name, key, path, figures))
     return Obtained(done=Done(key, lambda: product), record=record)
 
 
-def _produced(stage: Stage[P], key: str, record: Record) -> P:
-    """The computed product; a failure is kept for the other members of a sweep. Collective."""
+@contextmanager
+def _remembering(stage: Stage, key: str) -> Iterator[None]:
+    """A failure within is remembered for the other members of a sweep."""
     try:
-        return stage.produce(key, record)
+        yield
     except ConvergenceError as error:
         if stage.job.comm.rank == 0:  # not on_root: other processes need not have failed
             remember(stage.name, key, stage.job.scene.name, error)

@@ -203,12 +203,28 @@ def _parts(job: Job, reasons: Mapping[str, str], summary: Summary) -> dict[str, 
     done: dict[str, Done] = {}
     for kind in PARTS:
         with stages_obtained.entered(kind.name, summary, job.comm):
-            if (found := _done(job, kind, done, reasons, summary)) is not None:
+            found: Done | None = None
+            if issubclass(kind, Stage) and kind.name in reasons:
+                found = _skipped(kind, job, done, reasons[kind.name], summary)
+            else:
+                part = kind.taken(job, done)
+                if isinstance(part, Shared):
+                    found = Done("", part.make)
+                elif isinstance(part, Stage):
+                    found = _run(part, summary)
+            if found is not None:
                 done[kind.name] = found
             job.settle(done)
             if found is not None and kind is Setup and "contact" not in reasons:
                 _ = found.product  # a road too narrow for the footprint is refused before the modes
     return done
+
+
+def _skipped(kind: type[Stage], job: Job, done, reason: str, summary: Summary) -> Done | None:
+    """What later parts receive instead of a stage that is skipped for a `reason`. Collective."""
+    observe.say(f"{kind.name:9s} skipped: {reason}")
+    on_root(job.comm, lambda: summary.record(kind.name, "skipped", reason=reason))
+    return kind.instead(job, done)
 
 
 @contextmanager
@@ -235,19 +251,6 @@ def _say_demand(wanted: Estimate, each: float, directory: Path, comm: MPI.Comm) 
         f"{sum(wanted.disk.values()) / 1e9:.2g} GB of disk, "
         f"{duration(sum(wanted.seconds.values()))} of one core"
     )
-
-
-def _done(job: Job, kind: type[Part], done, reasons, summary: Summary) -> Done | None:
-    """The result of one part of the pipeline; None if it has none. Collective."""
-    if issubclass(kind, Stage) and kind.name in reasons:
-        reason = reasons[kind.name]
-        observe.say(f"{kind.name:9s} skipped: {reason}")
-        on_root(job.comm, lambda: summary.record(kind.name, "skipped", reason=reason))
-        return kind.instead(job, done)
-    part = kind.taken(job, done)
-    if isinstance(part, Shared):
-        return Done("", part.make)
-    return _run(part, summary) if isinstance(part, Stage) else None
 
 
 def _run(stage: Stage, summary: Summary) -> Done:

@@ -287,10 +287,18 @@ class Computed(Stage[P]):
 
     def produce(self, key: str, record: Record) -> P:
         """Compute the product and write its file. Collective."""
+        self.begin()
         product = self.compute(record)
         provenance = self.job.provenance(self.name, key)
         self.job.write(self.job.path(self.name), provenance, lambda file: self.write(file, product))
+        self.end(key, product)
         return product
+
+    def begin(self) -> None:
+        """What has to happen before the product is computed. Collective."""
+
+    def end(self, key: str, product: P) -> None:
+        """What has to happen once the product is written. Collective."""
 
 
 WORTH = 60.0  # results are written once computing them has taken this many times the writing

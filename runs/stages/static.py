@@ -198,25 +198,22 @@ class StaticStage(Computed[StaticState]):
 
         At a travel speed it is solved again until the wheel's speed matches its rolling radius.
         """
+        speed, near, steps, turns = self.job.speed, None, 0, 0
         with checkpointed(self, "solution(s)") as journal:
             journal.agreed(self.job.comm)
-            return self._concluded(record, *self._at_speed(record, History(journal)))
-
-    def _at_speed(self, record: Record, history: History) -> tuple[StaticState, Loader]:
-        """The state at the wheel's speed. Collective."""
-        speed, near, steps, turns = self.job.speed, None, 0, 0
-        while True:
-            state, loader, near = self._solved(record, speed, history, near)
-            steps, turns = steps + loader.newton_steps, turns + 1
-            before, speed = speed, self.job.free_speed(state)
-            same = abs(speed - before) <= _SAME_SPEED * speed or not state.rolling.speed
-            if same or turns == _SPEEDS:
-                loader.newton_steps = steps
-                return state, loader
-            radius = state.rolling_radius()
-            observe.say(f"  rolling radius {radius:.6g} m: again at {speed:.6g} rad/s")
-            del loader  # its matrices and factors, before the next ones are formed
-            collect(self.job.comm)
+            history = History(journal)
+            while True:
+                state, loader, near = self._solved(record, speed, history, near)
+                steps, turns = steps + loader.newton_steps, turns + 1
+                before, speed = speed, self.job.free_speed(state)
+                same = abs(speed - before) <= _SAME_SPEED * speed or not state.rolling.speed
+                if same or turns == _SPEEDS:
+                    loader.newton_steps = steps
+                    return self._concluded(record, state, loader)
+                radius = state.rolling_radius()
+                observe.say(f"  rolling radius {radius:.6g} m: again at {speed:.6g} rad/s")
+                del loader  # its matrices and factors, before the next ones are formed
+                collect(self.job.comm)
 
     def _concluded(self, record: Record, state: StaticState, loader: Loader) -> StaticState:
         """Add error estimate and the finer elements' footprint; record the figures. Collective."""
@@ -280,14 +277,15 @@ class StaticStage(Computed[StaticState]):
                 "damping forces of the rolling shape are left out of it"
             )
 
-    def produce(self, key: str, record: Record) -> StaticState:
-        """As any stage; also removes the last state of an earlier, failed run. Collective."""
+    def begin(self) -> None:
+        """Discard the matrices of an earlier state."""
         if self.forgets:
             reuse.forget()
-        product = super().produce(key, record)
+
+    def end(self, key: str, product: StaticState) -> None:
+        """Remove the last state of an earlier, failed run, and what resumes it. Collective."""
         on_root(self.job.comm, lambda: self.job.path("static_last").unlink(missing_ok=True))
         forget_checkpoint(self.job, self.name)
-        return product
 
     def write(self, file, product: StaticState) -> None:
         """Mesh, displacement, outer face and footprint."""

@@ -22,7 +22,7 @@ class MadeUp:
     """
 
     touch, rounding, farthest = 0.0, 0.0, 0.13
-    march = Loader.march
+    march, _seen = Loader.march, Loader._seen
 
     def __init__(self, curve) -> None:
         self.curve, self.equilibrium, self.body = curve, self, self
