@@ -35,7 +35,7 @@ from tireroad.greens.recursion import LoadedColumns
 # Points of the largest grid that is laid out before the patch is known.
 MOST_POINTS = 1_000_000
 LOAD_TOLERANCE = 1e-7
-# Number of displacements up to which W A W^T is kept as a matrix: 8 MB.
+# Number of displacements up to which W A W^T is kept as a matrix: 8 MB, three times that on a rough road.
 MOST_DENSE = 1000
 
 
@@ -199,13 +199,17 @@ def _bracket(excess: Callable[[float], float], step: float) -> tuple[float, floa
 class OnPoints:
     """A tire given at nodes, as seen at the points of a patch: W u from it, W^T f into it.
 
-    `components` 1: vertical only; 3: z, then x, then y of all points.
+    `components` of the displacements, and of the forces if those are more: 1: vertical only; 3: z,
+    then x, then y of all points.
     """
 
-    def __init__(self, tire: Any, weights: sparse.csr_matrix, components: int = 1) -> None:
+    def __init__(
+        self, tire: Any, weights: sparse.csr_matrix, components: int = 1, pushed: int | None = None
+    ) -> None:
         self._tire = tire
         self._weights = sparse.block_diag([weights] * components, format="csr")
-        self._transposed = self._weights.T.tocsr()
+        every = [weights.T] * (pushed or components)
+        self._transposed = sparse.block_diag(every, format="csr")
         self.comm = tire.comm
         self.same_step = self._same_step()
         self.inertia_force, self.ahead = tire.inertia_force, looking_ahead(tire)
@@ -226,11 +230,11 @@ class OnPoints:
     def _same_step(self) -> np.ndarray | LinearOperator:
         """W A W^T: a matrix if it is small, because a step then reads only its loaded columns."""
         weights, tire = self._weights, self._tire.same_step
-        count = weights.shape[0]
-        if count > MOST_DENSE:
+        shape = weights.shape[0], self._transposed.shape[1]
+        if shape[0] > MOST_DENSE:
             self._answers = LoadedColumns(tire, self.comm)
-            return LinearOperator((count, count), matvec=self._answer, dtype=float)
-        return weights @ (weights @ tire.T).T
+            return LinearOperator(shape, matvec=self._answer, dtype=float)
+        return weights @ (self._transposed.T @ tire.T).T
 
     def _answer(self, force: np.ndarray) -> np.ndarray:
         return self._weights @ (self._answers @ (self._transposed @ force))

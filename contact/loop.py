@@ -94,7 +94,7 @@ class Together:
     ) -> tuple[Array, Solved]:
         """The tire's prediction, and the solution that `solve` finds for it on the root process.
 
-        `horizontal`: whether there are horizontal forces. A ConvergenceError or InputError on the
+        `horizontal`: whether the solution has horizontal forces. A ConvergenceError or InputError on the
         root is raised on all processes. Collective.
         """
         if self._comm.size == 1:
@@ -181,9 +181,9 @@ class NonlinearTire(Tire, Protocol):
 class Instant(NamedTuple):
     """The state at the end of a step: (c,) arrays in N and m.
 
-    `horizontal` (c, 2) N; `axle_force` (3,) N; `penetration` (m) of the deepest point in the
+    `force` vertical and `horizontal` (c, 2) N; `axle_force` (3,) N; `penetration` (m) of the deepest point in the
     solution; `change` and `moved`: the tire's forces and displacements relative to the static
-    state, all components.
+    state, all components in which the tire's motion is followed.
     """
 
     time: float
@@ -203,12 +203,56 @@ class Instant(NamedTuple):
 class Drive:
     """The road's approach: `height(x, y)` m over the static plane, pointwise for any shape.
 
-    `motion(t)` m is its vertical motion, `speed` in m/s.
+    `motion(t)` m is its vertical motion, `speed` in m/s. `slope(x, y)` (..., 2): derivatives of that
+    height along x and y; None for a level road.
     """
 
     height: Callable[[np.ndarray, np.ndarray], np.ndarray]
     motion: Callable[[float], float]
     speed: float
+    slope: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None
+
+
+class RoadNormal:
+    """Forces of a road that leans: along its normal, and tangential to it.
+
+    On a slope r = (r_x, r_y) a point with the vertical force f and the bristle's force t bears
+
+        (t - f r,  f + t . r)
+
+    to first order in r. What the slope adds moves the tire like every other force; within the step
+    it is predicted from the last step's f and t, so that the contact problem stays as it is.
+    Neglected are two terms of second order that belong together, as their work does: the change of
+    gap -u . r by the horizontal motion u, and the slope met there instead of at the point.
+    """
+
+    def __init__(self, count: int) -> None:
+        self._force, self._tangential = np.zeros(count), np.zeros((count, 2))
+
+    def added(self, slope: Array | None) -> Array:
+        """What the slope (c, 2) adds to the forces (3 c,) N in z, x and y: the prediction."""
+        return self._added(slope, self._force, self._tangential)
+
+    def settle(self, slope: Array | None, force: Array, tangential: Array) -> Array:
+        """The same for the forces (c,) and (c, 2) N that the step found."""
+        self._force, self._tangential = force, tangential
+        return self._added(slope, force, tangential)
+
+    @staticmethod
+    def _added(slope: Array | None, force: Array, tangential: Array) -> Array:
+        out = np.zeros((3, len(force)))
+        if slope is not None:
+            out[0] = (tangential * slope).sum(axis=1)
+            out[1:] = -force * slope.T
+        return out.ravel()
+
+    def state(self) -> dict[str, Array]:
+        """The state that a checkpoint keeps."""
+        return {"normal_force_before": self._force, "normal_tangential": self._tangential}
+
+    def set_state(self, kept: dict[str, Array]) -> None:
+        """Continue from `state`."""
+        self._force, self._tangential = kept["normal_force_before"], kept["normal_tangential"]
 
 
 @dataclass(frozen=True)
@@ -219,12 +263,14 @@ class Loop:
     solver: ContactSolver
     friction: Friction | None = None
     memory: TreadMemory | None = None
+    normal: RoadNormal | None = None
 
     def snapshot(self) -> dict[str, np.ndarray]:
         """Arrays by name, between two steps. Collective when the tire is."""
         friction = self.friction.state() if self.friction else {}
         memory = self.memory.state() if self.memory else {}
-        return self.tire.snapshot() | self.solver.state() | friction | memory
+        normal = self.normal.state() if self.normal else {}
+        return self.tire.snapshot() | self.solver.state() | friction | memory | normal
 
     def restore(self, kept: dict[str, np.ndarray]) -> None:
         """Continue with the same bits as without interruption, on the same number of processes."""
@@ -234,6 +280,8 @@ class Loop:
             self.friction.set_state(kept)
         if self.memory:
             self.memory.set_state(kept)
+        if self.normal:
+            self.normal.set_state(kept)
 
 
 def roll(
@@ -247,11 +295,13 @@ def roll(
     done: int = 0,
     memory: TreadMemory | None = None,
     motion: bool = True,
+    normal: RoadNormal | None = None,
 ) -> Iterator[Instant]:
     """Yield the state after each of `steps` steps of `step` seconds. Collective if the tire is.
 
-    `solver` is made for A + C~. With `friction`, the tire's forces and displacements are three
-    times as many: z, then x, then y of all points. `memory`: that of a viscoelastic tread, whose
+    `solver` is made for A + C~. With `friction` or a `normal` the tire's forces are three times as
+    many: z, then x, then y of all points; its displacements with `friction`. Without a `normal` the
+    road's slope is left out. `memory`: that of a viscoelastic tread, whose
     response within the step is part of the solver. `done` steps have been taken before, and tire,
     solver and friction are as they were then. The root of `tire.comm` solves the contact problem
     and sends the result; solver and friction of other processes stay unchanged, while tire and
@@ -259,23 +309,32 @@ def roll(
     forces.
     """
     count = len(patch.points)
-    horizontal = np.zeros((count, 2)) if patch.pull is None else patch.pull
+    still = np.zeros((count, 2))
+    begun = horizontal = still if patch.pull is None else patch.pull
     # The first step starts from the static contact set, later ones from the solver's last one.
     touching = None if done else patch.force > 0
     answer = LoadedColumns.of(tire.same_step, tire.comm)
     settle = tire.settle if isinstance(tire, NonlinearTire) else None
     together = Together(tire.comm, count, looking_ahead(tire))
-    for time, road in _roads(drive, patch, step, steps, done):
+    for time, road, slope in _roads(drive, patch, step, steps, done, normal is not None):
         predict = tire.predict
         tread = memory.predict() if memory else np.zeros((1, count))
         past = friction.state() if friction and settle else {}
+        lifted = answer @ normal.added(slope) if normal else 0.0
         while True:
-            solve = partial(_contact, solver, friction, patch, tread, road, touching)
+            solve = partial(_contact, solver, friction, patch, tread, road, touching, lifted)
             free, found = together(predict, solve, friction is not None)
-            change = found.force - patch.force
+            vertical = found.force
             if friction:
                 horizontal = found.horizontal
-                change = np.concatenate([change, *horizontal.T])
+            if normal:
+                more = normal.settle(slope, found.force, horizontal if friction else still)
+                more = more.reshape(3, count)
+                vertical = vertical + more[0]
+                horizontal = (horizontal if friction else begun) + more[1:].T
+            change = vertical - patch.force
+            if friction or normal:
+                change = np.concatenate([change, *(horizontal - (still if friction else begun)).T])
             touching = None
             again = settle(change) if settle else None
             if again is None:
@@ -288,10 +347,10 @@ def roll(
         if memory:
             memory.advance(change)
         axle = -tire.inertia_force()
-        axle += patch.resultant(found.force, horizontal)
+        axle += patch.resultant(vertical, horizontal)
         yield Instant(
             time,
-            found.force,
+            vertical,
             horizontal,
             found.gap,
             moved[:count],
@@ -299,7 +358,7 @@ def roll(
             found.residual,
             found.penetration,
             int(np.count_nonzero(found.force)),
-            change,
+            change[: len(moved)],
             moved,
         )
 
@@ -316,10 +375,12 @@ def _contact(
     tread: np.ndarray,
     road: np.ndarray,
     touching: np.ndarray | None,
+    lifted: np.ndarray | float,
     free: np.ndarray,
 ) -> Solved:
-    """The contact in one step; `free` (tire) and `tread` are the motions due to past forces, m."""
-    count = len(road)
+    """The contact in one step; `free` (tire) and `tread` are the motions due to past forces, m, and
+    `lifted` the tire's due to what the slope adds in this step."""
+    count, free = len(road), free + lifted
     q = patch.gap + free[:count] + tread[0] - road
     if friction is None:
         force, horizontal = solver.solve(q, touching, reference=patch.force), np.zeros((0, 2))
@@ -331,9 +392,10 @@ def _contact(
 
 
 def _roads(
-    drive: Drive, patch: Patch, step: float, steps: int, done: int
-) -> Iterator[tuple[float, np.ndarray]]:
-    """Time (s) and road (c,) m under the points for each step after `done`.
+    drive: Drive, patch: Patch, step: float, steps: int, done: int, leans: bool
+) -> Iterator[tuple[float, np.ndarray, np.ndarray | None]]:
+    """Time (s), road (c,) m under the points and, if it `leans`, its slope (c, 2), for each step
+    after `done`.
 
     Blocks of steps are counted from the first step on, so that a restarted loop finds the same
     bits.
@@ -343,15 +405,19 @@ def _roads(
     for first in range(done - done % block, steps, block):
         times = step * np.arange(first + 1, min(first + block, steps) + 1)
         along = x + drive.speed * times[:, None]
-        heights = drive.height(along, np.broadcast_to(y, along.shape))
+        across = np.broadcast_to(y, along.shape)
+        heights = drive.height(along, across)
+        slopes = drive.slope(along, across) if leans and drive.slope else None
         for k, time in enumerate(times.tolist(), first):
             if k >= done:
-                yield time, heights[k - first] + drive.motion(time)
+                slope = None if slopes is None else slopes[k - first]
+                yield time, heights[k - first] + drive.motion(time), slope
 
 
 class Driven:
     """The tire as the contact sees it, including its motion under prescribed forces.
 
+    `seen`: displacements that the contact follows, by default as many as its forces.
     `history` (n + 1, k) N at the steps from t = 0 on; `directions` (k, 3) of unit length. After
     each `advance`: `reading` (r,) m; `work` (J) of the prescribed forces so far (trapezoidal rule);
     `lead`, the additional work of the mean forces that the `scheme` applies during the steps
@@ -359,15 +425,21 @@ class Driven:
     """
 
     def __init__(
-        self, tire: Tire, history: np.ndarray, directions: np.ndarray, scheme: str = "linear"
+        self,
+        tire: Tire,
+        history: np.ndarray,
+        directions: np.ndarray,
+        scheme: str = "linear",
+        seen: int | None = None,
     ) -> None:
         self._tire, self._history, self._directions = tire, history, directions
         self._forced = history.shape[1] > 0
         self._count = tire.same_step.shape[1] - history.shape[1]
+        self._seen = self._count if seen is None else seen
         self._same = tire.same_step
-        self.same_step, self.comm = self._same[: self._count, : self._count], tire.comm
+        self.same_step, self.comm = self._same[: self._seen, : self._count], tire.comm
         self.ahead = looking_ahead(tire)
-        self._beside = LoadedColumns(self._same[self._count :])
+        self._beside = LoadedColumns(self._same[self._seen :])
         # The force that `history` begins with was there before.
         self._ahead = ahead_of_mean(scheme, np.concatenate([history[:1], history]))
         self._step = 0
@@ -380,20 +452,20 @@ class Driven:
         self._step += 1
         self._free = self._tire.predict()
         if not self._forced:
-            return self._free[: self._count]
-        pushed = self._same[: self._count, self._count :] @ self._history[self._step]
-        return self._free[: self._count] + pushed
+            return self._free[: self._seen]
+        pushed = self._same[: self._seen, self._count :] @ self._history[self._step]
+        return self._free[: self._seen] + pushed
 
     def advance(self, force: np.ndarray) -> None:
         """Set the contact forces (c,) N at the end of the step."""
         if not self._forced:
             self._tire.advance(force)
-            self.reading = self._free[self._count :] + self._beside @ force
+            self.reading = self._free[self._seen :] + self._beside @ force
             return
         before, now = self._history[self._step - 1], self._history[self._step]
         acting = np.concatenate([force, now])
         self._tire.advance(acting)
-        moved = self._free[self._count :] + self._beside @ acting
+        moved = self._free[self._seen :] + self._beside @ acting
         along, self.reading = np.split(moved, [len(now)])
         self.work += float(0.5 * (before + now) @ (along - self._along))
         self.lead += float(self._ahead[self._step - 1] @ (along - self._along))

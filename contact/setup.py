@@ -14,12 +14,13 @@ from tireroad.contact.model import Spec, static_solver
 from tireroad.contact.patch import LEAST_REACH, Patch, make_patch
 from tireroad.contact.roads.cell_mean import CellMean
 from tireroad.contact.roads.kinds.shapes import Flat
-from tireroad.contact.roads.under_tire import PreparedRoad, RoadUnderTire
+from tireroad.contact.roads.under_tire import NOTHING, PreparedRoad, RoadUnderTire
 from tireroad.contact.tread.pattern import Pattern
 from tireroad.fem.static.road import RoadShape
 from tireroad.greens.response import Response
 
 _RUNG = 1.1
+_APART = 1e-3  # of a point's half size: distance of the heights whose difference is a slope
 
 
 class OuterFace(Protocol):
@@ -85,20 +86,40 @@ class ContactSetup:
     def drive(self) -> Drive:
         """The road as the time loop uses it, smoothed over each point's rectangle where it is
         finer; a pattern's depth lowers it, but for what the static state contains.
+
+        The slope is the road's: a pattern moves with the tread, whose blocks lie on the road.
         """
-        road = (
-            CellMean(self.road, self.patch.points[:, 1], self.patch.half_sizes)
-            if self.fine
-            else self.road
-        )
+        road: CellMean | PreparedRoad = self.road
+        slope: Callable[[np.ndarray, np.ndarray], np.ndarray] = self._slope
+        if self.fine:
+            road = smoothed = CellMean(self.road, self.patch.points[:, 1], self.patch.half_sizes)
+            slope = smoothed.slope
+        level = None if self.relief < NOTHING else slope
         if self.pattern is None:
-            return Drive(road.height, self.rolled.motion, self.rolled.speed)
+            return Drive(road.height, self.rolled.motion, self.rolled.speed, level)
         pattern, begun = self.pattern, self.begun
 
         def height(along: np.ndarray, across: np.ndarray) -> np.ndarray:
             return road.height(along, across) - (pattern.depth(along, across) - begun)
 
-        return Drive(height, self.rolled.motion, self.rolled.speed)
+        return Drive(height, self.rolled.motion, self.rolled.speed, level)
+
+    def _slope(self, along: np.ndarray, across: np.ndarray) -> np.ndarray:
+        """Slopes (n, c, 2) of a road that is smooth over a point's rectangle, by differences."""
+        x0, x1, y0, y1 = self.patch.extent
+        low, high = (x0, y0), (min(x1 + self.rolled.travel, self.road.end), y1)
+        out = np.zeros((*along.shape, 2))
+        for axis in (0, 1):
+            near, far = (
+                np.clip(
+                    (along, across)[axis] + sign * _APART * self.patch.half_sizes[:, axis], *ends
+                )
+                for sign, ends in ((s, (low[axis], high[axis])) for s in (-1, 1))
+            )
+            ends = [(near, across), (far, across)] if axis == 0 else [(along, near), (along, far)]
+            before, after = (self.road.height(x, y) for x, y in ends)
+            out[..., axis] = (after - before) / np.maximum(far - near, 1e-12)
+        return out
 
     @property
     def fine(self) -> bool:

@@ -219,14 +219,24 @@ class Wheel:
         return true, held_matrices(projection, self.speed, self._uniform, self.inertia)
 
     def respond(
-        self, basis: Basis, modes: Modes | None, outputs: Probes, loads: Probes, option: str
+        self,
+        basis: Basis,
+        modes: Modes | None,
+        outputs: Probes,
+        loads: Probes,
+        option: str,
+        light: Probes | None = None,
     ) -> Response:
         """Response with the residual `option`. Collective.
 
+        The forces of `light` follow those of the `loads`; they act on the states alone, without what
+        these lack (and like all others where "second-order" adds states).
         `modes` on all unknowns, for "attachment" only, must be the solution that `basis` projects:
         another one has other signs and vectors of repeated frequencies. InputError otherwise."""
         if option in ("static", "dirac"):
             whole = self._with_statics(basis, outputs, loads)
+            if light is not None:
+                whole = whole.with_forces(basis.couple(outputs, light))
             moved = outputs.shape[0] - np.count_nonzero(basis.of_hub(outputs).getnnz(axis=1))
             return replace(whole, pulse=moved if option == "dirac" else 0)
         if option == "second-order" and basis.projection.moves:
@@ -235,12 +245,18 @@ class Wheel:
             )
         r, k, same = outputs.shape[0], loads.shape[0], outputs is loads
         probes = loads if same else sparse.vstack([outputs, loads], format="csr")
+        every = np.arange(k) if same else np.arange(r, r + k)
         if option == "attachment":
             assert modes is not None, "attachment modes need the modes on all unknowns"
-            whole = self._attached(basis, modes, probes)
-        else:
+            whole = self._attached(basis, modes, probes, light)
+            more = 0 if light is None else light.shape[0]
+            every = np.append(every, np.arange(probes.shape[0], probes.shape[0] + more))
+        elif light is None:
             whole = self._of_second_order(basis, probes)
-        return whole if same else whole.between(slice(r), slice(r, r + k))
+        else:
+            whole = self._of_second_order(basis, sparse.vstack([probes, light], format="csr"))
+            every = np.append(every, np.arange(probes.shape[0], len(whole.residual)))
+        return whole if same and light is None else whole.between(slice(r), every)
 
     def _of_second_order(self, basis: Basis, probes: Probes) -> Response:
         """The states, and residual states in place of the truncated modes. Collective."""
@@ -287,11 +303,16 @@ class Wheel:
         made = completed(basis, self.turning, outputs, loads, flexibility, beside)
         return made if self.air is None else replace(made, left_out=None)
 
-    def _attached(self, basis: Basis, modes: Modes, probes: Probes) -> Response:
-        """Response of the modes and the attachment modes of all probes. Collective."""
+    def _attached(
+        self, basis: Basis, modes: Modes, probes: Probes, light: Probes | None
+    ) -> Response:
+        """Response of the modes and the attachment modes of all probes; the `light` ones have none.
+        Collective."""
         self._check_same(basis, modes)
         if self._drifts:
-            return self.standing_attachments(modes, probes)[0].couple(probes, probes)
+            drifting = self.standing_attachments(modes, probes)[0]
+            found = drifting.couple(probes, probes)
+            return found if light is None else found.with_forces(drifting.couple(probes, light))
         weights, loads = fewest(probes)
         loads = on_own_rows(self.operators, loads)
         rows = sparse.csr_matrix(self._beside(basis.of_hub(probes)))
@@ -308,7 +329,8 @@ class Wheel:
         if self.beyond is not None:
             lacking = regained(grown.held, *self._pencils(grown.projection), probes, probes)
             flexibility, beside = flexibility + lacking.compliance, beside + lacking.momentum
-        return self._completed(grown, probes, probes, flexibility, beside)
+        found = self._completed(grown, probes, probes, flexibility, beside)
+        return found if light is None else found.with_forces(grown.couple(probes, light))
 
     def _foremost(self, basis: Basis, probes: Probes, flexibility: Array) -> Array:
         """Load combinations (p, k) whose shapes join the basis, among probes that move anything."""

@@ -237,8 +237,27 @@ class Response:
             slope=None,
         )
 
-    def between(self, outputs: slice, forces: slice) -> Response:
-        """The response for some of the outputs and forces (slices)."""
+    def with_forces(self, more: Response) -> Response:
+        """Followed by the forces of `more`, a response of the same states and outputs."""
+
+        def beside(mine: np.ndarray | None, theirs: np.ndarray | None) -> np.ndarray | None:
+            """What is not known of the others' is zero."""
+            if mine is None:
+                return None
+            wide = np.zeros((len(mine), more.input.shape[1])) if theirs is None else theirs
+            return np.hstack([mine, wide])
+
+        return replace(
+            self,
+            input=np.hstack([self.input, more.input]),
+            block_input=np.hstack([self.block_input, more.block_input]),
+            residual=np.hstack([self.residual, more.residual]),
+            left_out=beside(self.left_out, more.left_out),
+            slope=beside(self.slope, more.slope),
+        )
+
+    def between(self, outputs: slice, forces: slice | np.ndarray) -> Response:
+        """The response for some of the outputs and forces (slices, or indices of forces)."""
         return replace(
             self,
             output=self.output[outputs],
@@ -249,7 +268,7 @@ class Response:
             pulse=sum(k < self.pulse for k in range(len(self.residual))[outputs]),
             left_out=None if self.left_out is None else self.left_out[:, forces],
             moments=None if self.moments is None else self.moments[outputs],
-            slope=None if self.slope is None else self.slope[self._with_rates(outputs), forces],
+            slope=None if self.slope is None else self.slope[self._with_rates(outputs)][:, forces],
         )
 
     def _with_rates(self, outputs: slice) -> np.ndarray:

@@ -144,22 +144,25 @@ def make_response(
     loads: sparse.csr_matrix,
     residual: str,
     fields: Callable[[], ModalBasis],
+    light: sparse.csr_matrix | None = None,
 ) -> Made:
     """The response (r, k) between probes `outputs` (r, 3 s) and `loads` (k, 3 s) with a residual.
 
+    `light`: further loads, which act on the states alone (coupling.Wheel.respond).
     `wheel` returns the full matrices and `fields` the modes on all unknowns; each is called only if
     the residual needs it. InputError for an unknown residual. Collective.
     """
     _check_known("residual", residual, RESIDUALS)
     if residual == "none":
-        return _made(Basis.of(rolling).couple(outputs, loads))
+        every = loads if light is None else sparse.vstack([loads, light], format="csr")
+        return _made(Basis.of(rolling).couple(outputs, every))
     if residual == "attachment":
         found = fields()
         if found is not rolling.basis:  # a new solution: its states must be its own too
             rolling = rolling_modes(found, rolling.turning, wheel().operators.body.comm)
-        response = _completed(wheel(), rolling, found.modes, outputs, loads, residual)
+        response = _completed(wheel(), rolling, found.modes, outputs, loads, residual, light)
     else:
-        response = _completed(wheel(), rolling, None, outputs, loads, residual)
+        response = _completed(wheel(), rolling, None, outputs, loads, residual, light)
     if residual in ("static", "dirac"):
         return _made(response)
     highest = cutoff(rolling)

@@ -297,15 +297,16 @@ class RollingTire:
         projection = self.standing.basis.projection
         return wheel_of(self.standing.motions, self.states.turning, projection=projection)
 
-    def respond(self, outputs, loads, residual: str = "static") -> Response:
+    def respond(self, outputs, loads, residual: str = "static", light=None) -> Response:
         """Green's functions between probes (r, 3 s) and loads (k, 3 s) on the outer face.
 
         `residual`: kind of residual flexibility that replaces the truncated modes
-        (greens.responses); InputError for an unknown one.
+        (greens.responses); InputError for an unknown one. `light` (l, 3 s): further loads, which
+        act on the modes alone and need no residual flexibility.
         """
         basis = self.standing.basis
         return make_response(
-            lambda: self.wheel, self.states, outputs, loads, residual, lambda: basis
+            lambda: self.wheel, self.states, outputs, loads, residual, lambda: basis, light
         ).response
 
     def at(self, spots: list[tuple[float, float]], residual: str = "static") -> Response:
@@ -342,7 +343,8 @@ _LEAST_STEPS = 200
 class History:
     """Histories of a run over n instants and c contact points.
 
-    `time` (n,) s; `force` (n, c) N of each contact point; `axle_force` (n, 3) N; `displacement`
+    `time` (n,) s; `force` (n, c) N of each contact point and `horizontal` (n, c, 2) N, which the
+    road's slope pushes forward and to the left; `axle_force` (n, 3) N; `displacement`
     (n, c) m of the tire at the points; `gap` (n, c) m; `patch`: the contact points; `limit`: the
     highest frequency up to which the results are valid; `run_in` s: until then the road grows from
     flat under a part of the patch.
@@ -353,6 +355,7 @@ class History:
 
     time: Array
     force: Array
+    horizontal: Array
     axle_force: Array
     displacement: Array
     gap: Array
@@ -434,8 +437,10 @@ def drive(
         speed=turning.speed * static.rolling_radius(), duration=duration, motion=lambda t: 0.0
     )
     setup = contact_setup(static, motions.lattice, road, rolled, spacing=pitches)
-    loads = probe.nodes(setup.patch.index, len(static.points), 2)
-    response = tire.respond(loads, loads, residual)
+    along, across, loads = (
+        probe.nodes(setup.patch.index, len(static.points), part) for part in range(3)
+    )
+    response = tire.respond(loads, loads, residual, sparse.vstack([along, across], "csr"))
     spec = _Spec(law=law)
     setup, _ = setup.settled(response, static.force, spec)
     fastest = np.abs(response.eigenvalue).max(initial=1.0 / duration)
@@ -501,14 +506,16 @@ def _instants(
     recursion = Recursion(response=kept, step=chosen.size, scheme=scheme, comm=comm)
     loop = make_loop(spec, setup, recursion, chosen.size)
     given = setup.patch, setup.drive, chosen.size, chosen.count
-    return list(contact_loop.roll(loop.tire, loop.solver, *given, memory=loop.memory))
+    return list(
+        contact_loop.roll(loop.tire, loop.solver, *given, memory=loop.memory, normal=loop.normal)
+    )
 
 
 def _history(patch: Patch, instants: list[Instant], limit: Limit, run_in: float) -> History:
     """Stack the instants. Raises ConvergenceError if the road touches the edge of the patch."""
     kept = {
         name: np.stack([getattr(instant, name) for instant in instants])
-        for name in ("time", "force", "axle_force", "displacement", "gap")
+        for name in ("time", "force", "horizontal", "axle_force", "displacement", "gap")
     }
     if (kept["force"][:, patch.edge] > 0).any():
         raise ConvergenceError(

@@ -175,15 +175,16 @@ def own_states(response: Response, rolling: RollingModes) -> bool:
     )
 
 
-def springs(response: Response, force: np.ndarray) -> float:
+def springs(response: Response, force: np.ndarray, own: np.ndarray | None = None) -> float:
     """Elastic energy (J) in the residual flexibility, with static states, at forces (k,) N.
 
-    The first k outputs are the forces' own displacements; readings may follow them
-    (contact.loop).
+    The first outputs are the displacements of the forces `own`, by default all; readings may follow
+    them (contact.loop). Further forces, of the road's slope, act on the states alone.
     """
     if response.pulse:
         return 0.0
-    return float(0.5 * force @ response.residual[: len(force)] @ force)
+    own = np.arange(len(force)) if own is None else own
+    return float(0.5 * force[own] @ response.residual[: len(own), own] @ force[own])
 
 
 class Motion:
@@ -209,10 +210,12 @@ class Motion:
         moving = rolling.turning.speed > 0 and not len(response.block)
         return plain and moving and own_states(response, rolling)
 
-    def add(self, states: np.ndarray, pushes: np.ndarray) -> None:
-        """Count n steps: all states and pushes (n, q) at their ends."""
+    def add(self, states: np.ndarray, pushes: np.ndarray) -> np.ndarray:
+        """Count n steps: all states and pushes (n, q) at their ends; the coordinates (n, m) there."""
         z = states.T
-        self.losses.add(self._coordinates(z), self._coordinates(self._eigenvalue * z + pushes.T))
+        coordinates = self._coordinates(z)
+        self.losses.add(coordinates, self._coordinates(self._eigenvalue * z + pushes.T))
+        return coordinates.T
 
     def _coordinates(self, z: np.ndarray) -> np.ndarray:
         return self._real @ z.real - self._imaginary @ z.imag

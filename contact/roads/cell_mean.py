@@ -53,50 +53,71 @@ class CellMean:
         middles = (np.arange(count) + 0.5) / count * 4 - 2
         self._within = np.abs(middles) < 1
         self._y = rows[:, 0, None] + rows[:, 2, None] * middles  # (r, m)
-        self._begin, self._mean = 0, np.empty((len(rows), 0))
+        # Weights (2, r, m) of the slope across, by least squares over the width and twice that.
+        self._across = np.zeros((2, *self._y.shape))
+        for across, used in zip(self._across, (self._within, np.full(count, True)), strict=True):
+            offset = np.where(used, self._y - rows[:, :1], 0.0)
+            across[:] = offset / (offset**2).sum(axis=1, keepdims=True)
+        self._begin, self._mean = 0, np.empty((2, len(rows), 0))
 
     def height(self, x: Array, _: Array) -> Array:
         """Heights (n, c) m with the points at x (n, c) m; y is known."""
-        place = np.asarray(x) / self._step
-        first = np.floor(place).astype(int)
-        share = place - first
-        begin = int(first.min(initial=0))
-        mean = self._known(begin, int(first.max(initial=0)) + 2)
-        here = first - self._begin
+        share, (mean, _across), here = self._at(x)
         near, far = mean[self._row, here], mean[self._row, here + 1]
         return near + share * (far - near)
 
-    def _known(self, begin: int, end: int) -> Array:
-        """Means (r, ...) m at the positions from `_begin` * step to `end` * step at least.
+    def slope(self, x: Array, _: Array) -> Array:
+        """Slopes (n, c, 2) along and across; that along is the derivative of `height`."""
+        share, (mean, across), here = self._at(x)
+        along = (mean[self._row, here + 1] - mean[self._row, here]) / self._step
+        near, far = across[self._row, here], across[self._row, here + 1]
+        return np.stack([along, near + share * (far - near)], axis=-1)
 
-        Means under the footprint are kept as it rolls on: nine of ten positions were evaluated
+    def _at(self, x: Array) -> tuple[Array, Array, NDArray[np.intp]]:
+        """For x (n, c) m: the part of the way between two positions, means and slopes across
+        (2, r, ...) at the positions, and the first one's index (n, c)."""
+        place = np.asarray(x) / self._step
+        first = np.floor(place).astype(int)
+        begin = int(first.min(initial=0))
+        known = self._known(begin, int(first.max(initial=0)) + 2)
+        return place - first, known, first - self._begin
+
+    def _known(self, begin: int, end: int) -> Array:
+        """Means and slopes across (2, r, ...) at the positions from `_begin` * step to `end` * step
+        at least.
+
+        Those under the footprint are kept as it rolls on: nine of ten positions were evaluated
         before.
         """
-        known = self._begin + self._mean.shape[1]
+        known = self._begin + self._mean.shape[2]
         if not self._begin <= begin <= known:
-            self._mean, known = np.empty((len(self._y), 0)), begin
+            self._mean, known = np.empty((2, len(self._y), 0)), begin
         else:
-            self._mean = self._mean[:, begin - self._begin :]
+            self._mean = self._mean[:, :, begin - self._begin :]
         self._begin = begin
         if end > known:
-            self._mean = np.concatenate([self._mean, self._means(known, end)], axis=1)
+            self._mean = np.concatenate([self._mean, self._means(known, end)], axis=2)
         return self._mean
 
     def _means(self, begin: int, end: int) -> Array:
-        """Means (r, end - begin) m at the positions begin * step, ..."""
+        """Means (m) and slopes across (2, r, end - begin) at the positions begin * step, ..."""
         places = self._step * np.arange(begin - self._reach, end + self._reach)
         x = np.minimum(places, self._road.end)
-        sample = np.zeros((2, len(self._y), len(x)))
-        for column, within in zip(self._y.T, self._within, strict=True):
+        # Over the width and twice that; heights, and their slope across.
+        sample = np.zeros((2, 2, len(self._y), len(x)))
+        for k, (column, within) in enumerate(zip(self._y.T, self._within, strict=True)):
             here = self._road.height(*np.broadcast_arrays(x, column[:, None]))
-            sample[1] += here
+            sample[1, 0] += here
+            sample[1, 1] += self._across[1, :, k, None] * here
             if within:
-                sample[0] += here
-        sample /= np.array([self._within.sum(), len(self._within)])[:, None, None]
-        mean = np.zeros((len(self._y), end - begin))
+                sample[0, 0] += here
+                sample[0, 1] += self._across[0, :, k, None] * here
+        sample[:, 0] /= np.array([self._within.sum(), len(self._within)])[:, None, None]
+        found = np.zeros((2, len(self._y), end - begin))
         for k in range(self._weight.shape[2]):
-            mean += (self._weight[:, :, k, None] * sample[:, :, k : k + end - begin]).sum(axis=0)
-        return mean
+            part = sample[:, :, :, k : k + end - begin]
+            found += (self._weight[:, None, :, k, None] * part).sum(axis=0)
+        return found
 
 
 def _parts(offset: Array, step: float, half: Array) -> Array:

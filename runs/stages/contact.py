@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import time
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -34,6 +34,7 @@ from tireroad.contact.results.energy import (
 from tireroad.contact.setup import ContactSetup
 from tireroad.fem.static.footprint import Footprint
 from tireroad.fem.static.state import StaticState
+from tireroad.greens.basis import Basis
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.modal.rolling import RollingModes
@@ -62,6 +63,7 @@ from tireroad.runs.stages.rolling import (
     reported,
     shortest_period,
 )
+from tireroad.runs.stages.setup import leaning, leaning_loads
 from tireroad.runs.stages.stage import Done, Record, Stage
 
 # Fewest point spacings per footprint width. Measured on cobblestones on two tires: deviation 23 %
@@ -203,16 +205,32 @@ def works(contact: Work, driven: Driven | None) -> Works:
     return Works(contact.total, driven.work if driven else None, lead)
 
 
+@dataclass(frozen=True)
+class Leaning:
+    """The forces of the road's slope among those of the loop, whose points are not followed.
+
+    `own` and `others`: indices of these and of all other forces; `shape` (k, m) kg^-1/2: modal
+    shapes at their points, None where there are none.
+    """
+
+    own: np.ndarray
+    others: np.ndarray
+    shape: np.ndarray | None
+
+
 class Losses:
     """Energy losses of a rolling tire from its states at each step; empty if not known."""
 
-    def __init__(self, chosen: Integration, response: Response, rolling: RollingModes) -> None:
+    def __init__(
+        self, chosen: Integration, response: Response, rolling: RollingModes, leaning: Leaning
+    ) -> None:
         tire = chosen.tire
         self._motion: Motion | None = None
+        self._leaning, self._aside = leaning, Work(chosen.scheme)
         if isinstance(tire, Recursion) and Motion.known(rolling, response):
             self._motion = Motion(rolling, response.slow(chosen.step), chosen.step)
-            inputs = response.residual.shape[1]
-            left_out = response.resolved(chosen.step).residual[:inputs]
+            left_out = response.resolved(chosen.step).residual
+            left_out = left_out[: len(leaning.others), leaning.others]
             self._circulation = Circulation(left_out * (not response.pulse), chosen.scheme)
             self._tire = tire
             tire.keep_samples()
@@ -229,23 +247,51 @@ class Losses:
         losses, beyond = self._motion.losses, self._circulation
         return losses.lost, losses.drive, beyond.work, beyond.lead
 
+    @property
+    def others(self) -> np.ndarray:
+        """Indices of the forces whose points are followed."""
+        return self._leaning.others
+
+    @property
+    def unknown(self) -> str:
+        """What the works leave out, in words."""
+        if self._motion is not None or self._leaning.shape is None:
+            return ""
+        return ", without the work of the road's slope along it"
+
+    @property
+    def leaning(self) -> tuple[float, float]:
+        """Work (J) of the forces along and across of the road's slope, and their lead, where the
+        losses are known."""
+        return self._aside.total, self._aside.lead
+
     def flush(self) -> None:
         """Account for the steps since the last call. Collective."""
         if self._motion is None or not (samples := self._tire.samples()):
             return
-        states, pushes, forces = map(list, zip(*samples, strict=True))
-        self._motion.add(self._tire.everywhere(states), self._tire.everywhere(pushes))
-        self._circulation.add(np.array(forces))
+        states, pushes, every = map(list, zip(*samples, strict=True))
+        forces = np.array(every)
+        moved = self._motion.add(self._tire.everywhere(states), self._tire.everywhere(pushes))
+        self._circulation.add(forces[:, self._leaning.others])
+        if self._leaning.shape is not None:
+            self._aside.add(forces[:, self._leaning.own] @ self._leaning.shape, moved)
 
     def state(self) -> dict[str, np.ndarray]:
         """State for a checkpoint."""
-        return self._motion.losses.state() | self._circulation.state() if self._motion else {}
+        if self._motion is None:
+            return {}
+        aside = {f"leaning_{name}": value for name, value in self._aside.state().items()}
+        return self._motion.losses.state() | self._circulation.state() | aside
 
     def set_state(self, kept: dict[str, np.ndarray]) -> None:
         """Continue from a `state`."""
         if self._motion is not None:
             self._motion.losses.set_state(kept)
             self._circulation.set_state(kept)
+            mark = "leaning_"
+            self._aside.set_state(
+                {name.removeprefix(mark): kept[name] for name in kept if name.startswith(mark)}
+            )
 
 
 def negligible(pressed: float) -> float:
@@ -268,16 +314,18 @@ def describe_energy(
     `kept`: the tire's snapshot; `pressed`: load times deflection of the static state, J.
     """
     slight = negligible(pressed)
+    aside, lead = losses.leaning
+    work = replace(work, contact=work.contact + aside, lead=work.lead + lead)
     total = work.total
     record.indicators["work of contact on the tire"] = (work.contact, "J")
     if work.driven is not None:
         record.indicators["work of the prescribed forces"] = (work.driven, "J")
     own = own_states(response, rolling) and len(kept["block_state"]) == len(rolling.states.block)
     if not own:
-        observe.say(f"  energy: contact and forces put {total:.4g} J into the tire")
+        observe.say(f"  energy: contact and forces put {total:.4g} J into the tire{losses.unknown}")
         return
     left = energy_left(rolling, kept, response.slow(step))
-    elastic = springs(response.resolved(step), kept["push_force"])
+    elastic = springs(response.resolved(step), kept["push_force"], losses.others)
     record.indicators |= {
         "energy left in the modes": (left, "J"),
         "energy left in the residual flexibility": (elastic, "J"),
@@ -427,10 +475,10 @@ class ContactStage(Stage[ContactHistory]):
         """Run the loop, writing by blocks; raises Chatter beyond the scheme's limit. Collective."""
         response, chosen = self.greens.product.contact, integration(self.job, plan, scheme.scheme)
         with record.timing("tread and solver"):
-            driven = driven_tire(self.job, chosen)
+            driven = driven_tire(self.job, chosen, setup.patch)
             loop = self._loop(record, setup, driven or chosen.tire, chosen.step)
         totals = Totals(setup.patch, setup.reach, scheme.limit, work=Work(scheme.scheme))
-        losses = Losses(chosen, response, self.rotating.product)
+        losses = Losses(chosen, response, self.rotating.product, self._leaning(setup))
         with ExitStack() as stack, record.timing("time loop"):
             attributes = {"step": chosen.step, "scheme": chosen.scheme, "road_relief": setup.relief}
             attributes |= {"free_slip": slip, "scheme_reason": scheme.reason}
@@ -464,6 +512,18 @@ class ContactStage(Stage[ContactHistory]):
             pressed = float(state.normal_force.sum()) * (state.deflection or 0.0)
             describe_energy(record, *given, losses, chosen.step, pressed)
 
+    def _leaning(self, setup: ContactSetup) -> Leaning:
+        """The forces of the road's slope among those of the loop."""
+        response, p = self.greens.product.contact, len(setup.patch.index)
+        every = np.arange(response.residual.shape[1])
+        if not leaning(self.job):
+            return Leaning(every[:0], every, None)
+        rolling, shape = self.rotating.product, np.zeros((2 * p, 0))
+        if Motion.known(rolling, response):
+            probes = leaning_loads(self.job, self.static.product, setup)
+            shape = Basis.of(rolling).seen(probes)
+        return Leaning(every[p : 3 * p], np.r_[every[:p], every[3 * p :]], shape)
+
     def _shortest_period(self) -> float:
         """Shortest period of all excitation, s."""
         scene, setup = self.job.scene, self.setup.product
@@ -485,8 +545,8 @@ class ContactStage(Stage[ContactHistory]):
     def _steps(self, setup, loop: Loop, driven, file: ContactFile, totals, losses, chosen) -> None:
         """Take the remaining steps; stops between two of them when requested. Collective."""
         done, steps = totals.figures.steps, chosen.steps
-        given = setup.patch, setup.drive, chosen.step, steps
-        instants = roll(loop.tire, loop.solver, *given, loop.friction, done, loop.memory)
+        given = setup.patch, setup.drive, chosen.step, steps, loop.friction, done, loop.memory
+        instants = roll(loop.tire, loop.solver, *given, normal=loop.normal)
         watch = Watch(self.job.comm, self.job.scene.time.checkpoint)
         with (
             Deferred() as deferred,

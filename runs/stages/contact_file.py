@@ -281,7 +281,7 @@ class ContactFile:
         self._checkpoint = job.directory / CHECKPOINT
         self._stack: list = []
         self._readings: list[np.ndarray] = []
-        self._rubs = job.scene.contact.rubs or job.scene.static.friction is not None
+        self._horizontal = job.scene.horizontal_forces or job.scene.static.friction is not None
         self._layout = dict(_LAYOUT)
         if not job.scene.output.axle_force:
             del self._layout["axle_force"]
@@ -322,6 +322,8 @@ class ContactFile:
         store.put(self._file, "points", patch.points, "m")
         store.put(self._file, "area", patch.area, "m2")
         store.put(self._file, "static_force", patch.force, "N")
+        if patch.pull is not None:
+            store.put(self._file, "static_horizontal_force", patch.pull, "N")
         stages_setup.fill(self._file, self._setup)
         fill(self._file, self._setup)
         forces = len(self._job.scene.force)
@@ -366,7 +368,7 @@ class ContactFile:
         driven = self._read()
         for name in self._layout | driven:
             dataset, values = self._file[name], (steps | driven)[name]
-            if name == "horizontal_force" and not self._rubs:
+            if name == "horizontal_force" and not self._horizontal:
                 dataset.resize(self._done + len(values), axis=0)  # unwritten entries are zero
             elif dataset.compression:
                 self._packer.append(dataset, values)

@@ -10,6 +10,7 @@ from typing import ClassVar
 
 import h5py
 import numpy as np
+from scipy import sparse
 
 from tireroad.contact.setup import ContactSetup
 from tireroad.fem.static.state import StaticState
@@ -21,7 +22,7 @@ from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
 from tireroad.runs.scene.tables.scene import PointForce, has_air
 from tireroad.runs.stages import cavity, corner
-from tireroad.runs.stages.setup import components, points_of, probes
+from tireroad.runs.stages.setup import components, leaning, leaning_loads, points_of, probes
 from tireroad.runs.stages.stage import Computed, Done, Record
 from tireroad.runs.stages.turning import turning_of
 
@@ -112,6 +113,7 @@ class GreensStage(Computed[Responses]):
             "points": setup.patch.index.tolist() if setup else [],
             "pitch": points_of(self.job, self.static.product) if setup else None,
             "components": components(self.job) if setup else (),
+            "leaning": setup is not None and leaning(self.job),
         }
 
     @property
@@ -123,6 +125,18 @@ class GreensStage(Computed[Responses]):
     def _contact_forces(self) -> int:
         """Number of force components on the nodes of the patch."""
         return len(components(self.job)) * len(self.setup.product.patch.index)
+
+    @property
+    def _leaning(self) -> bool:
+        return self.setup.product is not None and leaning(self.job)
+
+    def _light(self, width: int) -> sparse.csr_matrix | None:
+        """The forces of the road's slope, as wide as the other probes; None if there are none."""
+        if not self._leaning:
+            return None
+        found = leaning_loads(self.job, self.static.product, self.setup.product)
+        found.resize(found.shape[0], width)
+        return found
 
     @property
     def _wanted(self) -> Wanted:
@@ -161,6 +175,7 @@ class GreensStage(Computed[Responses]):
                 points.loads,
                 residual,
                 lambda: self.fields.product,
+                self._light(points.loads.shape[1]),
             )
         record.indicators |= made.figures
         record.warnings += made.warnings
@@ -169,11 +184,14 @@ class GreensStage(Computed[Responses]):
     def _apart(self, name: str, whole: Response) -> dict[str, Response]:
         """The contact's response, with prescribed forces as inputs (contact.loop), and theirs."""
         forces, more = len(self.job.scene.force), corner.readings(self.job)
-        if name == "force" or not (forces or more):
+        light = 2 * len(self.setup.product.patch.index) if self._leaning else 0
+        if name == "force" or not (forces or more or light):
             return {name: whole}
-        count = self._contact_forces
+        count, last = self._contact_forces, whole.input.shape[1]
         inputs = count + forces
-        contact = {"contact": whole.between(slice(None), slice(inputs))}
+        # What leans follows the vertical forces, before the prescribed ones.
+        order = np.r_[:count, last - light : last, count:inputs]
+        contact = {"contact": whole.between(slice(None), order)}
         if not forces:
             return contact
         held = 0 if self.job.axle else more

@@ -20,7 +20,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from tireroad.contact.grid_patch import OnPoints
-from tireroad.contact.loop import Driven, Loop, equal_steps, roll, steps_of
+from tireroad.contact.loop import Driven, Loop, RoadNormal, equal_steps, roll, steps_of
 from tireroad.contact.model import step_solver, tread_memory, tread_shear
 from tireroad.contact.patch import Patch
 from tireroad.contact.results.chatter import Chosen, choose, oscillation
@@ -181,17 +181,21 @@ def passing_period(road: Road, spacing: float, speed: float) -> float:
     return min(periods)
 
 
-def driven_tire(job: Job, chosen: Integration) -> Driven | None:
+def driven_tire(job: Job, chosen: Integration, patch: Patch) -> Driven | None:
     """The tire under prescribed forces and with wheel readings; None if the scene has neither."""
     forces = job.scene.force
     if not forces and not corner.readings(job):
         return None
     time = chosen.step * np.arange(chosen.steps + 1)
-    return Driven(chosen.tire, histories(forces, time), directions(forces), chosen.scheme)
+    seen = (3 if job.scene.contact.rubs else 1) * len(patch.index)
+    return Driven(chosen.tire, histories(forces, time), directions(forces), chosen.scheme, seen)
 
 
 def make_loop(spec, setup: ContactSetup, tire, step: float) -> Loop:
-    """The loop of tire, normal solver and friction, from the table [contact]."""
+    """The loop of tire, normal solver and friction, from the table [contact].
+
+    A tire whose forces have three components meets the road's slope too.
+    """
     patch = setup.patch
     p = len(patch.index)
     memory = tread_memory(spec, patch, setup.rolled.speed, step)
@@ -200,9 +204,11 @@ def make_loop(spec, setup: ContactSetup, tire, step: float) -> Loop:
     friction = None
     if spec.rubs:
         friction = _friction(spec, setup, tire, step, at_once)
+    seen, pushed = (count // p for count in tire.same_step.shape)
     if patch.weights is not None:
-        tire = OnPoints(tire, patch.weights, 1 if friction is None else 3)
-    return Loop(tire, solver, friction, memory)
+        tire = OnPoints(tire, patch.weights, seen, pushed)
+    normal = RoadNormal(len(patch.points)) if pushed == 3 else None
+    return Loop(tire, solver, friction, memory, normal)
 
 
 def bristles(spec, patch: Patch):
@@ -281,13 +287,13 @@ def forces(
     comm = sharers(kept, job.comm)
     tire = Recursion(response=kept, step=step, scheme=scheme, comm=comm, look_ahead=True)
     spec = contact or job.scene.contact
-    driven = driven_tire(job, Integration(tire, step, steps, scheme))
+    driven = driven_tire(job, Integration(tire, step, steps, scheme), setup.patch)
     loop = make_loop(spec, setup, driven or tire, step)
     (total, axle), every = np.zeros((2, steps, 3)), np.ones(len(setup.patch.points))
     given = setup.patch, setup.drive, step, steps
     with threadpool_limits(1, "blas"):
         for k, instant in enumerate(
-            roll(loop.tire, loop.solver, *given, loop.friction, 0, loop.memory, motion=False)
+            roll(loop.tire, loop.solver, *given, loop.friction, 0, loop.memory, False, loop.normal)
         ):
             total[k, :2] = every @ instant.horizontal
             total[k, 2], axle[k] = instant.force.sum(), instant.axle_force

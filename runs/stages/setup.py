@@ -213,8 +213,28 @@ def rolling_radius(job: Job, state: StaticState) -> float:
 
 
 def components(job: Job) -> tuple[int, ...]:
-    """Directions of the contact forces: normal to the road; with a brush also along and across."""
+    """Directions in which the motion of the contact points is followed: normal to the road; with a
+    brush also along and across."""
     return (2, 0, 1) if job.scene.contact.rubs else (2,)
+
+
+def leaning(job: Job) -> bool:
+    """Whether forces along and across come from the road's slope alone: their points are not
+    followed that way."""
+    return job.scene.horizontal_forces and not job.scene.contact.rubs
+
+
+def leaning_loads(job: Job, state: StaticState, setup: ContactSetup) -> sparse.csr_matrix:
+    """The forces (2 p, 3 s) of the road's slope on the nodes of the patch: all x, then all y."""
+    return sparse.vstack([_on_nodes(state, setup, part) for part in (0, 1)], format="csr")
+
+
+def _on_nodes(state: StaticState, setup: ContactSetup, part: int) -> sparse.csr_matrix:
+    """A direction of the road at each node of the patch, (p, 3 s)."""
+    count, index, frames = len(state.points), setup.patch.index, state.frames
+    if frames is None:
+        return probe.nodes(index, count, part)
+    return probe.along(index, count, frames[index, part])
 
 
 @dataclass(frozen=True)
@@ -248,14 +268,7 @@ def probes(job: Job, state: StaticState, setup: ContactSetup | None) -> Probes:
     more = corner.readings(job)
     if setup is None:
         return _driven_alone(loads, readings, min(more, corner.MOMENTS))
-    count, index = len(state.points), setup.patch.index
-    frames = state.frames
-    parts = [
-        probe.nodes(index, count, part)
-        if frames is None
-        else probe.along(index, count, frames[index, part])
-        for part in components(job)
-    ]
+    parts = [_on_nodes(state, setup, part) for part in components(job)]
     if job.scene.force:
         parts += [loads, readings]
     points = sparse.vstack(parts, format="csr")

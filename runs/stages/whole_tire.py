@@ -26,7 +26,7 @@ from tireroad.runs.files.store import opened
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.stages.contact_file import ContactHistory
 from tireroad.runs.stages.rolling import histories, of_given_forces, recursive
-from tireroad.runs.stages.setup import components, probes
+from tireroad.runs.stages.setup import components, leaning, leaning_loads, probes
 from tireroad.runs.stages.stage import Computed, Done, Job, Record
 
 _ROWS = 4096  # steps read at a time
@@ -38,7 +38,12 @@ def driven_loads(job: Job, state: StaticState, setup: ContactSetup | None) -> sp
     if setup is None:
         return loads
     patch = len(components(job)) * len(setup.patch.index)
-    return loads[: patch + len(job.scene.force)]
+    forces = loads[patch : patch + len(job.scene.force)]
+    if not leaning(job):
+        return loads[: patch + len(job.scene.force)]
+    aside = leaning_loads(job, state, setup)
+    aside.resize(aside.shape[0], loads.shape[1])
+    return sparse.vstack([loads[:patch], aside, forces], format="csr")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,8 +88,7 @@ class Forces:
     def _force(self, some: slice) -> np.ndarray:
         """Forces (n, k) N in the order of the driven points.
 
-        Only the normal ones have a static part here: a static state with friction excludes
-        horizontal forces of the loop, whose bristles begin unloaded.
+        Bristles begin unloaded; a static state with friction has horizontal forces of its own.
         """
         prescribed = histories(self.job.scene.force, self.time[some])
         if self.setup is None:
@@ -92,8 +96,10 @@ class Forces:
         patch = self.setup.patch
         with h5py.File(self.job.path("contact")) as file:
             parts = [file["normal_force"][some] - file["static_force"][:]]
-            if len(components(self.job)) > 1:
-                parts += [file["horizontal_force"][some, :, k] for k in (0, 1)]
+            if self.job.scene.horizontal_forces:
+                held = file.get("static_horizontal_force")
+                begun = np.zeros(2) if held is None else held[:]
+                parts += [(file["horizontal_force"][some] - begun)[:, :, k] for k in (0, 1)]
         if patch.weights is not None:
             parts = [(patch.weights.T @ part.T).T for part in parts]
         return np.hstack([*parts, prescribed])

@@ -700,6 +700,15 @@ class Scene:
         return self.contact is not None and self.time is not None and self.static.on_road
 
     @property
+    def horizontal_forces(self) -> bool:
+        """Whether the contact has horizontal forces: of bristles, or of a road that leans."""
+        if self.contact is None or self.contact.rubs:
+            return self.contact is not None
+        rotation, road = self.rotation, self.road
+        rolls = rotation is not None and (rotation.travel_speed or rotation.speed) > 0
+        return rolls and road is not None and road.kind != "flat"
+
+    @property
     def joins_shapes(self) -> bool:
         """Whether rotation shapes join the modes of a rotating wheel (modal.rotation_shapes)."""
         rotation = self.rotation
