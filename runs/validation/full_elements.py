@@ -15,10 +15,11 @@ from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
+from scipy import sparse
 from threadpoolctl import threadpool_limits
 
 from tireroad.contact.grid_patch import OnPoints
-from tireroad.contact.loop import roll
+from tireroad.contact.loop import RoadNormal, roll
 from tireroad.contact.model import Spec, step_solver
 from tireroad.contact.results.spectra import BAND, Distance, distance
 from tireroad.contact.setup import ContactSetup
@@ -34,7 +35,7 @@ from tireroad.modal.standing import fewer
 from tireroad.runs.process import observe
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.pipeline import Finished, run_scene
-from tireroad.runs.stages.setup import probes, scene_setup
+from tireroad.runs.stages.setup import leaning, leaning_loads, probes, scene_setup
 from tireroad.runs.stages.turning import turning_of
 from tireroad.runs.validation.tables import Table
 
@@ -68,16 +69,21 @@ def follow(trial: Trial, tire, step: float, setup: float) -> History:
     Contact and axle force (n, 3) N, displacement of the contact points (n, c) m.
     """
     patch, drive = trial.setup.patch, trial.setup.drive
-    solver = step_solver(trial.spec, patch, tire.same_step)
+    p = len(patch.index)
+    solver = step_solver(trial.spec, patch, tire.same_step[:p, :p])
+    seen, pushed = (count // p for count in tire.same_step.shape)
     if patch.weights is not None:
-        tire = OnPoints(tire, patch.weights)
+        tire = OnPoints(tire, patch.weights, seen, pushed)
+    normal = RoadNormal(len(patch.points)) if pushed == 3 else None
     steps = round(trial.duration / step)
     contact, axle = np.zeros((2, steps, 3))
     moved = np.zeros((steps, len(patch.points)))
     with threadpool_limits(1, "blas"):
         began = time.process_time()
-        for k, instant in enumerate(roll(tire, solver, patch, drive, step, steps)):
-            contact[k, 2], axle[k] = instant.force.sum(), instant.axle_force
+        instants = roll(tire, solver, patch, drive, step, steps, normal=normal)
+        for k, instant in enumerate(instants):
+            contact[k] = patch.resultant(instant.force, instant.horizontal)
+            axle[k] = instant.axle_force
             moved[k] = instant.displacement
         seconds = time.process_time() - began
     values = {"contact force": contact, "axle force": axle, "displacement": moved}
@@ -159,6 +165,8 @@ class Tires:
         static, contact = self.run.static, self.job.scene.contact
         setup = scene_setup(self.job, static) if contact else None
         self.probes = probes(self.job, static, setup)
+        leans = setup is not None and leaning(self.job)
+        self.aside = leaning_loads(self.job, static, setup) if leans else None
         if setup:
             self.trial = Trial(contact, setup, self.job.scene.time.duration)
 
@@ -187,12 +195,12 @@ class Tires:
             self._rolling[count] = rolling_modes(few, turning, self.job.comm)
         rolling, points = self._rolling[count], self.probes
         points = points.on_face if counted else points
-        given = points.outputs, points.loads, residual
-        return make_response(lambda: self.wheel, rolling, *given, lambda: rolling.basis).response
+        given = points.outputs, points.loads, residual, lambda: rolling.basis, self.aside
+        return make_response(lambda: self.wheel, rolling, *given).response
 
     def full(self, step: float, radius: float = RADIUS) -> tuple[FullTire, float, float]:
         """All degrees of freedom between the same points; step; set-up in s."""
-        wheel, points = self.wheel, self.probes.on_face
+        wheel, points = self.wheel, self._all_points
         axle = self.job.axle
         began = time.perf_counter()
         damping, modal = self._damping()
@@ -202,8 +210,8 @@ class Tires:
             speed=wheel.speed,
             damping=damping,
             step=step,
-            outputs=points.outputs,
-            loads=points.loads,
+            outputs=points,
+            loads=points,
             inertia=wheel.inertia,
             spectral_radius=radius,
             modal=modal,
@@ -211,6 +219,12 @@ class Tires:
             corner=(axle, self.motions.rim_motion(wheel.speed != 0)) if axle else None,
         )
         return tire, step, time.perf_counter() - began
+
+    @property
+    def _all_points(self) -> sparse.csr_matrix:
+        """Outputs and loads of full finite elements: those of the road's slope are outputs, too."""
+        points = self.probes.on_face.loads
+        return points if self.aside is None else sparse.vstack([points, self.aside], "csr")
 
     def _damping(self) -> tuple[tuple[float, float], ModalDamping | None]:
         """Uniform damping of the full matrices, and additional modal damping. Collective."""
@@ -224,7 +238,7 @@ class Tires:
 
     def nonlinear(self, step: float) -> tuple[NonlinearTire, float, float]:
         """The full finite elements with large motions; step; set-up in s."""
-        points, static, wheel = self.probes.on_face, self.run.static, self.wheel
+        points, static, wheel = self._all_points, self.run.static, self.wheel
         began = time.perf_counter()
         damping, modal = self._damping()
         tire = NonlinearTire(
@@ -232,8 +246,8 @@ class Tires:
             inflation=static.inflation,
             damping=damping,
             step=step,
-            outputs=points.outputs,
-            loads=points.loads,
+            outputs=points,
+            loads=points,
             spectral_radius=RADIUS,
             modal=modal,
             turning=(wheel.rotation, static.rolling) if wheel.speed else None,
