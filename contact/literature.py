@@ -189,7 +189,7 @@ def look_up(area: Array, force: Array) -> LookUp:
     """The table from pairs (n,) m^2 and N/m. InputError if fewer than three are inside the road."""
     inside = area > 0
     if inside.sum() < 3:
-        raise InputError("wedges: fewer than three of them meet the road: press further")
+        raise InputError("wedges: fewer than three wedges are in contact: increase the deflection")
     a, f = area[inside], force[inside]
     order = np.argsort(a)
     groups = np.array_split(order, min(_CLASSES, len(order)))

@@ -8,8 +8,8 @@ from __future__ import annotations
 import ufl
 
 import tireroad as tr
+from tireroad.fem.kinematics import dilatation, isochoric
 from tireroad.fem.parameters import number
-from tireroad.fem.tire.invariants import dilatation, isochoric
 from tireroad.fem.tire.laws.elastic import Elastic
 from tireroad.fem.tire.material import MATERIALS, material_law
 

@@ -2,7 +2,11 @@
 
 The mesh is fixed in the non-rotating frame; material flows through it with w = Omega e_y x X
 (Nackenhorst 2004; thesis (2.6)-(2.8), corrected). All quantities are per unit Omega.
+
+Invariants of the right Cauchy-Green tensor C in UFL, for the material laws.
 """
+
+from __future__ import annotations
 
 import ufl
 from dolfinx.mesh import Mesh
@@ -39,3 +43,16 @@ def cross_axle(u: Expr) -> Expr:
 def body_rate(u: Expr, w: Expr) -> Expr:
     """grad(u) w - e_y x u: rate of a steady field as seen by the rotating material."""
     return convective(u, w) - cross_axle(u)
+
+
+def isochoric(C: Expr) -> tuple[Expr, Expr]:
+    """Invariants I1 and I2 of J^(-2/3) C."""
+    J = ufl.sqrt(ufl.det(C))
+    first = ufl.tr(C)
+    second = (first**2 - ufl.tr(C * C)) / 2
+    return J ** (-2 / 3) * first, J ** (-4 / 3) * second
+
+
+def dilatation(C: Expr, bulk: Expr) -> Expr:
+    """kappa/2 (J - 1)^2, the form of Abaqus and CalculiX."""
+    return bulk / 2 * (ufl.sqrt(ufl.det(C)) - 1) ** 2

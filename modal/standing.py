@@ -85,7 +85,7 @@ def solved(
 def _check_wanted(count: int | None, up_to: float | None) -> None:
     if (count is None) == (up_to is None):
         raise InputError(
-            "modes: give count, how many of the lowest, or up_to, a frequency in Hz; one of the two"
+            "modes: give either count (number of lowest modes) or up_to (Hz), not both"
         )
     try:
         if count is None:

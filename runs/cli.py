@@ -457,7 +457,7 @@ def _cache(args: argparse.Namespace) -> None:
     from tireroad.runs.files.cache import Cache
 
     if args.unused_for is not None and not args.clear:
-        raise InputError("cache: --unused-for belongs to --clear, and nothing is removed without")
+        raise InputError("cache: --unused-for requires --clear; nothing was removed")
     cache = Cache.of_user()
     if args.clear:
         print(cache.clear(args.unused_for or 0.0))

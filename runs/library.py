@@ -33,8 +33,7 @@ from tireroad.contact import loop as contact_loop
 from tireroad.contact.loop import Instant, Steps, check_times, equal_steps
 from tireroad.contact.patch import Patch
 from tireroad.contact.results.chatter import choose, oscillation
-from tireroad.contact.results.limits import Limit, limits, lowest, pitch
-from tireroad.contact.results.spectra import amplitudes, third_octaves
+from tireroad.contact.results.spectra import Limit, amplitudes, limits, lowest, pitch, third_octaves
 from tireroad.contact.roads.under_tire import RoadUnderTire
 from tireroad.contact.setup import ContactSetup, Rolled, contact_setup
 from tireroad.contact.tread.law import TREADS, TreadLaw
@@ -149,7 +148,7 @@ def torus(
     _check_ranges(shape)
     if material is not None and not isinstance(material, Material):
         raise InputError(
-            f"torus: material = {material!r} is no material: take tireroad.compound(…), or "
+            f"torus: material = {material!r} is not a material: take tireroad.compound(…), or "
             "youngs_modulus, poisson_ratio and density"
         )
     section = shape.ring()
@@ -275,7 +274,7 @@ def _check_state(tire: TireModel, static: StaticState) -> None:
         why = "its tire is of other materials"
     if why:
         raise InputError(
-            f"modes: static is the state of another tire ({why}): press this one, and give the result"
+            f"modes: static is the state of another tire ({why}): call tireroad.press(tire, …) for this one"
         )
 
 
@@ -467,7 +466,7 @@ def _law(tread: TreadLaw | None) -> TreadLaw:
     if isinstance(tread, TreadLaw):
         return tread
     raise InputError(
-        f"drive: tread = {tread!r} is no tread law: take an object of contact.tread.laws, such as "
+        f"drive: tread = {tread!r} is not a tread law: take an object of contact.tread.laws, such as "
         "HalfSpace(youngs_modulus=1e7)"
     )
 

@@ -34,7 +34,7 @@ def program() -> None:
     except (signals.Stopped, Exception):
         if not signals.raised():
             raise
-        print(f"stopped by {signals.raised()} before anything was begun", file=sys.stderr)
+        print(f"stopped by {signals.raised()} before anything was started", file=sys.stderr)
         os._exit(handed_over(STOPPED, for_all=False))
 
 

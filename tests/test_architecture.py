@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections import Counter
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -126,3 +127,21 @@ def test_functions_stay_short() -> None:
         if isinstance(node, ast.FunctionDef) and node.end_lineno
     ]
     assert sum(length <= FUNCTION for length in lengths) >= 0.95 * len(lengths)
+
+
+def _journeys() -> list[tuple[str, list[str]]]:
+    """Files and functions that docs/architecture.md leads a reader through."""
+    text = (ROOT / "docs" / "architecture.md").read_text()
+    part = text[text.index("## Four journeys") : text.index("## How to extend it")]
+    steps = re.findall(r"`([a-z_/0-9]+\.py)`: ((?:`\w+`(?:, )?)+)", part)
+    return [(file, re.findall(r"`(\w+)`", names)) for file, names in steps]
+
+
+def test_the_journeys_lead_somewhere() -> None:
+    journeys = _journeys()
+    assert len(journeys) > 30
+    for file, names in journeys:
+        tree = ast.parse((ROOT / file).read_text())
+        kinds = ast.FunctionDef | ast.ClassDef
+        there = {node.name for node in ast.walk(tree) if isinstance(node, kinds)}
+        assert set(names) <= there, f"{file}: {sorted(set(names) - there)}"

@@ -71,7 +71,7 @@ def test_modes_take_the_state_of_an_equal_tire(rolling, static) -> None:
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"tread": "rubber"}, "tread = 'rubber' is no tread law.*HalfSpace"),
+        ({"tread": "rubber"}, "tread = 'rubber' is not a tread law.*HalfSpace"),
         ({"duration": float("nan")}, "duration = nan s must be positive and finite"),
         ({"duration": -1.0}, "duration = -1 s must be"),
         ({"step": 0.0}, "step = 0 s must be"),
@@ -115,7 +115,7 @@ def test_a_response_has_a_point(rolling) -> None:
 
 
 def test_a_torus_is_of_a_material() -> None:
-    with pytest.raises(tr.InputError, match="material = 'rubber' is no material: take"):
+    with pytest.raises(tr.InputError, match="material = 'rubber' is not a material: take"):
         tr.torus(**TIRE, material="rubber")
 
 

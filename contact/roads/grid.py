@@ -537,7 +537,7 @@ def _check_axes(x: Array, y: Array, shape: tuple[int, ...], source: str) -> None
                 f"within {FARTHEST:g} m"
             )
     if shape != (len(x), len(y)):
-        raise InputError(f"{source}: z has shape {shape}, x and y ask for {(len(x), len(y))}")
+        raise InputError(f"{source}: z has shape {shape}, x and y require {(len(x), len(y))}")
 
 
 def _check_choice(key: str, value: str, choices: tuple[str, ...]) -> None:

@@ -93,7 +93,9 @@ def check_plausible(
         (dz / step, step, dz) for dz, step in zip(differ, steps, strict=True)
     )
     if largest > HIGHEST:
-        raise InputError(f"{source}: heights of {largest:.3g} m are no road")
+        raise InputError(
+            f"{source}: heights of {largest:.3g} m are implausible for a road: check height_unit"
+        )
     relief = np.ptp(z[~np.isnan(z).any(axis=1)], axis=1)
     if heights and (slope > STEEPEST or _median(relief) > ROUGHEST * extent[1]):
         raise InputError(
@@ -187,7 +189,7 @@ def read_csv(file: Path) -> tuple[Array, Array, Rows]:
         with file.open(encoding="utf-8-sig") as stream:
             return _csv_rows(file, _lines(file, stream))
     except UnicodeDecodeError as error:
-        raise InputError(f"road.file {file}: is no text file (byte {error.start})") from error
+        raise InputError(f"road.file {file}: is not a text file (byte {error.start})") from error
 
 
 def _lines(file: Path, stream: TextIO) -> Iterator[Line]:

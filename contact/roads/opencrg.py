@@ -56,7 +56,7 @@ def read_header(file: Path) -> tuple[Blocks, int, int]:
             blocks[name].append((number, text.split("!", 1)[0].strip()))
     raise InputError(
         f"{file}: no line of $$$$ that separates header and data within {len(head):,} bytes: "
-        "this is no OpenCRG file, or it is truncated"
+        "this is not an OpenCRG file, or it is truncated"
     )
 
 
@@ -280,7 +280,9 @@ def _refuse_blocks(file: Path, blocks: Blocks) -> None:
     """InputError for what would change the heights and is not supported, by name."""
     for name in ("ROAD_CRG", "KD_DEFINITION"):
         if name not in blocks and "ROAD_CRG_FILE" not in blocks:
-            raise InputError(f"{file}: no block ${name}: this is no OpenCRG file, or it is damaged")
+            raise InputError(
+                f"{file}: no block ${name}: this is not an OpenCRG file, or it is damaged"
+            )
     if "ROAD_CRG_FILE" in blocks:
         raise InputError(f"{file}: refers to another file ($ROAD_CRG_FILE); name that file instead")
     for block, harmless in (
@@ -333,14 +335,14 @@ def _rows(
     if step is None:
         raise InputError(f"{file}: REFERENCE_LINE_INCREMENT is missing in $ROAD_CRG")
     if not 0.0 < step < LONGEST_STEP:
-        raise InputError(f"{file}: REFERENCE_LINE_INCREMENT = {step:g} m is no step of a road")
+        raise InputError(f"{file}: REFERENCE_LINE_INCREMENT = {step:g} m must be positive")
     if "REFERENCE_LINE_END_U" not in parameters:
         return step, None
     length = parameters["REFERENCE_LINE_END_U"] - parameters.get("REFERENCE_LINE_START_U", 0.0)
     steps = length / step
     if not (1.0 - 1e-3 < steps < MAX_BYTES and abs(steps - round(steps)) < 1e-3 * max(1.0, steps)):
         raise InputError(
-            f"{file}: REFERENCE_LINE_START_U to END_U, {length:g} m, is no whole number of "
+            f"{file}: REFERENCE_LINE_START_U to END_U, {length:g} m, is not a whole number of "
             f"REFERENCE_LINE_INCREMENT = {step:g} m"
         )
     return step, round(steps) + 1

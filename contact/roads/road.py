@@ -111,7 +111,7 @@ def make_road(spec: Any = None, /, **keys: Any) -> RoadUnderTire:
     """
     if spec is not None and not hasattr(spec, "__dict__"):
         raise InputError(
-            f"make_road: {spec!r:.60} is no road of a scene: give keys by name, such as "
+            f"make_road: {spec!r:.60} is not a road of a scene: give keys by name, such as "
             'make_road(kind="sine", wavelength=0.2)'
         )
     if spec is None or not hasattr(spec, "surface"):

@@ -278,7 +278,7 @@ class _Reader:
 
     def data(self, data: Data) -> None:
         if self.card is None:
-            raise data.place.error("data before the first keyword: this is no Abaqus deck")
+            raise data.place.error("data before the first keyword: this is not an Abaqus deck")
         if self.used or self.card.keyword == "INSTANCE":
             self.lines.append(data)
 
@@ -317,7 +317,7 @@ class _Reader:
         labels = table[:, 0]
         wrong = (labels != np.floor(labels)) | (labels < 1) | (labels > LABEL)
         if wrong.any():
-            raise card.place.error(f"*NODE: {labels[wrong][0]:g} is no label of a node")
+            raise card.place.error(f"*NODE: {labels[wrong][0]:g} is not a label of a node")
         points = table[:, 1:4]
         if system == "C":
             radius, angle = points[:, 0].copy(), np.radians(points[:, 1])
@@ -364,7 +364,7 @@ class _Reader:
             what = "STEP" if self.step else "PART"
             raise open_.error(f"*{what} has no *END {what}: is the deck cut short?")
         if self.card is None:
-            raise InputError(f"{self.path}: no keyword in it: this is no Abaqus deck")
+            raise InputError(f"{self.path}: no keyword in it: this is not an Abaqus deck")
         labels, points = self.nodes.table(self.path.name)
         self.elements.check_once()
         elements = self.elements.labels()

@@ -155,7 +155,7 @@ class SetReader:
             return BOTH_SIDES
         match = _FACE.fullmatch(text.upper())
         if not match:
-            raise place.error(f"{shown(text)} is no face of an element: S1 to S6, SPOS, SNEG")
+            raise place.error(f"{shown(text)} is not a face of an element: S1 to S6, SPOS, SNEG")
         return int(match[1]) - 1
 
     def pressure(self, card: Card, lines: list[Data], _: int) -> None:
@@ -524,7 +524,9 @@ class Generator:
     def _count(self, more: int, place: Place) -> None:
         self._made += more
         if self._made > MOST:
-            raise place.error(f"more than {MOST} nodes and elements are generated: this is no tire")
+            raise place.error(
+                f"more than {MOST} nodes and elements would be generated: too many for a tire"
+            )
 
 
 def _shares(intervals: int, bias: float, two_step: bool, place: Place) -> np.ndarray:

@@ -128,7 +128,7 @@ def _pieces(file: BinaryIO, path: Path, reading: _Reading) -> Iterator[tuple[int
             )
         if b"\0" in new:
             raise Place(path.name, number + (left + new[: new.index(b"\0")]).count(b"\n")).error(
-                "a zero byte: this is no text file"
+                "a zero byte: this is not a text file"
             )
         text = left + new
         end = _whole_lines(text) if new else len(text)
@@ -165,7 +165,7 @@ def _keyword(raw: bytes, place: Place, reading: _Reading) -> Iterator[Card | Dat
     """A keyword, followed by the contents of its INPUT file."""
     reading.keywords += 1
     if reading.keywords > _KEYWORDS:
-        raise place.error(f"more than {_KEYWORDS} keywords: this is no deck")
+        raise place.error(f"more than {_KEYWORDS} keywords: this is not a deck")
     first, *rest = _fields(" ".join(raw.decode("utf-8", "replace").split()))
     card = Card(" ".join(first.lstrip("* ").upper().split()), _options(rest), place)
     if card.keyword != "INCLUDE":
@@ -305,7 +305,7 @@ def number(text: str, place: Place) -> float:
     try:
         value = float(text.replace("D", "e").replace("d", "e").replace("_", "?"))
     except ValueError:
-        raise place.error(f"{shown(text)} is no number") from None
+        raise place.error(f"{shown(text)} is not a number") from None
     if not np.isfinite(value):
         raise place.error(f"{shown(text)} is not a finite number")
     return value
@@ -378,7 +378,7 @@ def label(text: str, place: Place) -> int:
     """Label of a node or element, an integer from 0 to 10^9. Raises InputError otherwise."""
     value = number(text, place)
     if value != int(value) or not 0 <= value <= LABEL:
-        raise place.error(f"{shown(text)} is no label of a node or element")
+        raise place.error(f"{shown(text)} is not a label of a node or element")
     return int(value)
 
 

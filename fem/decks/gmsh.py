@@ -112,7 +112,7 @@ class TextNumbers(_Numbers):
             try:
                 self._all = np.fromstring(part.text.replace(b"\n", b" "), sep=" ")
             except (DeprecationWarning, ValueError):
-                raise self.error("something in this part is no number") from None
+                raise self.error("something in this part is not a number") from None
 
     def reals(self, count: int) -> np.ndarray:
         if self._at + count > len(self._all):
@@ -133,7 +133,7 @@ class TextNumbers(_Numbers):
         """Labels (n,) and points (n, 3), stored node by node."""
         table = self.reals(4 * count).reshape(count, 4)
         if not (table[:, 0] == np.floor(table[:, 0])).all():
-            raise self.error("a node's label is no whole number")
+            raise self.error("a node's label is not a whole number")
         return table[:, 0].astype(np.int64), table[:, 1:].copy()
 
 
@@ -211,7 +211,7 @@ def read(path: Path) -> Deck:
 def _format(found: dict[str, Part], path: Path) -> tuple[str, bool]:
     part = found.get("MeshFormat")
     if part is None:
-        raise InputError(f"{path}: no $MeshFormat: this is no Gmsh mesh")
+        raise InputError(f"{path}: no $MeshFormat: this is not a Gmsh mesh")
     words = part.text.split(None, 3)[:3]
     if len(words) < 3 or words[0] not in (b"2.2", b"4.1") or words[1] not in (b"0", b"1"):
         raise part.place.error("the mesh must be of format 2.2 or 4.1 (gmsh -format msh41)")
@@ -331,7 +331,7 @@ def _deck(
 ) -> Deck:
     if not (len(labels) and len(elements)):
         raise InputError(
-            f"{path.name}: {len(labels)} nodes and {len(elements)} elements are no mesh"
+            f"{path.name}: not a mesh: {len(labels)} nodes and {len(elements)} elements"
         )
     dimension = max(TYPES[sort][0] for sort, *_ in elements)
     order = np.argsort(labels, kind="stable")

@@ -129,7 +129,7 @@ class RoadShape:
         return -1.0 if self.inside else 1.0
 
     def _near(self, x: Array) -> Array:
-        assert self.drum_radius is not None, "the road is no drum"
+        assert self.drum_radius is not None, "the road is not a drum"
         reach = _REACH * self.drum_radius
         return np.clip(x, -reach, reach)
 

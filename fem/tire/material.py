@@ -95,7 +95,7 @@ def compound(
     wrong = sorted(parameters.keys() - law.__dataclass_fields__.keys())
     if wrong:
         known = ", ".join(law.__dataclass_fields__)
-        raise InputError(f"material {model}: {wrong[0]} is none of its parameters: {known}")
+        raise InputError(f"material {model}: unknown parameter {wrong[0]}; valid: {known}")
     return Material(
         law=law(**parameters), density=density, dynamic=dynamic, loss_factor=loss_factor
     )

@@ -184,7 +184,7 @@ class Cache:
                 try:
                     fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 except BlockingIOError:
-                    observe.say(f"{stage:9s} waits: another run computes the same")
+                    observe.say(f"{stage:9s} waits for another run that computes the same stage")
                     fcntl.flock(lock, fcntl.LOCK_EX)
             yield
 

@@ -209,7 +209,7 @@ def export(directory: Path) -> list[Path]:
     export, a result file is damaged (then nothing is written), or `export` cannot be written.
     """
     if not directory.is_dir():
-        raise InputError(f"{directory} is no folder: give the result folder of a run")
+        raise InputError(f"{directory} is not a folder: give the result folder of a run")
     files: dict[str, Callable[[Path], object]] = {}
     others = left_out(directory)
     for name, reader in READERS.items():

@@ -69,8 +69,8 @@ def check_kept_scene(path: Path) -> None:
         raise InputError(f"{path}: cannot be read ({error})") from None
     if not is_as_signed(text):
         raise InputError(
-            f"{path}: has changed since the run wrote it (damaged or edited): resume goes on with"
-            " what was begun; use run for another scene, or to write it anew from your own file"
+            f"{path}: has changed since the run wrote it (damaged or edited): resume continues"
+            " what was started; use run for another scene, or to write it anew from your own file"
         )
 
 

@@ -27,7 +27,7 @@ def describe(file: Path, as_json: bool = False) -> str:
         raise InputError(f"{file} is a folder: {_candidates(file)}")
     if not file.is_file():
         raise InputError(
-            f"{file}: {'is no file of data' if file.exists() else 'there is no such file'}"
+            f"{file}: {'is not a data file' if file.exists() else 'there is no such file'}"
         )
     try:
         whole = "right" if disk.is_whole(file) else "wrong"
@@ -37,7 +37,7 @@ def describe(file: Path, as_json: bool = False) -> str:
         raise InputError(f"{file} cannot be read ({error.strerror})") from None
     if whole == "wrong" and not h5py.is_hdf5(file):
         raise InputError(
-            f"{file} is no HDF5 file, or a damaged one: give a result file of a run, such as static.h5"
+            f"{file} is not an HDF5 file, or is damaged: give a result file of a run, such as static.h5"
         )
     if whole == "wrong":
         verify(file)
@@ -143,7 +143,7 @@ def _scene(text: str) -> str:
     try:
         tables = tomllib.loads(text)
     except tomllib.TOMLDecodeError:
-        return f"{lines} lines that are no TOML"
+        return f"{lines} lines that are not TOML"
     names = ", ".join(key for key, value in tables.items() if isinstance(value, (dict, list)))
     return f"{tables.get('name', 'without a name')}, {lines} lines ({names})"
 

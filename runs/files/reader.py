@@ -123,7 +123,7 @@ class RunResults(Mapping[str, NDArray[Any]]):
             table = json.loads(self._text("summary.json"))
             table["stages"].items()
         except (ValueError, KeyError, TypeError, AttributeError):
-            raise self._damaged("summary.json", "it is no summary of a run") from None
+            raise self._damaged("summary.json", "it is not the summary of a run") from None
         if not is_table_as_signed(table):
             raise self._damaged("summary.json", "it is not what the run wrote (checksum)")
         return table
@@ -135,7 +135,7 @@ class RunResults(Mapping[str, NDArray[Any]]):
         except OSError as error:
             raise InputError(f"{path} cannot be read ({error.strerror}); {AGAIN}") from None
         except UnicodeDecodeError:
-            raise self._damaged(name, "it is no text") from None
+            raise self._damaged(name, "it is not text") from None
 
     def _damaged(self, name: str, why: str) -> InputError:
         return InputError(f"{self.directory / name} is damaged: {why}; {AGAIN}")

@@ -45,7 +45,7 @@ def on_root(comm: Any, function: Callable[[], T]) -> T:
     return parallel.on_root(comm, function, (InputError, ConvergenceError, Removed))
 
 
-KEPT = "what was finished is kept, the same command or resume goes on"
+KEPT = "completed stages are kept; run the same command or `resume` to continue"
 
 
 def judged(function: Callable[[], None], kept: str = KEPT) -> tuple[int, str]:

@@ -106,7 +106,7 @@ PATIENCE = 8.0
 checkpoint first, however long that takes; elsewhere files are complete or absent, so nothing is
 lost."""
 
-_AGAIN = "what was finished is kept, the same command or resume goes on"
+_AGAIN = "completed stages are kept; run the same command or `resume` to continue"
 _PR_SET_PDEATHSIG = 1
 
 

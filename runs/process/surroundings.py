@@ -119,7 +119,7 @@ def _check_temporary() -> None:
         if given := os.environ.get(name):
             if not (os.path.isdir(given) and os.access(given, os.W_OK | os.X_OK)):
                 raise InputError(
-                    f"{name} = {given} is no folder that can be written, and MPI keeps its files there: set it to "
+                    f"{name} = {given} is not writable, and MPI keeps its session files there: set it to "
                     "another, or unset it"
                 )
             break

@@ -231,7 +231,7 @@ def write_report(directory: Path) -> Path:
     process. Raises InputError if the folder holds no results or cannot be written to.
     """
     if not directory.is_dir():
-        raise InputError(f"{directory} is no folder: give the result folder of a run")
+        raise InputError(f"{directory} is not a folder: give the result folder of a run")
     if not any((directory / name).is_file() for name in (*SECTIONS, "summary.json", "scene.toml")):
         raise InputError(
             f"{directory} holds no results (no summary.json, scene.toml or *.h5 of a run): "

@@ -371,7 +371,7 @@ def _check_kinds(result: Any, raw: dict, path: tuple[str, ...], source: Source) 
 
 
 def _of_another_kind(path, selector: str, kinds, this: Any, source: Source) -> None:
-    source.add(path, f"belongs to {selector} = {' or '.join(kinds)}, and this is {this}")
+    source.add(path, f"is only valid for {selector} = {' or '.join(kinds)} (here: {this})")
 
 
 def _field(item: Field, raw: Any, path: tuple[str, ...], source: Source) -> Any:

@@ -201,7 +201,7 @@ class Variants(Parameters):
             if getattr(self, item.name) is None:
                 object.__setattr__(self, item.name, part.registry[name]())
             elif not isinstance(getattr(self, item.name), part.registry[name]):
-                raise TypeError(f"{item.name} is no {part.selector} = {name}")
+                raise TypeError(f"{item.name} is not a {part.selector} = {name}")
 
 
 def table_of(item: Field) -> Table | None:

@@ -37,7 +37,7 @@ from tireroad.contact.results.error_bars import (
     share,
     total,
 )
-from tireroad.contact.results.limits import Limit, limits, lowest, pitch
+from tireroad.contact.results.spectra import Limit, limits, lowest, pitch
 from tireroad.contact.setup import ContactSetup, on_shape
 from tireroad.contact.tread.between_nodes import Backed, on_nodes, over_rectangles, unsettled
 from tireroad.contact.tread.compliance import Influence

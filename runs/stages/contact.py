@@ -490,7 +490,7 @@ class ContactStage(Stage[ContactHistory]):
                 totals.set_state(kept)
                 losses.set_state(kept)
                 reached = totals.figures.steps * chosen.step
-                observe.say(f"  goes on from the checkpoint at t = {reached:.6g} s")
+                observe.say(f"  continues from the checkpoint at t = {reached:.6g} s")
             done, began = totals.figures.steps, time.thread_time()
             self._steps(setup, loop, driven, file, totals, losses, chosen)
             # CPU time of this process's own thread: the cost of a step when no other process needs

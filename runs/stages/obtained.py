@@ -44,7 +44,7 @@ def entered(stage: str, summary: Summary, comm: MPI.Comm) -> Iterator[None]:
     except BaseException as error:
         if comm.rank == 0:
             stopped = isinstance(error, Stopped)
-            told = f"stopped by {error}: resume goes on" if stopped else str(error) or repr(error)
+            told = f"stopped by {error}: resume continues" if stopped else str(error) or repr(error)
             with suppress(Exception):  # of the first error, whatever else goes wrong
                 summary.end(stage, told)
         raise

@@ -27,8 +27,7 @@ from tireroad.contact.results.chatter import Chosen, choose, oscillation
 from tireroad.contact.roads.under_tire import is_level
 from tireroad.contact.setup import ContactSetup
 from tireroad.contact.solver.stick_slip import Friction
-from tireroad.contact.tread.brush import Brush, BrushLaw
-from tireroad.contact.tread.free_rolling import free_slip
+from tireroad.contact.tread.brush import Brush, BrushLaw, free_slip
 from tireroad.greens.convolution import Convolution
 from tireroad.greens.recursion import Recursion, sharers
 from tireroad.greens.response import Response

@@ -20,7 +20,7 @@ from tireroad.contact.roads.grid_file import UNREADABLE, read_numbers
 from tireroad.contact.roads.road import placed
 from tireroad.contact.roads.under_tire import make_motion
 from tireroad.contact.setup import ContactSetup, Rolled, contact_setup, nodes_within
-from tireroad.contact.tread.free_rolling import shape_slip
+from tireroad.contact.tread.brush import shape_slip
 from tireroad.contact.tread.pattern import Heights, Pattern, pitch_starts
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices import probe

@@ -13,15 +13,16 @@ import h5py
 import numpy as np
 
 from tireroad.contact.results import spectra
-from tireroad.contact.results.limits import Limit, lowest
 from tireroad.contact.results.spectra import (
     FORCE,
     MOMENT,
     SILENT,
     VELOCITY,
+    Limit,
     amplitudes,
     density,
     least_duration,
+    lowest,
     lowest_wanted,
     nominal,
     off_middle,

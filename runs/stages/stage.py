@@ -317,7 +317,7 @@ def checkpointed(stage: Stage, what: str) -> Iterator[Journal]:
     journal = Journal(found, parts.keep)
     least = min(job.comm.allgather(len(found)))
     if least:
-        observe.say(f"  goes on from the checkpoint after {least} {what}")
+        observe.say(f"  continues from the checkpoint after {least} {what}")
     try:
         yield journal
     except Stopped:

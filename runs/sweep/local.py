@@ -273,7 +273,7 @@ class Queue:
             raise InputError(f"sweep: queue.template {path} cannot be read: {error}") from None
         if not _has_group(str(given.get("number", cls.number))):
             raise InputError(
-                f"sweep: queue.number = {given['number']!r} is no pattern with a group in round brackets, as in "
+                f"sweep: queue.number = {given['number']!r} is not a pattern with a group in round brackets, as in "
                 '"Job <([0-9]+)>"'
             )
         words: dict[str, Any] = {key: str(value) for key, value in given.items()}
@@ -282,7 +282,7 @@ class Queue:
             found.submission(path, 1, ["1"])
         except (LookupError, ValueError) as error:
             raise InputError(
-                f"sweep: [queue] submit, array or after is no command line with {{count}} and {{jobs}} in their places: {error!r}"
+                f"sweep: [queue] submit, array or after is not a command line with {{count}} and {{jobs}} in their places: {error!r}"
             ) from None
         return found
 
@@ -406,7 +406,7 @@ def _directives(given: Mapping[str, Any]) -> str:
             raise InputError(f"sweep: slurm.{key} is set by the program: {advice}")
         line = "\n" not in str(value) and not isinstance(value, list | dict)
         if not _DIRECTIVE.fullmatch(key) or not line:
-            raise InputError(f"sweep: slurm.{key} = {value!r} is no option of sbatch on one line")
+            raise InputError(f"sweep: slurm.{key} = {value!r} is not a one-line option of sbatch")
         if value is not False:
             lines.append(f"#SBATCH --{key}" + ("" if value is True else f"={value}"))
     return "\n".join(lines)

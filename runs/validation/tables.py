@@ -88,7 +88,7 @@ def _check(out: Path) -> None:
     if out.is_dir():
         raise InputError(f"--out {out} is a folder: name a file, such as {out / 'measured.json'}")
     if out.exists() and not out.is_file():  # a device would be replaced by the file
-        raise InputError(f"--out {out} is no ordinary file: name another one")
+        raise InputError(f"--out {out} is not an ordinary file: name another one")
     if out.suffix == ".html":
         raise InputError(f"--out {out}: a page of this name is written beside it; end it in .json")
     try:
@@ -106,7 +106,9 @@ def _left(results: dict[str, list[Table]], out: Path | None) -> str:
     finished = f"{', '.join(results)} in {out}" if results else "nothing in the file of --out"
     kept = out.with_suffix(".kept")
     if kept.is_dir():
-        return f"kept are {finished}, and cases of the last one in {kept}: the same command goes on"
+        return (
+            f"kept are {finished}, and cases of the last one in {kept}: the same command continues"
+        )
     return f"kept are {finished}; name those that remain, with another --out"
 
 

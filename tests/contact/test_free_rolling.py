@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from tireroad.contact.tread.brush import Brush, BrushLaw
-from tireroad.contact.tread.free_rolling import free_slip, shape_slip
+from tireroad.contact.tread.brush import Brush, BrushLaw, free_slip, shape_slip
 from tireroad.fem.errors import ConvergenceError
 
 LOAD = 1000.0

@@ -100,7 +100,7 @@ def test_no_mode_below_the_frequency():
     ("wanted", "message"),
     [
         ({}, "give count.* or up_to"),
-        ({"count": 5, "up_to": 100.0}, "one of the two"),
+        ({"count": 5, "up_to": 100.0}, "not both"),
         ({"count": 0}, "count must be ≥ 1, not 0"),
         ({"count": -3}, "count must be ≥ 1"),
         ({"count": 2.5}, "count must be a whole number, not 2.5"),

@@ -104,11 +104,11 @@ class LaserFile(Levelled):
             lines = [row for row in text.splitlines() if row.strip() and not row.startswith("#")]
             begin = 1 if lines and _is_heading(lines[0]) else 0
             if len(lines) - begin < 3:
-                raise InputError(f"{len(lines) - begin} heights are no road")
+                raise InputError(f"only {len(lines) - begin} heights: too few for a road")
             check_count(path, len(lines))
             table = np.loadtxt(lines[begin:], delimiter=",", ndmin=2, dtype=float)
         except UnicodeDecodeError as error:
-            raise InputError(f"{source}: is no text file (byte {error.start})") from error
+            raise InputError(f"{source}: is not a text file (byte {error.start})") from error
         except (OSError, ValueError) as error:
             raise InputError(f"{source}: {error}") from error
         return self._line(table, source)

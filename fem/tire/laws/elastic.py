@@ -54,7 +54,7 @@ class NeoHookean(Elastic):
     @staticmethod
     def energy(C: Expr, shear: Expr, bulk: Expr) -> tuple[Expr, Expr]:
         """G/2 (I1 - 3) of the isochoric part, and K/2 (J - 1)^2."""
-        from tireroad.fem.tire.invariants import dilatation, isochoric
+        from tireroad.fem.kinematics import dilatation, isochoric
 
         first, _ = isochoric(C)
         return shear / 2 * (first - 3), dilatation(C, bulk)

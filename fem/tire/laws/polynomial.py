@@ -37,7 +37,7 @@ class MooneyRivlin(Polynomial):
     @staticmethod
     def energy(C: Expr, c10: Expr, c01: Expr, bulk: Expr) -> tuple[Expr, Expr]:
         """c10 (I1 - 3) + c01 (I2 - 3) of the isochoric part, and K/2 (J - 1)^2."""
-        from tireroad.fem.tire.invariants import dilatation, isochoric
+        from tireroad.fem.kinematics import dilatation, isochoric
 
         first, second = isochoric(C)
         return c10 * (first - 3) + c01 * (second - 3), dilatation(C, bulk)
@@ -64,7 +64,7 @@ class Yeoh(Polynomial):
     @staticmethod
     def energy(C: Expr, c10: Expr, c20: Expr, c30: Expr, bulk: Expr) -> tuple[Expr, Expr]:
         """The polynomial of the isochoric part, and K/2 (J - 1)^2."""
-        from tireroad.fem.tire.invariants import dilatation, isochoric
+        from tireroad.fem.kinematics import dilatation, isochoric
 
         excess = isochoric(C)[0] - 3
         return c10 * excess + c20 * excess**2 + c30 * excess**3, dilatation(C, bulk)

@@ -45,7 +45,7 @@ def _show(section: Section, wanted: Accuracy, trials: list[Trial]) -> None:
     section.show(
         trade(cost, np.array([worst(one)[0] for one in over]), np.array([_shares(o) for o in over])),
         "The search: estimated error over the one asked for, against the cost of a run with the settings of each "
-        f"trial, in the order tried; marks: the part of each cause. A search goes on to 1/{MARGIN:g}.",
+        f"trial, in the order tried; marks: the part of each cause. A search continues to 1/{MARGIN:g}.",
     )  # fmt: skip
 
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tireroad.contact.results.limits import limits, lowest, pitch
+from tireroad.contact.results.spectra import limits, lowest, pitch
 
 
 @pytest.mark.parametrize(

@@ -70,7 +70,7 @@ class Looking:
 
 @pytest.mark.mpi
 def test_what_stops_the_root_process_stops_all() -> None:
-    """And a number that is no number from one solve leaves none behind for the next. The root predicts before it solves,
+    """And a number that is not a number from one solve leaves none behind for the next. The root predicts before it solves,
     the others once they have met."""
     comm, ahead = MPI.COMM_WORLD, Looking()
     together = Together(comm, 2, ahead)

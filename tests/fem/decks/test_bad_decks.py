@@ -105,7 +105,7 @@ CASES = {
     "text": (
         GOOD.replace("*ELEMENT", "777, tire, 0.\n*ELEMENT", 1),
         {},
-        r"line \d+: \"tire\" is no number",
+        r"line \d+: \"tire\" is not a number",
     ),
     "label": (GOOD.replace("*ELEMENT", "7.5, 1., 0.\n*ELEMENT", 1), {}, r"7\.5 is no label"),
     "cut short": (GOOD[: GOOD.index("*NSET") - 12], {}, r"line \d+: .*cut short"),

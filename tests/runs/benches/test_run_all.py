@@ -28,7 +28,7 @@ def test_a_stop_says_what_is_kept(tmp_path, monkeypatch) -> None:
     assert list(json.loads(out.read_text())["results"]) == ["done"]
     out.with_suffix(".kept").mkdir()
     assert (
-        "the same command goes on"
+        "the same command continues"
         in judged(lambda: tables.run_all("tireroad.tests.bench", [], out))[1]
     )
 

@@ -64,7 +64,7 @@ def test_stopped_and_resumed(tmp_path: Path, launch, name: str) -> None:
 
     again = launch("-m", "runs", "resume", broken)
     assert again.returncode == 0, again.stderr
-    assert "goes on from the checkpoint" in again.stdout
+    assert "continues from the checkpoint" in again.stdout
     assert not (broken / "checkpoint.h5").exists()
     with h5py.File(whole / "contact.h5") as one, h5py.File(broken / "contact.h5") as other:
         names: list[str] = []

@@ -128,7 +128,7 @@ def test_result_folder_removed_under_a_run(scene: Path, processes: int) -> None:
 def test_a_disk_that_refuses_keeps_what_is_finished(
     scene: Path, number: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
-    """Full or read-only in the middle of modes.h5: status 3; the same command goes on from the static state."""
+    """Full or read-only in the middle of modes.h5: status 3; the same command continues from the static state."""
 
     def refuse(*_: object) -> None:
         raise OSError(number, os.strerror(number))

@@ -59,7 +59,7 @@ def test_a_table_within_an_array_is_fitted_too(scene_file) -> None:
         (["contact.tread=winkler", "contact.poisson_ratio=0.4"], "contact.poisson_ratio belongs"),
         (["road.motion.kind=ramp", "road.motion.frequency=9"], "road.motion.frequency belongs"),
         (['contact={tread="winkler",youngs_modulus=1e7}'], "contact.youngs_modulus belongs"),
-        (["road.wavelength=0.1"], "road.wavelength belongs to kind = sine"),
+        (["road.wavelength=0.1"], "road.wavelength is only valid for kind = sine"),
         (["road.kind=grid"], "road needs file"),
         (["contact.tread=jelly"], "contact.tread must be one of"),
     ],
@@ -71,7 +71,9 @@ def test_what_set_itself_contradicts_is_refused(path: Path, items: list[str], wo
 
 def test_a_file_that_contradicts_itself_is_refused(scene_file) -> None:
     text = CONTRACT.replace('"half-space"', '"winkler"')
-    assert "youngs_modulus belongs to tread = " in refused(scene_file(text), "static.load=400")
+    assert "youngs_modulus is only valid for tread = " in refused(
+        scene_file(text), "static.load=400"
+    )
 
 
 def test_an_axis_of_a_sweep_chooses_as_set_does(path: Path, scene_file) -> None:

@@ -120,9 +120,9 @@ def test_another_deck_is_another_tire(folder):
         ('rim = "RIMS"', r"own\.toml, line 4: tire\.inp: tire\.rim: .*did you mean RIM"),
         ('length_unit = "mm"', r"is this deck in m\?"),
         ("mirror = true", r"mirror = true is for a half section"),
-        ("outer_radius = 0.3", r"outer_radius belongs to section = torus"),
+        ("outer_radius = 0.3", r"outer_radius is only valid for section = torus"),
         ('[[tire.region]]\nname = "TREAD"', r"tire\.region\.0 name = \"TREAD\" .*WALL"),
-        ('[[tire.cords]]\nname = "C"', r"tire\.cords\.0 name = \"C\" is no line of the file: B"),
+        ('[[tire.cords]]\nname = "C"', r"tire\.cords\.0 name = \"C\" is not a line of the file: B"),
     ],
 )
 def test_messages(folder, add, message):

@@ -72,7 +72,7 @@ def test_unknowns_are_those_of_the_section(tmp_path, given):
     ("text", "message"),
     [
         ('section = "radial"\nsize = "foo"', "like"),
-        ('section = "radial"\nthickness = 0.01', "belongs to section = torus"),
+        ('section = "radial"\nthickness = 0.01', "is only valid for section = torus"),
         (
             'section = "radial"\n[[tire.cords]]\nname = "x"',
             "one of cap ply, belt 2, belt 1, carcass",
@@ -91,7 +91,7 @@ def test_unknowns_are_those_of_the_section(tmp_path, given):
         ),
         ('section = "radial"\n[tire.material]\ndensity = 1.0', "follow from its size"),
         ('section = "radial"\norder = 1', "take 2 or 3"),
-        ('size = "205/60 R15"', "belongs to section = radial"),
+        ('size = "205/60 R15"', "is only valid for section = radial"),
     ],
 )
 def test_a_radial_tire_says_what_it_does_not_take(tmp_path, text, message):

@@ -144,7 +144,7 @@ def test_static(folder: Path, monkeypatch, capsys, segments: int, damping: float
     run(scene, folder / "broken", "static")
     assert len(solved) < whole - after + 3  # the last of each problem is solved again
     if COMM.rank == 0:
-        assert f"goes on from the checkpoint after {after} solution(s)" in capsys.readouterr().out
+        assert f"continues from the checkpoint after {after} solution(s)" in capsys.readouterr().out
     assert_same(folder / "whole" / "static.h5", folder / "broken" / "static.h5", ROUNDING)
     assert not (folder / "broken" / "static_checkpoint").exists()
 

@@ -128,7 +128,7 @@ def check_cords(tire: Tire, own: OwnSection) -> None:
         if cords.name not in own.mesh.plies:
             known = ", ".join(own.mesh.plies) or "none"
             raise InputError(
-                f'tire.cords.{number} name = "{cords.name}" is no line of the file: {known}'
+                f'tire.cords.{number} name = "{cords.name}" is not a line of the file: {known}'
             )
 
 
