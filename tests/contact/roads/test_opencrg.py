@@ -163,7 +163,7 @@ SLOPE = PHI.replace("phi,rad", "slope,m/m")
         ({"parameters": "* REFERENCE_LINE_INCREMENT\n"}, "INCREMENT is missing"),
         ({"channels": f"U:reference line u,m,0,0.1\n{PHI}"}, "step 0.1 m, but"),
         ({"parameters": "REFERENCE_LINE_INCREMENT = 0.0\n"}, "INCREMENT = 0"),
-        ({"parameters": "REFERENCE_LINE_END_U = 1e300\n"}, "no whole number"),
+        ({"parameters": "REFERENCE_LINE_END_U = 1e300\n"}, "not a whole number"),
         ({"parameters": "LONG_SECTION_V_RIGHT = one\n"}, "line 8: .*KEY = number"),
         ({"blocks": "$ROAD_CRG_MODS\nSCALE_Z_GRID = 2.0\n"}, "SCALE_Z_GRID = 2"),
         ({"blocks": "$ROAD_CRG_OPTS\nBORDER_MODE_U = 1\n"}, "BORDER_MODE_U = 1"),
