@@ -23,6 +23,7 @@ _HOMES = {
     "roll": "tireroad.runs.library",
     "drive": "tireroad.runs.library",
     "make_road": "tireroad.contact.roads.road",
+    "radiate": "tireroad.greens.sound",
     "Material": "tireroad.fem.tire.material",
     "compound": "tireroad.fem.tire.material",
     "Turning": "tireroad.fem.turning",

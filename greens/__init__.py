@@ -10,6 +10,7 @@ _HOMES = {
     "Wheel": "coupling",
     "couple": "response",
     "make_response": "responses",
+    "radiate": "sound",
     "wheel_of": "coupling",
 }
 __all__ = sorted(_HOMES)

@@ -1,0 +1,458 @@
+"""Sound of a vibrating closed surface over a rigid road, by boundary elements and reciprocity.
+
+With e^{+iwt}, k = w/c and the image x' of x in the road z = 0,
+
+    G(x, y) = e^{-ikr} / (4 pi r) + e^{-ikr'} / (4 pi r'),    r = |x - y|,  r' = |x - y'|.
+
+For each microphone m the rigid body is solved in the field of a point source there (Burton and
+Miller, Proc. R. Soc. A 323 (1971) 201; n into the air),
+
+    [1/2 - D - alpha H] g = G(., x_m) + alpha dG(., x_m)/dn,
+    D g = int g dG/dn_y,   H g = d/dn_x int g dG/dn_y,
+
+and by reciprocity the pressure of the normal velocity v is  p(x_m) = i w rho int g v dS. All
+microphones are right-hand sides of one factorisation, and one more velocity costs a product.
+
+Elements are constant, with collocation at their centroids. The parts of the kernels that are
+singular at k = 0 are integrated in closed form over near elements and over near images, so that thin
+gaps between body and road need no small elements; the rest by Gauss points. The diagonal follows
+from the identities of a closed surface, sum_j D_ij = -1/2 and sum_j H_ij = 0 at k = 0. Below the
+first frequency at which the body's inside could resonate alpha = 0, which is more accurate; above
+it alpha = -i / max(k, 25 1/m). Elements that lie on the road are left out: body and image are closed
+without them.
+
+Of smooth bodies the pressure is within some 0.5 dB where the longest edge is a tenth of the wave
+length, 1 dB at 1/6.5; beyond a third of it the elements are refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import interpolate, linalg
+
+from tireroad.fem.errors import InputError
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Single = NDArray[np.complex64]
+
+ON_ROAD = 1e-6  # of the body's size: nodes this near to the road lie on it
+NEAR = 3.0  # element radii: nearer than that an element is integrated in closed form
+BLOCK = 400_000  # pairs of points at a time
+COUPLING = 25.0  # 1/m: least k of the coupling -i/k, which else dominates at low frequencies
+SAFE = 0.98  # of the lowest possible resonance inside, below which no coupling is needed
+PER_WAVE = 3.0  # longest edges on a wave length, at least
+APART = 60.0  # Hz between solved frequencies where many are asked for: 0.02 dB
+MIRROR = np.array([1.0, 1.0, -1.0])
+AWAY = 1e20  # m: distance given to pairs that are integrated otherwise
+CLOSED = 2e-4  # of the area: what the vector areas of a closed surface may add up to
+
+
+def radiate(
+    points: Array,
+    quads: NDArray[np.intp],
+    normal_velocity: Complex,
+    frequency: Array,
+    microphones: Array,
+    *,
+    road: bool = True,
+    speed_of_sound: float = 343.0,
+    density: float = 1.2,
+) -> Complex:
+    """Pressure (k, f) Pa at `microphones` (k, 3) m of a vibrating closed surface. Not collective.
+
+    `points` (n, 3) m, with the rigid `road` at z = 0; `quads` (m, 4) of them, outward, triangles with
+    a repeated node; `normal_velocity` (m, f) m/s of each element into the air at each `frequency`
+    (f,) Hz. Complex amplitudes for e^{+iwt}. `speed_of_sound` m/s and `density` kg/m3 of the air.
+    InputError for a surface that is open, faces inwards or reaches under the road, for microphones
+    inside it, under the road or nearer to an element than its size, and for frequencies that are
+    not positive or whose waves are shorter than three edges.
+    """
+    body = Body.of(points, quads, road)
+    velocity = np.atleast_2d(np.asarray(normal_velocity, complex))
+    hertz = np.atleast_1d(np.asarray(frequency, float))
+    listeners = np.atleast_2d(np.asarray(microphones, float))
+    if velocity.shape != (len(quads), len(hertz)):
+        raise InputError(
+            f"radiate: normal_velocity has shape {velocity.shape}; {len(quads)} elements and "
+            f"{len(hertz)} frequencies require {(len(quads), len(hertz))}"
+        )
+    if not (np.isfinite(velocity).all() and speed_of_sound > 0 and density > 0):
+        raise InputError("radiate: velocities must be finite, speed_of_sound and density positive")
+    body.check_frequencies(hertz, speed_of_sound)
+    body.check_microphones(listeners)
+    g = transfer(body, hertz, listeners, speed_of_sound)
+    moved = velocity[body.kept] * body.area[:, None]
+    return 2j * np.pi * hertz * density * np.einsum("fjk,jf->kf", g, moved)
+
+
+def transfer(body: Body, frequency: Array, microphones: Array, speed_of_sound: float) -> Complex:
+    """g (f, e, k) 1/m of the e elements for the microphones (k, 3), at frequencies (f,) Hz.
+
+    Where more are asked for than one in `APART` Hz, g is solved that far apart and interpolated by
+    a cubic spline of g e^{ikR}, R from the microphone to the body.
+    """
+    solved = np.unique(frequency)
+    far = int(np.ceil(np.ptp(solved) / APART)) + 1
+    if len(solved) > max(far, 4) + 1:
+        solved = np.linspace(solved[0], solved[-1], max(far, 4))
+    wave = 2 * np.pi / speed_of_sound
+    found = np.stack([body.solve(wave * f, microphones) for f in solved])
+    if np.array_equal(solved, frequency):
+        return found
+    if len(solved) == len(np.unique(frequency)):
+        return found[np.searchsorted(solved, frequency)]
+    apart = np.linalg.norm(microphones - body.center.mean(axis=0), axis=1)
+    ahead = np.exp(1j * wave * solved[:, None] * apart)[:, None]
+    smooth = interpolate.CubicSpline(solved, found * ahead)(frequency)
+    return smooth * np.exp(-1j * wave * frequency[:, None] * apart)[:, None]
+
+
+@dataclass(frozen=True)
+class Body:
+    """A closed surface of e quadrilaterals with `corners` (e, 4, 3) m, over a `road` or in free air.
+
+    `kept` (e,): their numbers among the elements given, of which those on the road are left out.
+    """
+
+    corners: Array
+    kept: NDArray[np.intp]
+    road: bool
+
+    @staticmethod
+    def of(points: Array, quads: NDArray[np.intp], road: bool) -> Body:
+        """The body of `radiate`; InputError where it is not closed or faces inwards."""
+        points, quads = np.asarray(points, float), np.asarray(quads)
+        if points.ndim != 2 or points.shape[1] != 3 or quads.ndim != 2 or quads.shape[1] != 4:
+            raise InputError("radiate: points are (n, 3) and quads (m, 4)")
+        if not np.isfinite(points).all() or quads.min() < 0 or quads.max() >= len(points):
+            raise InputError("radiate: points must be finite, and quads name points from 0 on")
+        corners = points[quads]
+        size = float(np.ptp(points[np.unique(quads)], axis=0).max())
+        if not road:
+            body = Body(corners, np.arange(len(quads)), False)
+        else:
+            if corners[..., 2].min() < -ON_ROAD * size:
+                raise InputError(
+                    f"radiate: the surface reaches {-1e3 * corners[..., 2].min():.3g} mm under the "
+                    "road at z = 0: move it up, or take road = False"
+                )
+            lies = (corners[..., 2] <= ON_ROAD * size).all(axis=1)
+            body = Body(corners[~lies], np.flatnonzero(~lies), True)
+        if not (body.area > 1e-12 * size**2).all():
+            raise InputError("radiate: an element has no area")
+        open_to = body.vector.sum(axis=0)
+        if road and body.corners[..., 2].min() <= ON_ROAD * size:
+            open_to[2] = 0.0  # the contact
+        if np.linalg.norm(open_to) > CLOSED * body.area.sum():
+            raise InputError(
+                f"radiate: the surface is not closed: its areas add up to {1e4 * np.linalg.norm(open_to):.3g} cm2; "
+                "close its holes, as those of a wheel by discs"
+            )
+        worst = float(np.abs(body.defect).max())
+        if worst > 0.25:
+            raise InputError(
+                f"radiate: the surface is not closed, or faces inwards: the solid angles seen from "
+                f"element {int(body.kept[np.abs(body.defect).argmax()])} are off by {worst:.2g} of a "
+                "sphere's half: close it, with corners in the order that turns counterclockwise from outside"
+            )
+        return body
+
+    @cached_property
+    def center(self) -> Array:
+        """Collocation points (e, 3) m: the means of the distinct corners."""
+        c = self.corners
+        triangle = (np.linalg.norm(c - np.roll(c, -1, axis=1), axis=2) == 0).sum(axis=1) == 1
+        mean = c.mean(axis=1)
+        for j in np.flatnonzero(triangle):
+            mean[j] = np.unique(c[j], axis=0).mean(axis=0)
+        return mean
+
+    @cached_property
+    def vector(self) -> Array:
+        """Vector areas (e, 3) m2, half the cross product of the diagonals."""
+        c = self.corners
+        return 0.5 * np.cross(c[:, 2] - c[:, 0], c[:, 3] - c[:, 1])
+
+    @cached_property
+    def area(self) -> Array:
+        """Areas (e,) m2."""
+        return np.linalg.norm(self.vector, axis=1)
+
+    @cached_property
+    def normal(self) -> Array:
+        """Unit normals (e, 3), into the air."""
+        return self.vector / self.area[:, None]
+
+    @cached_property
+    def radius(self) -> Array:
+        """Largest distance (e,) m of a corner from the centroid."""
+        return np.linalg.norm(self.corners - self.center[:, None], axis=2).max(axis=1)
+
+    @cached_property
+    def edge(self) -> float:
+        """The longest edge, m."""
+        c = self.corners
+        return float(np.linalg.norm(c - np.roll(c, -1, axis=1), axis=2).max())
+
+    def check_frequencies(self, frequency: Array, speed_of_sound: float) -> None:
+        """InputError for frequencies (f,) Hz that the elements cannot follow."""
+        if not (np.isfinite(frequency).all() and (frequency > 0).all()):
+            raise InputError("radiate: frequencies must be positive and finite")
+        most = speed_of_sound / (PER_WAVE * self.edge)
+        if frequency.max() > most:
+            raise InputError(
+                f"radiate: {frequency.max():.4g} Hz is beyond these elements, whose longest edge of "
+                f"{1e3 * self.edge:.3g} mm follows waves to {most:.4g} Hz: take smaller elements"
+            )
+
+    def check_microphones(self, place: Array) -> None:
+        """InputError for microphones (k, 3) m inside, under the road or on the surface."""
+        if place.shape[1] != 3 or not np.isfinite(place).all():
+            raise InputError("radiate: microphones are (k, 3), finite")
+        for k, x in enumerate(place):
+            if self.road and x[2] < 0:
+                raise InputError(f"radiate: microphone {k} lies under the road: z = {x[2]:.3g} m")
+            near = np.linalg.norm(self.center - x, axis=1) - self.radius
+            if near.min() < 0:
+                raise InputError(
+                    f"radiate: microphone {k} is nearer to element {int(self.kept[near.argmin()])} than its "
+                    f"size of {2e3 * self.radius[near.argmin()]:.3g} mm: move it away, or take smaller elements"
+                )
+            angles = [solid_angles(np.tile(x, (len(c), 1)), c).sum() for c in self._bodies]
+            if abs(sum(angles)) > 2 * np.pi:
+                raise InputError(f"radiate: microphone {k} lies inside the body")
+
+    @property
+    def _bodies(self) -> list[Array]:
+        """Corners of the elements and, over a road, of their images, outward (e, 4, 3)."""
+        own = self.corners
+        return [own, (own * MIRROR)[:, ::-1]] if self.road else [own]
+
+    def resonance(self, speed_of_sound: float = 1.0) -> float:
+        """A frequency (Hz) below which nothing inside can resonate with pressure zero all around.
+
+        The higher one of that of a box around the body and of a ball of its volume (Faber and
+        Krahn). A body that stands on the road is open to its image, and both count.
+        """
+        low, high = self.corners.min(axis=(0, 1)), self.corners.max(axis=(0, 1))
+        size, volume = high - low, float((self.center * self.vector).sum()) / 3
+        if self.road and low[2] <= ON_ROAD * size.max():
+            size[2], volume = 2 * size[2], 2 * volume
+        box = 0.5 * float(np.sqrt((size**-2.0).sum()))
+        return speed_of_sound * max(box, 0.5 / (3 * volume / (4 * np.pi)) ** (1 / 3))
+
+    def _gauss(self, count: int) -> tuple[Array, Array]:
+        """Points (e, q, 3) m and vector weights (e, q, 3) m2 of count x count points an element."""
+        at, weight = np.polynomial.legendre.leggauss(count)
+        s, t = (a.ravel() for a in np.meshgrid(at, at))
+        shape = np.stack(
+            [(1 - s) * (1 - t), (1 + s) * (1 - t), (1 + s) * (1 + t), (1 - s) * (1 + t)]
+        )
+        by_s = np.stack([-(1 - t), 1 - t, 1 + t, -(1 + t)])
+        by_t = np.stack([-(1 - s), -(1 + s), 1 + s, 1 - s])
+        place, along, across = (
+            np.einsum("aq,eac->eqc", part / 4, self.corners) for part in (shape, by_s, by_t)
+        )
+        return place, np.cross(along, across) * np.outer(weight, weight).ravel()[:, None]
+
+    @cached_property
+    def _near(self) -> tuple[list[NDArray[np.intp]], list[NDArray[np.intp]]]:
+        """Pairs of collocation points and near elements, or near images: rows and columns."""
+        rows, columns = [], []
+        for mirror in self._mirrors:
+            apart = np.linalg.norm(self.center[:, None] - self.center * mirror, axis=2)
+            i, j = np.nonzero(apart < NEAR * self.radius + self.radius)
+            rows.append(i)
+            columns.append(j)
+        return rows, columns
+
+    @property
+    def _mirrors(self) -> list[Array]:
+        return [np.ones(3), MIRROR] if self.road else [np.ones(3)]
+
+    @cached_property
+    def _closed(self) -> list[tuple[Array, Array, Array]]:
+        """D, H and S at k = 0 of the near pairs, in closed form; D and H of an element on itself 0."""
+        found: list[tuple[Array, Array, Array]] = []
+        for corners, i, j in zip(self._bodies, *self._near, strict=True):
+            x, n, c = self.center[i], self.normal[i], corners[j]
+            double = -solid_angles(x, c) / (4 * np.pi)
+            hyper = -(n * edge_field(x, c)).sum(axis=1) / (4 * np.pi)
+            if not found:
+                double[i == j] = hyper[i == j] = 0.0
+            found.append((double, hyper, potentials(x, c) / (4 * np.pi)))
+        return found
+
+    @cached_property
+    def _static(self) -> tuple[Array, Array]:
+        """Row sums (e,) of D and H at k = 0 over all elements and images but each on itself."""
+        sums = np.zeros((2, len(self.area)))
+        for rows, double, hyper in self._far(0.0, True):
+            sums[0, rows], sums[1, rows] = double.real.sum(axis=1), hyper.real.sum(axis=1)
+        for closed, i in zip(self._closed, self._near[0], strict=True):
+            np.add.at(sums[0], i, closed[0])
+            np.add.at(sums[1], i, closed[1])
+        return sums[0], sums[1]
+
+    @cached_property
+    def defect(self) -> Array:
+        """What the row sums of D lack of -1/2, (e,): small for a closed surface."""
+        return -0.5 - self._static[0]
+
+    def _far(self, k: float, hyper: bool) -> Iterator[tuple[slice, Single, Single]]:
+        """Blocks of rows of D and, if wanted, H over all pairs that are not near; those are 0."""
+        place, weight = self._gauss(2)
+        e, q = place.shape[:2]
+        size = max(BLOCK // (e * q), 1)
+        for first in range(0, e, size):
+            rows = slice(first, min(first + size, e))
+            x = self.center[rows].astype(np.float32)
+            n = self.normal[rows].astype(np.float32)
+            double = np.zeros((len(x), e), np.complex64)
+            second = np.zeros_like(double)
+
+            def total(values: NDArray[np.float32], count: int = len(x)) -> NDArray[np.float32]:
+                """The sum over an element's points."""
+                return values.reshape(count, e, q).sum(axis=2)
+
+            for mirror, i, j in zip(self._mirrors, *self._near, strict=True):
+                y = (place * mirror).reshape(-1, 3).astype(np.float32)
+                w = (weight * mirror).reshape(-1, 3).astype(np.float32)
+                d = y - x[:, None]
+                r = np.sqrt(np.einsum("ijc,ijc->ij", d, d))
+                own = (i >= rows.start) & (i < rows.stop)
+                near = r.reshape(len(x), e, q)
+                near[i[own] - rows.start, j[own]] = AWAY
+                part = 1 / r  # in single precision zero for what is far away, squared
+                b = np.einsum("ijc,jc->ij", d, w) * part
+                z = np.float32(k) * r
+                cos, sin = np.cos(z), np.sin(z)
+                scale = part / np.float32(4 * np.pi)
+                real, imaginary = part, np.float32(k)
+                double.real -= total((real * cos + imaginary * sin) * b * scale)
+                double.imag -= total((imaginary * cos - real * sin) * b * scale)
+                if hyper:
+                    b *= -np.einsum("ijc,ic->ij", d, n) * part
+                    both = (n @ w.T) * part
+                    real = (3 * part**2 - np.float32(k**2)) * b + part * both
+                    imaginary = np.float32(k) * (3 * part * b + both)
+                    second.real += total((real * cos + imaginary * sin) * scale)
+                    second.imag += total((imaginary * cos - real * sin) * scale)
+            yield rows, double, second
+
+    def _smooth(self, k: float) -> list[tuple[Complex, Complex]]:
+        """What D and H of the near pairs exceed their values at k = 0 by, with 4 x 4 points."""
+        place, weight = self._gauss(4)
+        found = []
+        for mirror, closed, i, j in zip(self._mirrors, self._closed, *self._near, strict=True):
+            x, n = self.center[i][:, None], self.normal[i][:, None]
+            d, w = (place * mirror)[j] - x, (weight * mirror)[j]
+            r = np.linalg.norm(d, axis=2)
+            z, a = k * r, -(d * n).sum(axis=2) / r
+            b, c = (d * w).sum(axis=2) / r, (w * n).sum(axis=2)
+            wave = np.exp(-1j * z)
+            double = -((1j * z + 1) * wave - 1) * b / (4 * np.pi * r**2)
+            hyper = ((3 + 3j * z - z**2) * wave - 3) * a * b
+            hyper += ((1 + 1j * z) * wave - 1 - z**2 / 2) * c
+            hyper = hyper / (4 * np.pi * r**3)
+            turned = (self.normal[i] * (self.normal * mirror)[j]).sum(axis=1)
+            more = turned * k**2 / 2 * closed[2]
+            found.append((double.sum(axis=1), hyper.sum(axis=1) + more))
+        return found
+
+    def solve(self, k: float, microphones: Array) -> Complex:
+        """g (e, m) 1/m at the wave number `k` (1/m) for the microphones (m, 3) m."""
+        alpha = 0.0 if k < 2 * np.pi * SAFE * self.resonance() else -1j / max(k, COUPLING)
+        e = len(self.area)
+        matrix = np.zeros((e, e), np.complex64)
+        for rows, double, hyper in self._far(k, alpha != 0):
+            matrix[rows] = -double - np.complex64(alpha) * hyper
+        for closed, more, i, j in zip(self._closed, self._smooth(k), *self._near, strict=True):
+            part = -(closed[0] + more[0]) - alpha * (closed[1] + more[1])
+            np.add.at(matrix, (i, j), part.astype(np.complex64))
+        own = np.arange(e)
+        matrix[own, own] += (0.5 - self.defect + alpha * self._static[1]).astype(np.complex64)
+        right = np.zeros((e, len(microphones)), complex)
+        for mirror in self._mirrors:
+            d = microphones * mirror - self.center[:, None]
+            r = np.linalg.norm(d, axis=2)
+            wave = np.exp(-1j * k * r) / (4 * np.pi * r)
+            slope = (d * self.normal[:, None]).sum(axis=2) / r * (1j * k + 1 / r) * wave
+            right += wave + alpha * slope
+        factor = linalg.lu_factor(matrix, overwrite_a=True, check_finite=False)
+        return linalg.lu_solve(factor, right.astype(np.complex64), check_finite=False)
+
+
+def solid_angles(x: Array, corners: Array) -> Array:
+    """Solid angles (p,) of quadrilaterals (p, 4, 3) seen from x (p, 3), of two triangles each.
+
+    Positive where the normal points away from x. Van Oosterom and Strackee, IEEE Trans. Biomed.
+    Eng. 30 (1983) 125.
+    """
+    a, b, c, d = np.moveaxis(corners - x[:, None], 1, 0)
+    return _triangle(a, b, c) + _triangle(a, c, d)
+
+
+def _triangle(a: Array, b: Array, c: Array) -> Array:
+    la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
+    volume = (a * np.cross(b, c)).sum(axis=1)
+    below = la * lb * lc + (a * b).sum(axis=1) * lc
+    below += (b * c).sum(axis=1) * la + (c * a).sum(axis=1) * lb
+    return 2 * np.arctan2(volume, below)
+
+
+def edge_field(x: Array, corners: Array) -> Array:
+    """Integrals (p, 3) of the law of Biot and Savart around quadrilaterals (p, 4, 3), at x (p, 3)."""
+    out = np.zeros_like(x)
+    for k in range(4):
+        a, b = corners[:, k] - x, corners[:, (k + 1) % 4] - x
+        la, lb = np.linalg.norm(a, axis=1), np.linalg.norm(b, axis=1)
+        below = la * lb * (la * lb + (a * b).sum(axis=1))
+        cross = np.cross(a, b) * (la + lb)[:, None]
+        out += np.where(below[:, None] > 0, cross / np.where(below > 0, below, 1.0)[:, None], 0.0)
+    return out
+
+
+def potentials(x: Array, corners: Array) -> Array:
+    """int 1/r (p,) m over quadrilaterals (p, 4, 3) from x (p, 3), two triangles each.
+
+    Wilton and others, IEEE Trans. Antennas Propag. 32 (1984) 276.
+    """
+    return _potential(x, corners[:, [0, 1, 2]]) + _potential(x, corners[:, [0, 2, 3]])
+
+
+def _potential(x: Array, corners: Array) -> Array:
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    size = np.linalg.norm(normal, axis=1)
+    flat = size > 0
+    normal = normal / np.where(flat, size, 1.0)[:, None]
+    h = ((x - corners[:, 0]) * normal).sum(axis=1)
+    out = np.zeros(len(x))
+    for k in range(3):
+        a, b = corners[:, k], corners[:, (k + 1) % 3]
+        along = b - a
+        length = np.linalg.norm(along, axis=1)
+        along = along / np.where(length > 0, length, 1.0)[:, None]
+        outward = np.cross(along, normal)
+        t = ((a - x) * outward).sum(axis=1)
+        low, high = ((a - x) * along).sum(axis=1), ((b - x) * along).sum(axis=1)
+        near, far = np.linalg.norm(a - x, axis=1), np.linalg.norm(b - x, axis=1)
+        root = t**2 + h**2
+        # From the end whose sum does not cancel.
+        forward = low + high >= 0
+        top = np.where(forward, far + high, near - low)
+        below = np.where(forward, near + low, far - high)
+        ratio = np.where((top > 0) & (below > 0), top / np.where(below > 0, below, 1.0), 1.0)
+        part = t * np.log(ratio)
+        part -= np.abs(h) * (
+            np.arctan2(t * high, root + np.abs(h) * far)
+            - np.arctan2(t * low, root + np.abs(h) * near)
+        )
+        out += np.where(length > 0, part, 0.0)
+    return np.where(flat, out, 0.0)
