@@ -177,7 +177,7 @@ class Body:
     def vector(self) -> Array:
         """Vector areas (e, 3) m2, half the cross product of the diagonals."""
         c = self.corners
-        return 0.5 * np.cross(c[:, 2] - c[:, 0], c[:, 3] - c[:, 1])
+        return np.asarray(np.cross(c[:, 2] - c[:, 0], c[:, 3] - c[:, 1]) / 2, float)
 
     @cached_property
     def area(self) -> Array:
