@@ -33,7 +33,7 @@ def db(found: np.ndarray, exact: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("n", [10, 14])
 def test_a_pulsating_and_an_oscillating_sphere(n: int) -> None:
     """Between first and second order in the elements; at 571.66 Hz, ka = pi, the inside resonates.
-    Of 600 elements: 0.5, 2.2 and 3.4 % (0.04, 0.19 and 0.29 dB)."""
+    Of 600 elements the amplitude is 0.5, 2.2 and 3.4 % off, the level 0.04, 0.07 and 0.15 dB."""
     points, quads = ball(n)
     f = np.array([100.0, 571.66, 1000.0])
     k, r = 2 * np.pi * f / C, np.linalg.norm(HERE, axis=1)[:, None]
@@ -43,6 +43,7 @@ def test_a_pulsating_and_an_oscillating_sphere(n: int) -> None:
     pulse = 1j * k * RHO * C * 0.09 * np.exp(-1j * k * (r - 0.3)) / (r * (1 + 0.3j * k))
     worst = np.abs(found / pulse - 1).max(axis=0)
     assert (worst < np.array([0.5, 3.0, 4.5]) / n**2).all()
+    assert (db(found, pulse).max(axis=0) < [0.05, 0.1, 0.2]).all()
     found = tr.radiate(points, quads, normal[:, :1] * np.ones(3), f, HERE, road=False)
 
     def wave(z):  # spherical Hankel function of the second kind and order 1, but for a factor
