@@ -60,8 +60,7 @@ from tireroad.runs.scene.sections.kinds.radial import RadialSection, built
 from tireroad.runs.scene.sections.kinds.torus import TorusSection
 from tireroad.runs.scene.tables.tire import NEAR_ROAD, Tire
 from tireroad.runs.stages.rolling import grown, make_loop
-from tireroad.runs.stages.stage import make_tire
-from tireroad.runs.stages.turning import rolling_shape
+from tireroad.runs.stages.stage import make_tire, rolling_shape
 
 P = ParamSpec("P")
 T = TypeVar("T")

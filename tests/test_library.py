@@ -142,7 +142,7 @@ def test_objects_of_the_wrong_kind_are_named_with_what_makes_the_right_ones(
         (lambda: tr.drive(rolling.standing, flat, duration=0.01), "tire .* Standing: .*roll"),
         (lambda: tr.drive(rolling, {"kind": "flat"}, duration=0.01), "road .* dict: .*make_road"),
         (lambda: tr.make_road({"kind": "flat"}), "make_road: .* give keys by name"),
-        (lambda: tr.make_road(5), "make_road: 5 is no road"),
+        (lambda: tr.make_road(5), "make_road: 5 is not a road"),
     ):
         with pytest.raises(tr.InputError, match=message):
             call()

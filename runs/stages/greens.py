@@ -23,8 +23,7 @@ from tireroad.runs.files.store import put
 from tireroad.runs.scene.tables.scene import PointForce, has_air
 from tireroad.runs.stages import cavity, corner
 from tireroad.runs.stages.setup import components, leaning, leaning_loads, points_of, probes
-from tireroad.runs.stages.stage import Computed, Done, Record
-from tireroad.runs.stages.turning import turning_of
+from tireroad.runs.stages.stage import Computed, Done, Record, turning_of
 
 _UNITS = {
     "eigenvalue": "1/s",

@@ -40,9 +40,10 @@ from tireroad.runs.stages.stage import (
     Record,
     Shared,
     checkpointed,
+    damping_of,
     forget_checkpoint,
+    shapes_of,
 )
-from tireroad.runs.stages.turning import damping_of, shapes_of
 
 _UNITS = {
     "squares": "1/s2",

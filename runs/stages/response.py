@@ -35,8 +35,7 @@ from tireroad.runs.stages.rolling import (
     shortest_period,
 )
 from tireroad.runs.stages.setup import driven_points
-from tireroad.runs.stages.stage import Computed, Done, Job, Record
-from tireroad.runs.stages.turning import turning_of
+from tireroad.runs.stages.stage import Computed, Done, Job, Record, turning_of
 
 Array = np.ndarray
 

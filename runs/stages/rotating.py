@@ -26,8 +26,7 @@ from tireroad.modal.rolling import RollingModes, full_states, rolling_modes
 from tireroad.modal.states import StateModes
 from tireroad.runs.files.store import put
 from tireroad.runs.stages import cavity, corner
-from tireroad.runs.stages.stage import Computed, Done, Job, Record, Shared
-from tireroad.runs.stages.turning import turning_of
+from tireroad.runs.stages.stage import Computed, Done, Job, Record, Shared, turning_of
 
 _STATES = {"eigenvalue": "1/s", "right": "-", "left": "s", "residual": "-", "left_residual": "-"}
 _BLOCK = {"block": "1/s", "block_right": "-", "block_left": "s"}

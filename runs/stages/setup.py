@@ -32,8 +32,7 @@ from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.scene.tables.contact import PatternTable
 from tireroad.runs.stages import corner, reuse
 from tireroad.runs.stages.rolling import run_time
-from tireroad.runs.stages.stage import Done, Job, Record, Shared
-from tireroad.runs.stages.turning import wheel_slip
+from tireroad.runs.stages.stage import Done, Job, Record, Shared, wheel_slip
 
 if TYPE_CHECKING:
     from tireroad.fem.static.footprint import TreadSurface

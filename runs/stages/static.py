@@ -37,9 +37,12 @@ from tireroad.runs.stages.stage import (
     Record,
     checkpointed,
     forget_checkpoint,
+    friction_of,
     road_shape,
+    rolling_shape,
+    turning_of,
+    wheel_slip,
 )
-from tireroad.runs.stages.turning import friction_of, rolling_shape, turning_of, wheel_slip
 
 _UNITS = {"points": "m", "force": "N", "area": "m2"}
 

@@ -22,9 +22,8 @@ from tireroad.fem.static.state import StaticState
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.scene.tables.scene import deflections
-from tireroad.runs.stages.stage import Computed, Done, Job, Record
+from tireroad.runs.stages.stage import Computed, Done, Job, Record, wheel_slip
 from tireroad.runs.stages.static import steady_rolling
-from tireroad.runs.stages.turning import wheel_slip
 
 AXES = ("longitudinal", "lateral")
 _COLUMNS = ("moved", "force", "tangent", "moment", "sticks")

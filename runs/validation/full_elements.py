@@ -36,7 +36,7 @@ from tireroad.runs.process import observe
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.pipeline import Finished, run_scene
 from tireroad.runs.stages.setup import leaning, leaning_loads, probes, scene_setup
-from tireroad.runs.stages.turning import turning_of
+from tireroad.runs.stages.stage import turning_of
 from tireroad.runs.validation.tables import Table
 
 

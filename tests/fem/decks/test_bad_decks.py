@@ -107,7 +107,7 @@ CASES = {
         {},
         r"line \d+: \"tire\" is not a number",
     ),
-    "label": (GOOD.replace("*ELEMENT", "7.5, 1., 0.\n*ELEMENT", 1), {}, r"7\.5 is no label"),
+    "label": (GOOD.replace("*ELEMENT", "7.5, 1., 0.\n*ELEMENT", 1), {}, r"7\.5 is not a label"),
     "cut short": (GOOD[: GOOD.index("*NSET") - 12], {}, r"line \d+: .*cut short"),
     "step without end": (GOOD + "*STEP\n*STATIC\n", {}, r"line \d+: \*STEP has no \*END STEP"),
     "zero byte": (GOOD[:300] + "\0" + GOOD[300:], {}, r"line \d+: a zero byte"),

@@ -191,7 +191,7 @@ def test_options_of_sbatch(monkeypatch) -> None:
     for key, told in (("signal", "leave it out"), ("ntasks", "give processes")):
         with pytest.raises(InputError, match=f"slurm.{key} is set by the program: {told}"):
             _directives({key: "4"})
-    with pytest.raises(InputError, match="no option of sbatch"):
+    with pytest.raises(InputError, match="not a one-line option of sbatch"):
         _directives({"partition": ["a", "b"]})
     monkeypatch.setenv("PYTHONPATH", "/a b:/c")
     assert _environment() == "export PYTHONPATH='/a b:/c'\n"

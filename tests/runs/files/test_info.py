@@ -51,7 +51,7 @@ def test_a_foreign_file_is_described_too(tmp_path: Path) -> None:
     text = describe(tmp_path / "other.h5")
     assert row(text, "name")[1:5] == ["()", "text", "none", "given"]
     assert "group/empty" in text
-    assert "no TOML" in text
+    assert "not TOML" in text
     with h5py.File(tmp_path / "bare.h5", "w"):
         pass
     assert "no datasets" in describe(tmp_path / "bare.h5")
@@ -74,7 +74,7 @@ def test_a_truncated_file_is_an_input_error(results: Path, tmp_path: Path, kept:
 
 
 def test_what_is_no_result_is_an_input_error(results: Path) -> None:
-    with pytest.raises(InputError, match="no HDF5 file"):
+    with pytest.raises(InputError, match="not an HDF5 file"):
         describe(results / "scene.toml")
     with pytest.raises(InputError, match="no such file"):
         describe(results / "absent.h5")

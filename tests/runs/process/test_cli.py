@@ -103,7 +103,7 @@ def test_wrong_commands_end_with_two(launch, tmp_path: Path, command: list[str])
     [
         (["sweep", "x.toml", "--local", "0"], "--local: 0: must be a whole number, 1 to 9999"),
         (["cache", "--clear", "--unused-for", "-1"], "-1: must be a number of days, 0 or more"),
-        (["cache", "--unused-for", "3"], "--unused-for belongs to --clear"),
+        (["cache", "--unused-for", "3"], "--unused-for requires --clear"),
     ],
 )
 def test_a_wrong_number_is_named(capsys, monkeypatch, command: list[str], words: str) -> None:

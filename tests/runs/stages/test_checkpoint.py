@@ -188,7 +188,7 @@ def test_what_is_damaged_is_not_taken(folder: Path, monkeypatch, capsys) -> None
     run(scene, folder / "broken", "static")
     if COMM.rank == 0:
         said = capsys.readouterr().out
-        assert "static_checkpoint exists, but it is damaged" in said and "goes on" not in said
+        assert "static_checkpoint exists, but it is damaged" in said and "continues" not in said
     assert_same(folder / "whole" / "static.h5", folder / "broken" / "static.h5", ROUNDING)
 
 
