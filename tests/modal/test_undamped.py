@@ -99,7 +99,7 @@ def test_no_mode_below_the_frequency():
 @pytest.mark.parametrize(
     ("wanted", "message"),
     [
-        ({}, "give count.* or up_to"),
+        ({}, "give either count .* or up_to"),
         ({"count": 5, "up_to": 100.0}, "not both"),
         ({"count": 0}, "count must be ≥ 1, not 0"),
         ({"count": -3}, "count must be ≥ 1"),

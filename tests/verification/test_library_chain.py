@@ -6,8 +6,9 @@ import h5py
 import numpy as np
 import pytest
 from mpi4py import MPI
+from scipy import sparse
 
-from tireroad.contact.loop import roll
+from tireroad.contact.loop import RoadNormal, roll
 from tireroad.contact.model import step_solver
 from tireroad.contact.results.spectra import amplitudes
 from tireroad.contact.roads.road import make_road
@@ -87,14 +88,16 @@ def test_the_chain_gives_what_the_program_gives(tire, tmp_path, launch) -> None:
     setup = contact_setup(
         static, tire.lattice, road, Rolled(speed=speed, duration=0.01, motion=still)
     )
-    probes = nodes(setup.patch.index, len(static.points), 2)
-    greens = make_response(
-        lambda: wheel_of(motions, rolling.turning), rolling, probes, probes, "static", lambda: modes
-    ).response
+    along, across, probes = (nodes(setup.patch.index, len(static.points), k) for k in range(3))
+    aside = sparse.vstack([along, across], "csr")
+    given = rolling, probes, probes, "static", lambda: modes, aside
+    greens = make_response(lambda: wheel_of(motions, rolling.turning), *given).response
     march = Recursion(response=greens.resolved(STEP), step=STEP, scheme="linear", comm=COMM)
     tread = SimpleNamespace(law=HalfSpace(youngs_modulus=2e7), solver="active-set")
-    solver = step_solver(tread, setup.patch, march.same_step)
-    steps = list(roll(march, solver, setup.patch, setup.drive, STEP, 200))
+    count = len(setup.patch.points)
+    solver = step_solver(tread, setup.patch, march.same_step[:, :count])
+    normal = RoadNormal(count)
+    steps = list(roll(march, solver, setup.patch, setup.drive, STEP, 200, normal=normal))
     force = np.array([[*step.horizontal.sum(axis=0), step.force.sum()] for step in steps])
     frequency, spectrum = amplitudes(force, STEP)
 

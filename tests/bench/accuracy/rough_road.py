@@ -23,6 +23,7 @@ from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.files.store import opened
 from tireroad.runs.process import observe
 from tireroad.runs.stages.pipeline import Finished, run_scene
+from tireroad.runs.stages.setup import leaning, leaning_loads
 from tireroad.runs.validation.full_elements import History, Trial, follow
 
 BAND = 500.0  # Hz: upper frequency of the errors
@@ -164,14 +165,17 @@ def fewer_modes(given: Prepared, count: int, residual: str) -> Response:
     run, job = given.run, given.run.job
     few = fewer(run.fields, run.motions, count, run.wheel.turning, job.axle)
     rolling = rolling_modes(few, run.wheel.turning, job.comm)
-    points = nodes(given.trial.setup.patch.index, len(run.static.points), 2)
-    pair = points, points, residual
-    return make_response(lambda: run.wheel, rolling, *pair, lambda: rolling.basis).response
+    setup = given.trial.setup
+    points = nodes(setup.patch.index, len(run.static.points), 2)
+    aside = leaning_loads(job, run.static, setup) if leaning(job) else None
+    several = points, points, residual, lambda: rolling.basis, aside
+    return make_response(lambda: run.wheel, rolling, *several).response
 
 
 def modal(given: Prepared, response: Response, step: float) -> History:
     """The loop on the states that the step resolves, without readings of the wheel."""
-    alone = response.between(slice(response.residual.shape[1]), slice(None)).resolved(step)
+    points = slice(len(given.trial.setup.patch.index))
+    alone = response.between(points, slice(None)).resolved(step)
     tire = Recursion(response=alone, step=step, scheme="linear", comm=MPI.COMM_SELF)
     with threadpool_limits(1, "blas"):
         return follow(given.trial, tire, step, 0.0)

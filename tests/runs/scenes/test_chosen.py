@@ -56,9 +56,18 @@ def test_a_table_within_an_array_is_fitted_too(scene_file) -> None:
 @pytest.mark.parametrize(
     ("items", "word"),
     [
-        (["contact.tread=winkler", "contact.poisson_ratio=0.4"], "contact.poisson_ratio is only valid for"),
-        (["road.motion.kind=ramp", "road.motion.frequency=9"], "road.motion.frequency is only valid for"),
-        (['contact={tread="winkler",youngs_modulus=1e7}'], "contact.youngs_modulus is only valid for"),
+        (
+            ["contact.tread=winkler", "contact.poisson_ratio=0.4"],
+            "contact.poisson_ratio is only valid for",
+        ),
+        (
+            ["road.motion.kind=ramp", "road.motion.frequency=9"],
+            "road.motion.frequency is only valid for",
+        ),
+        (
+            ['contact={tread="winkler",youngs_modulus=1e7}'],
+            "contact.youngs_modulus is only valid for",
+        ),
         (["road.wavelength=0.1"], "road.wavelength is only valid for kind = sine"),
         (["road.kind=grid"], "road needs file"),
         (["contact.tread=jelly"], "contact.tread must be one of"),
