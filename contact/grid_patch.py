@@ -25,7 +25,7 @@ from scipy import sparse
 from scipy.optimize import brentq
 from scipy.sparse.linalg import LinearOperator
 
-from tireroad.contact.loop import looking_ahead
+from tireroad.contact.loop import RoadNormal, looking_ahead
 from tireroad.contact.patch import Patch
 from tireroad.contact.solver.conditions import ContactSolver
 from tireroad.contact.tread.kernel import GridPlaces
@@ -238,6 +238,15 @@ class OnPoints:
 
     def _answer(self, force: np.ndarray) -> np.ndarray:
         return self._weights @ (self._answers @ (self._transposed @ force))
+
+
+def on_points(tire: Any, patch: Patch) -> tuple[Any, RoadNormal | None]:
+    """The tire as seen at the points of the patch, and the road's normal if its forces have three
+    components."""
+    seen, pushed = (count // len(patch.index) for count in tire.same_step.shape)
+    if patch.weights is not None:
+        tire = OnPoints(tire, patch.weights, seen, pushed)
+    return tire, RoadNormal(len(patch.points)) if pushed == 3 else None
 
 
 ACROSS = 8  # points across the footprint below which twice their spacing gives no estimate

@@ -310,7 +310,7 @@ def roll(
     """
     count = len(patch.points)
     still = np.zeros((count, 2))
-    begun = horizontal = still if patch.pull is None else patch.pull
+    rest = still if patch.pull is None or friction else patch.pull
     # The first step starts from the static contact set, later ones from the solver's last one.
     touching = None if done else patch.force > 0
     answer = LoadedColumns.of(tire.same_step, tire.comm)
@@ -324,17 +324,14 @@ def roll(
         while True:
             solve = partial(_contact, solver, friction, patch, tread, road, touching, lifted)
             free, found = together(predict, solve, friction is not None)
-            vertical = found.force
-            if friction:
-                horizontal = found.horizontal
+            tangential = found.horizontal if friction else still
+            vertical, horizontal = found.force, rest + tangential
             if normal:
-                more = normal.settle(slope, found.force, horizontal if friction else still)
-                more = more.reshape(3, count)
-                vertical = vertical + more[0]
-                horizontal = (horizontal if friction else begun) + more[1:].T
+                more = normal.settle(slope, found.force, tangential).reshape(3, count)
+                vertical, horizontal = vertical + more[0], horizontal + more[1:].T
             change = vertical - patch.force
             if friction or normal:
-                change = np.concatenate([change, *(horizontal - (still if friction else begun)).T])
+                change = np.concatenate([change, *(horizontal - rest).T])
             touching = None
             again = settle(change) if settle else None
             if again is None:

@@ -107,18 +107,15 @@ class ContactSetup:
     def _slope(self, along: np.ndarray, across: np.ndarray) -> np.ndarray:
         """Slopes (n, c, 2) of a road that is smooth over a point's rectangle, by differences."""
         x0, x1, y0, y1 = self.patch.extent
-        low, high = (x0, y0), (min(x1 + self.rolled.travel, self.road.end), y1)
-        out = np.zeros((*along.shape, 2))
-        for axis in (0, 1):
-            near, far = (
-                np.clip(
-                    (along, across)[axis] + sign * _APART * self.patch.half_sizes[:, axis], *ends
-                )
-                for sign, ends in ((s, (low[axis], high[axis])) for s in (-1, 1))
-            )
-            ends = [(near, across), (far, across)] if axis == 0 else [(along, near), (along, far)]
-            before, after = (self.road.height(x, y) for x, y in ends)
-            out[..., axis] = (after - before) / np.maximum(far - near, 1e-12)
+        bounds = (x0, min(x1 + self.rolled.travel, self.road.end)), (y0, y1)
+        out, apart = np.zeros((*along.shape, 2)), _APART * self.patch.half_sizes
+        for axis, here in enumerate((along, across)):
+            ends = [
+                np.clip(here + step, *bounds[axis]) for step in (-apart[:, axis], apart[:, axis])
+            ]
+            places = [(end, across) if axis == 0 else (along, end) for end in ends]
+            before, after = (self.road.height(x, y) for x, y in places)
+            out[..., axis] = (after - before) / np.maximum(ends[1] - ends[0], 1e-12)
         return out
 
     @property

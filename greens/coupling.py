@@ -243,20 +243,17 @@ class Wheel:
             raise InputError(
                 "greens.residual: second-order is not available for a wheel that moves"
             )
-        r, k, same = outputs.shape[0], loads.shape[0], outputs is loads
+        r, same = outputs.shape[0], outputs is loads
         probes = loads if same else sparse.vstack([outputs, loads], format="csr")
-        every = np.arange(k) if same else np.arange(r, r + k)
         if option == "attachment":
             assert modes is not None, "attachment modes need the modes on all unknowns"
             whole = self._attached(basis, modes, probes, light)
-            more = 0 if light is None else light.shape[0]
-            every = np.append(every, np.arange(probes.shape[0], probes.shape[0] + more))
-        elif light is None:
-            whole = self._of_second_order(basis, probes)
         else:
-            whole = self._of_second_order(basis, sparse.vstack([probes, light], format="csr"))
-            every = np.append(every, np.arange(probes.shape[0], len(whole.residual)))
-        return whole if same and light is None else whole.between(slice(r), every)
+            if light is not None:
+                probes = sparse.vstack([probes, light], format="csr")
+            whole = self._of_second_order(basis, probes)
+        forces = slice(0 if same else r, None)
+        return whole if same and light is None else whole.between(slice(r), forces)
 
     def _of_second_order(self, basis: Basis, probes: Probes) -> Response:
         """The states, and residual states in place of the truncated modes. Collective."""

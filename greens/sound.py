@@ -97,15 +97,11 @@ def transfer(body: Body, frequency: Array, microphones: Array, speed_of_sound: f
     Where more are asked for than one in `APART` Hz, g is solved that far apart and interpolated by
     a cubic spline of g e^{ikR}, R from the microphone to the body.
     """
-    solved = np.unique(frequency)
-    far = int(np.ceil(np.ptp(solved) / APART)) + 1
-    if len(solved) > max(far, 4) + 1:
-        solved = np.linspace(solved[0], solved[-1], max(far, 4))
-    wave = 2 * np.pi / speed_of_sound
+    every, wave = np.unique(frequency), 2 * np.pi / speed_of_sound
+    few = max(int(np.ceil(np.ptp(every) / APART)) + 1, 4)
+    solved = every if len(every) <= few + 1 else np.linspace(every[0], every[-1], few)
     found = np.stack([body.solve(wave * f, microphones) for f in solved])
-    if np.array_equal(solved, frequency):
-        return found
-    if len(solved) == len(np.unique(frequency)):
+    if solved is every:
         return found[np.searchsorted(solved, frequency)]
     apart = np.linalg.norm(microphones - body.center.mean(axis=0), axis=1)
     ahead = np.exp(1j * wave * solved[:, None] * apart)[:, None]

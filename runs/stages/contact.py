@@ -520,7 +520,7 @@ class ContactStage(Stage[ContactHistory]):
             return Leaning(every[:0], every, None)
         rolling, shape = self.rotating.product, np.zeros((2 * p, 0))
         if Motion.known(rolling, response):
-            probes = leaning_loads(self.job, self.static.product, setup)
+            probes = leaning_loads(self.static.product, setup)
             shape = Basis.of(rolling).seen(probes)
         return Leaning(every[p : 3 * p], np.r_[every[:p], every[3 * p :]], shape)
 

@@ -133,9 +133,7 @@ class GreensStage(Computed[Responses]):
         """The forces of the road's slope, as wide as the other probes; None if there are none."""
         if not self._leaning:
             return None
-        found = leaning_loads(self.job, self.static.product, self.setup.product)
-        found.resize(found.shape[0], width)
-        return found
+        return leaning_loads(self.static.product, self.setup.product, width)
 
     @property
     def _wanted(self) -> Wanted:

@@ -19,8 +19,8 @@ from typing import NamedTuple
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from tireroad.contact.grid_patch import OnPoints
-from tireroad.contact.loop import Driven, Loop, RoadNormal, equal_steps, roll, steps_of
+from tireroad.contact.grid_patch import on_points
+from tireroad.contact.loop import Driven, Loop, equal_steps, roll, steps_of
 from tireroad.contact.model import step_solver, tread_memory, tread_shear
 from tireroad.contact.patch import Patch
 from tireroad.contact.results.chatter import Chosen, choose, oscillation
@@ -203,10 +203,7 @@ def make_loop(spec, setup: ContactSetup, tire, step: float) -> Loop:
     friction = None
     if spec.rubs:
         friction = _friction(spec, setup, tire, step, at_once)
-    seen, pushed = (count // p for count in tire.same_step.shape)
-    if patch.weights is not None:
-        tire = OnPoints(tire, patch.weights, seen, pushed)
-    normal = RoadNormal(len(patch.points)) if pushed == 3 else None
+    tire, normal = on_points(tire, patch)
     return Loop(tire, solver, friction, memory, normal)
 
 

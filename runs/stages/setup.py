@@ -223,9 +223,16 @@ def leaning(job: Job) -> bool:
     return job.scene.horizontal_forces and not job.scene.contact.rubs
 
 
-def leaning_loads(job: Job, state: StaticState, setup: ContactSetup) -> sparse.csr_matrix:
-    """The forces (2 p, 3 s) of the road's slope on the nodes of the patch: all x, then all y."""
-    return sparse.vstack([_on_nodes(state, setup, part) for part in (0, 1)], format="csr")
+def leaning_loads(
+    state: StaticState, setup: ContactSetup, width: int | None = None
+) -> sparse.csr_matrix:
+    """The forces (2 p, 3 s) of the road's slope on the nodes of the patch: all x, then all y.
+
+    `width`: that of other probes beside them, which also read the wheel.
+    """
+    loads = sparse.vstack([_on_nodes(state, setup, part) for part in (0, 1)], format="csr")
+    loads.resize(loads.shape[0], width or loads.shape[1])
+    return loads
 
 
 def _on_nodes(state: StaticState, setup: ContactSetup, part: int) -> sparse.csr_matrix:

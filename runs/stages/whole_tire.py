@@ -41,8 +41,7 @@ def driven_loads(job: Job, state: StaticState, setup: ContactSetup | None) -> sp
     forces = loads[patch : patch + len(job.scene.force)]
     if not leaning(job):
         return loads[: patch + len(job.scene.force)]
-    aside = leaning_loads(job, state, setup)
-    aside.resize(aside.shape[0], loads.shape[1])
+    aside = leaning_loads(state, setup, loads.shape[1])
     return sparse.vstack([loads[:patch], aside, forces], format="csr")
 
 

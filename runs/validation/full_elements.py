@@ -18,8 +18,8 @@ from mpi4py import MPI
 from scipy import sparse
 from threadpoolctl import threadpool_limits
 
-from tireroad.contact.grid_patch import OnPoints
-from tireroad.contact.loop import RoadNormal, roll
+from tireroad.contact.grid_patch import on_points
+from tireroad.contact.loop import roll
 from tireroad.contact.model import Spec, step_solver
 from tireroad.contact.results.spectra import BAND, Distance, distance
 from tireroad.contact.setup import ContactSetup
@@ -71,10 +71,7 @@ def follow(trial: Trial, tire, step: float, setup: float) -> History:
     patch, drive = trial.setup.patch, trial.setup.drive
     p = len(patch.index)
     solver = step_solver(trial.spec, patch, tire.same_step[:p, :p])
-    seen, pushed = (count // p for count in tire.same_step.shape)
-    if patch.weights is not None:
-        tire = OnPoints(tire, patch.weights, seen, pushed)
-    normal = RoadNormal(len(patch.points)) if pushed == 3 else None
+    tire, normal = on_points(tire, patch)
     steps = round(trial.duration / step)
     contact, axle = np.zeros((2, steps, 3))
     moved = np.zeros((steps, len(patch.points)))
@@ -166,7 +163,7 @@ class Tires:
         setup = scene_setup(self.job, static) if contact else None
         self.probes = probes(self.job, static, setup)
         leans = setup is not None and leaning(self.job)
-        self.aside = leaning_loads(self.job, static, setup) if leans else None
+        self.aside = leaning_loads(static, setup) if leans else None
         if setup:
             self.trial = Trial(contact, setup, self.job.scene.time.duration)
 

@@ -167,7 +167,7 @@ def fewer_modes(given: Prepared, count: int, residual: str) -> Response:
     rolling = rolling_modes(few, run.wheel.turning, job.comm)
     setup = given.trial.setup
     points = nodes(setup.patch.index, len(run.static.points), 2)
-    aside = leaning_loads(job, run.static, setup) if leaning(job) else None
+    aside = leaning_loads(run.static, setup) if leaning(job) else None
     several = points, points, residual, lambda: rolling.basis, aside
     return make_response(lambda: run.wheel, rolling, *several).response
 
