@@ -24,6 +24,7 @@ _HOMES = {
     "drive": "tireroad.runs.library",
     "make_road": "tireroad.contact.roads.road",
     "radiate": "tireroad.greens.sound",
+    "listen": "tireroad.runs.stages.sound",
     "Material": "tireroad.fem.tire.material",
     "compound": "tireroad.fem.tire.material",
     "Turning": "tireroad.fem.turning",

@@ -27,7 +27,7 @@ length, 1 dB at 1/6.5; beyond a third of it the elements are refused.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -49,7 +49,7 @@ SAFE = 0.98  # of the lowest possible resonance inside, below which no coupling 
 PER_WAVE = 3.0  # longest edges on a wave length, at least
 APART = 60.0  # Hz between solved frequencies where many are asked for: 0.02 dB
 MIRROR = np.array([1.0, 1.0, -1.0])
-AWAY = 1e20  # m: distance given to pairs that are integrated otherwise
+AWAY = 1e20  # m2: square of the distance given to pairs that are integrated otherwise
 CLOSED = 2e-4  # of the area: what the vector areas of a closed surface may add up to
 
 
@@ -140,24 +140,29 @@ class Body:
                 )
             lies = (corners[..., 2] <= ON_ROAD * size).all(axis=1)
             body = Body(corners[~lies], np.flatnonzero(~lies), True)
-        if not (body.area > 1e-12 * size**2).all():
-            raise InputError("radiate: an element has no area")
-        open_to = body.vector.sum(axis=0)
-        if road and body.corners[..., 2].min() <= ON_ROAD * size:
+        return body.checked("radiate")
+
+    def checked(self, owner: str) -> Body:
+        """The body itself; InputError, which names the `owner`, where it is not closed or faces inwards."""
+        size = float(np.ptp(self.corners, axis=(0, 1)).max())
+        if not (self.area > 1e-12 * size**2).all():
+            raise InputError(f"{owner}: an element has no area")
+        open_to = self.vector.sum(axis=0)
+        if self.road and self.corners[..., 2].min() <= ON_ROAD * size:
             open_to[2] = 0.0  # the contact
-        if np.linalg.norm(open_to) > CLOSED * body.area.sum():
+        if np.linalg.norm(open_to) > CLOSED * self.area.sum():
             raise InputError(
-                f"radiate: the surface is not closed: its areas add up to {1e4 * np.linalg.norm(open_to):.3g} cm2; "
+                f"{owner}: the surface is not closed: its areas add up to {1e4 * np.linalg.norm(open_to):.3g} cm2; "
                 "close its holes, as those of a wheel by discs"
             )
-        worst = float(np.abs(body.defect).max())
+        worst = float(np.abs(self.defect).max())
         if worst > 0.25:
             raise InputError(
-                f"radiate: the surface is not closed, or faces inwards: the solid angles seen from "
-                f"element {int(body.kept[np.abs(body.defect).argmax()])} are off by {worst:.2g} of a "
+                f"{owner}: the surface is not closed, or faces inwards: the solid angles seen from "
+                f"element {int(self.kept[np.abs(self.defect).argmax()])} are off by {worst:.2g} of a "
                 "sphere's half: close it, with corners in the order that turns counterclockwise from outside"
             )
-        return body
+        return self
 
     @cached_property
     def center(self) -> Array:
@@ -207,22 +212,25 @@ class Body:
                 f"{1e3 * self.edge:.3g} mm follows waves to {most:.4g} Hz: take smaller elements"
             )
 
-    def check_microphones(self, place: Array) -> None:
+    def check_microphones(
+        self, place: Array, owner: str = "radiate", names: Sequence[str] = ()
+    ) -> None:
         """InputError for microphones (k, 3) m inside, under the road or on the surface."""
         if place.shape[1] != 3 or not np.isfinite(place).all():
-            raise InputError("radiate: microphones are (k, 3), finite")
+            raise InputError(f"{owner}: microphones are (k, 3), finite")
         for k, x in enumerate(place):
+            who = f"{owner}: microphone {names[k] if names else k}"
             if self.road and x[2] < 0:
-                raise InputError(f"radiate: microphone {k} lies under the road: z = {x[2]:.3g} m")
+                raise InputError(f"{who} lies under the road: z = {x[2]:.3g} m")
             near = np.linalg.norm(self.center - x, axis=1) - self.radius
             if near.min() < 0:
                 raise InputError(
-                    f"radiate: microphone {k} is nearer to element {int(self.kept[near.argmin()])} than its "
+                    f"{who} is nearer to element {int(self.kept[near.argmin()])} than its "
                     f"size of {2e3 * self.radius[near.argmin()]:.3g} mm: move it away, or take smaller elements"
                 )
             angles = [solid_angles(np.tile(x, (len(c), 1)), c).sum() for c in self._bodies]
             if abs(sum(angles)) > 2 * np.pi:
-                raise InputError(f"radiate: microphone {k} lies inside the body")
+                raise InputError(f"{who} lies inside the body")
 
     @property
     def _bodies(self) -> list[Array]:
@@ -243,7 +251,7 @@ class Body:
         box = 0.5 * float(np.sqrt((size**-2.0).sum()))
         return speed_of_sound * max(box, 0.5 / (3 * volume / (4 * np.pi)) ** (1 / 3))
 
-    def _gauss(self, count: int) -> tuple[Array, Array]:
+    def points_and_weights(self, count: int) -> tuple[Array, Array]:
         """Points (e, q, 3) m and vector weights (e, q, 3) m2 of count x count points an element."""
         at, weight = np.polynomial.legendre.leggauss(count)
         s, t = (a.ravel() for a in np.meshgrid(at, at))
@@ -302,64 +310,87 @@ class Body:
         return -0.5 - self._static[0]
 
     def _far(self, k: float, hyper: bool) -> Iterator[tuple[slice, Single, Single]]:
-        """Blocks of rows of D and, if wanted, H over all pairs that are not near; those are 0."""
-        place, weight = self._gauss(2)
+        """Blocks of rows of D and, if wanted, H over all pairs that are not near; those are 0.
+
+        Distances and their products with normals by products of matrices, in single precision,
+        about the body's middle.
+        """
+        place, weight = self.points_and_weights(2)
         e, q = place.shape[:2]
-        size = max(BLOCK // (e * q), 1)
+        middle = self.center.mean(axis=0)
+        wave, size = np.float32(k), max(BLOCK // (e * q), 1)
         for first in range(0, e, size):
             rows = slice(first, min(first + size, e))
-            x = self.center[rows].astype(np.float32)
+            count = rows.stop - first
             n = self.normal[rows].astype(np.float32)
-            double = np.zeros((len(x), e), np.complex64)
+            double = np.zeros((count, e), np.complex64)
             second = np.zeros_like(double)
 
-            def total(values: NDArray[np.float32], count: int = len(x)) -> NDArray[np.float32]:
+            def total(values: NDArray[np.float32], count: int = count) -> NDArray[np.float32]:
                 """The sum over an element's points."""
-                return values.reshape(count, e, q).sum(axis=2)
+                return values.reshape(count, q, e).sum(axis=1)
 
             for mirror, i, j in zip(self._mirrors, *self._near, strict=True):
-                y = (place * mirror).reshape(-1, 3).astype(np.float32)
-                w = (weight * mirror).reshape(-1, 3).astype(np.float32)
-                d = y - x[:, None]
-                r = np.sqrt(np.einsum("ijc,ijc->ij", d, d))
+                # Both relative to a point that lies near both where they are near each other.
+                about = middle if mirror[2] > 0 else middle * [1, 1, 0]
+                y = np.swapaxes(place * mirror - about, 0, 1).reshape(-1, 3).astype(np.float32)
+                w = np.swapaxes(weight * mirror, 0, 1).reshape(-1, 3).astype(np.float32)
+                x = (self.center[rows] - about).astype(np.float32)
+                square = x @ (-2 * y.T)
+                square += (x * x).sum(axis=1)[:, None]
+                square += (y * y).sum(axis=1)
                 own = (i >= rows.start) & (i < rows.stop)
-                near = r.reshape(len(x), e, q)
-                near[i[own] - rows.start, j[own]] = AWAY
-                part = 1 / r  # in single precision zero for what is far away, squared
-                b = np.einsum("ijc,jc->ij", d, w) * part
-                z = np.float32(k) * r
+                near = square.reshape(count, q, e)
+                near[i[own] - rows.start, :, j[own]] = AWAY
+                r = np.sqrt(square, out=square)
+                part = 1 / r
+                b = (y * w).sum(axis=1) - x @ w.T
+                b *= part
+                z = wave * r
                 cos, sin = np.cos(z), np.sin(z)
                 scale = part / np.float32(4 * np.pi)
-                real, imaginary = part, np.float32(k)
-                double.real -= total((real * cos + imaginary * sin) * b * scale)
-                double.imag -= total((imaginary * cos - real * sin) * b * scale)
+                cos *= scale
+                sin *= scale
+                double.real -= total((part * cos + wave * sin) * b)
+                double.imag -= total((wave * cos - part * sin) * b)
                 if hyper:
-                    b *= -np.einsum("ijc,ic->ij", d, n) * part
+                    b *= ((n * x).sum(axis=1)[:, None] - n @ y.T) * part
                     both = (n @ w.T) * part
-                    real = (3 * part**2 - np.float32(k**2)) * b + part * both
-                    imaginary = np.float32(k) * (3 * part * b + both)
-                    second.real += total((real * cos + imaginary * sin) * scale)
-                    second.imag += total((imaginary * cos - real * sin) * scale)
+                    real = (3 * part**2 - wave**2) * b + part * both
+                    imaginary = wave * (3 * part * b + both)
+                    second.real += total(real * cos + imaginary * sin)
+                    second.imag += total(imaginary * cos - real * sin)
             yield rows, double, second
 
-    def _smooth(self, k: float) -> list[tuple[Complex, Complex]]:
-        """What D and H of the near pairs exceed their values at k = 0 by, with 4 x 4 points."""
-        place, weight = self._gauss(4)
-        found = []
-        for mirror, closed, i, j in zip(self._mirrors, self._closed, *self._near, strict=True):
-            x, n = self.center[i][:, None], self.normal[i][:, None]
-            d, w = (place * mirror)[j] - x, (weight * mirror)[j]
+    @cached_property
+    def _around(self) -> list[tuple[Array, ...]]:
+        """Of the near pairs (p,), at 4 x 4 points: r, a, b and c (16, p) of `_smooth`, and n.n' (p,)."""
+        place, weight = self.points_and_weights(4)
+        found: list[tuple[Array, ...]] = []
+        for mirror, i, j in zip(self._mirrors, *self._near, strict=True):
+            x, n = self.center[i], self.normal[i]
+            d = np.moveaxis((place * mirror)[j], 1, 0) - x
+            w = np.moveaxis((weight * mirror)[j], 1, 0)
             r = np.linalg.norm(d, axis=2)
-            z, a = k * r, -(d * n).sum(axis=2) / r
-            b, c = (d * w).sum(axis=2) / r, (w * n).sum(axis=2)
-            wave = np.exp(-1j * z)
+            a, b = -(d * n).sum(axis=2) / r, (d * w).sum(axis=2) / r
+            turned = (n * (self.normal * mirror)[j]).sum(axis=1)
+            found.append((r, a, b, (w * n).sum(axis=2), turned))
+        return found
+
+    def _smooth(self, k: float, hyper: bool) -> list[tuple[Complex, Complex]]:
+        """What D and, if wanted, H of the near pairs exceed their values at k = 0 by."""
+        found = []
+        for (r, a, b, c, turned), closed in zip(self._around, self._closed, strict=True):
+            z = k * r
+            wave = np.cos(z) - 1j * np.sin(z)
             double = -((1j * z + 1) * wave - 1) * b / (4 * np.pi * r**2)
-            hyper = ((3 + 3j * z - z**2) * wave - 3) * a * b
-            hyper += ((1 + 1j * z) * wave - 1 - z**2 / 2) * c
-            hyper = hyper / (4 * np.pi * r**3)
-            turned = (self.normal[i] * (self.normal * mirror)[j]).sum(axis=1)
+            second = np.zeros((1, len(turned)), complex)
+            if hyper:
+                second = ((3 + 3j * z - z**2) * wave - 3) * (a * b)
+                second += ((1 + 1j * z) * wave - 1 - z**2 / 2) * c
+                second /= 4 * np.pi * r**3
             more = turned * k**2 / 2 * closed[2]
-            found.append((double.sum(axis=1), hyper.sum(axis=1) + more))
+            found.append((double.sum(axis=0), second.sum(axis=0) + more))
         return found
 
     def solve(self, k: float, microphones: Array) -> Complex:
@@ -369,7 +400,9 @@ class Body:
         matrix = np.zeros((e, e), np.complex64)
         for rows, double, hyper in self._far(k, alpha != 0):
             matrix[rows] = -double - np.complex64(alpha) * hyper
-        for closed, more, i, j in zip(self._closed, self._smooth(k), *self._near, strict=True):
+        for closed, more, i, j in zip(
+            self._closed, self._smooth(k, alpha != 0), *self._near, strict=True
+        ):
             part = -(closed[0] + more[0]) - alpha * (closed[1] + more[1])
             np.add.at(matrix, (i, j), part.astype(np.complex64))
         own = np.arange(e)

@@ -38,8 +38,8 @@ A rolling tire on a rough road: finite elements, modes, Green's functions, conta
 `mpirun -n N python3 -m runs COMMAND` is the same program in a batch script.
 """
 RUN = """\
-Runs the stages static, modes, rotating, greens, contact, accuracy, response, spectra, vibration, motion, report,
-as far as the scene needs them. Stages already computed from the same inputs are reused unless --fresh.
+Runs the stages static, radiation, modes, rotating, greens, contact, accuracy, response, spectra, vibration, sound,
+motion, report, as far as the scene needs them. Stages already computed from the same inputs are reused unless --fresh.
 """
 REPRODUCE = """\
 Computes the figures and tables of the thesis anew: a page with a picture beside what the thesis shows, what

@@ -26,6 +26,7 @@ from tireroad.fem.errors import InputError
 from tireroad.runs.files.disk import replacing
 from tireroad.runs.files.folder import left_out
 from tireroad.runs.files.store import opened
+from tireroad.runs.files.wave import wave_file
 
 SHAPES = 20  # modes written
 INSTANTS = 400  # contact states written: each takes 1 kB of page and an entry of the time slider
@@ -191,7 +192,7 @@ NAMES = {  # levels in third_octave/ whose names do not give the quantity
 }
 MADE = {
     *(f"{name}.csv" for name in ("footprint", "modes", "contact_force", "spectra", "third_octave")),
-    *(f"{name}.csv" for name in ("density", "response", "receptance", "vibration")),
+    *(f"{name}.csv" for name in ("density", "response", "receptance", "vibration", "sound")),
     *(f"{name}.xdmf" for name in ("static", "modes", "contact", "motion")),
     *(f"{name}_fields.h5" for name in ("static", "modes", "contact", "motion")),
 }
@@ -230,6 +231,9 @@ def export(directory: Path) -> list[Path]:
             write(part)
     for name in MADE - files.keys():
         (folder / name).unlink(missing_ok=True)
+    for old in folder.glob("sound_*_Pa.wav"):
+        if old.name not in files:
+            old.unlink()
     return [folder / name for name in files]
 
 
@@ -374,6 +378,30 @@ def vibration(file: h5py.File) -> dict[str, Callable[[Path], object]]:
     return _table("vibration.csv", columns)
 
 
+def sound(file: h5py.File) -> dict[str, Callable[[Path], object]]:
+    """sound.csv: third octaves at the microphones; a WAV file each, whose name says its full scale."""
+    centre, names = file["third_octave/centre"][()], file.attrs["microphone_names"]
+    columns = {"band [Hz]": nominal(centre), "exact centre of the band [Hz]": centre}
+    for key, unit in (
+        ("level", "dB re 20 uPa"),
+        ("level_a", "dB(A) re 20 uPa"),
+        ("level_error", "dB"),
+    ):
+        what = key.replace("level_a", "level, A-weighted,").replace(
+            "level_error", "error of the level"
+        )
+        for name, values in zip(names, file[f"third_octave/{key}"][()], strict=True):
+            columns[f"{what} at {name} [{unit}]"] = values
+    columns["sound power [dB re 1 pW]"] = file["power"][()]
+    files = _table("sound.csv", columns)
+    held = file["signal/pressure"]
+    for number, (name, signal) in enumerate(zip(names, held[()], strict=True)):
+        data, full = wave_file(signal, float(held.attrs["rate"]))
+        plain = "".join(c if c.isalnum() or c in "-." else "_" for c in str(name))
+        files[f"sound_{number}_{plain}_{full:g}_Pa.wav"] = partial(Path.write_bytes, data=data)
+    return files
+
+
 def motion(file: h5py.File) -> dict[str, Callable[[Path], object]]:
     """motion.xdmf: the outer face over time, for ParaView."""
     return _page(motion_page(file))
@@ -396,5 +424,6 @@ READERS: dict[str, Callable[[h5py.File], dict[str, Callable[[Path], object]]]] =
     "spectra.h5": spectra,
     "response.h5": response,
     "vibration.h5": vibration,
+    "sound.h5": sound,
     "motion.h5": motion,
 }

@@ -37,7 +37,8 @@ LEVELS = (
     ("axle force", "spectra/third_octave/level", "dB re 1 N"),
     ("contact force", "spectra/third_octave/contact_level", "dB re 1 N"),
     ("moment on the hub", "spectra/third_octave/hub_moment_level", "dB re 1 N m"),
-    ("radiated power", "vibration/third_octave/radiated_power_level", "dB re 1 pW"),
+    ("sound pressure", "sound/third_octave/level_a", "dB(A) re 20 uPa"),
+    ("sound power", "sound/power", "dB re 1 pW"),
 )
 MATCHED = 24  # lowest modes of the first run that are matched in the others
 
@@ -115,18 +116,23 @@ def _bands(runs: Sequence[RunResults], quantity: str, path: str, unit: str) -> l
     found: list[dict[tuple[int, float], float]] = []
     for run in runs:
         own: dict[tuple[int, float], float] = {}
-        centre = path.rpartition("/")[0] + "/centre"
+        centre = path.partition("/")[0] + "/third_octave/centre"
         if path in run and centre in run and len(run[centre]):
-            level = run[path].reshape(len(run[centre]), -1)  # some have components
+            heard_at = run[path].T if path.endswith("level_a") else run[path]
+            level = heard_at.reshape(len(run[centre]), -1)  # some have components
             for band, parts in zip(nominal(run[centre]), level, strict=True):
                 heard = ((axis, float(v)) for axis, v in enumerate(parts) if v > SILENT)
                 own |= {(axis, float(band)): v for axis, v in heard}
         found.append(own)
     keys = sorted({key for own in found for key in own})
     several = any(axis for axis, _ in keys)
+    names: Sequence[str] = AXES
+    if path.startswith("sound/") and several:
+        longest = max(runs, key=lambda run: len(run[path]) if path in run else 0)
+        names = [f"at {name}" for name in longest.attributes("sound")["microphone_names"]]
     return [
         Row(
-            f"{quantity} {AXES[axis]}" if several else quantity,
+            f"{quantity} {names[axis]}" if several else quantity,
             f"{band:g} Hz",
             unit,
             tuple(own.get((axis, band)) for own in found),

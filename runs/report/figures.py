@@ -171,9 +171,14 @@ def level_range(level: NDArray) -> tuple[float, float]:
 
 @styled
 def third_octaves(
-    centre: NDArray, level: NDArray, error: NDArray | None, label: str, few: NDArray
+    centre: NDArray,
+    level: NDArray,
+    error: NDArray | None,
+    label: str,
+    few: NDArray,
+    names: Sequence[str] = COMPONENTS,
 ) -> str:
-    """Third-octave levels (nb, 3) dB as bars over band centres (nb) Hz, with errors (nb, 3) dB.
+    """Third-octave levels (nb, n) dB as bars over band centres (nb) Hz, with errors (nb, n) dB.
 
     Pale where a band has `few` (nb) lines.
     """
@@ -181,10 +186,11 @@ def third_octaves(
     here, place = axes[0, 0], np.arange(len(centre))
     finite = np.where(level > SILENT, level, -np.inf)
     floor, _ = level_range(level)
-    for column, name in enumerate(COMPONENTS):
+    pitch = 0.84 / len(names)
+    for column, name in enumerate(names):
         height = np.maximum(finite[:, column] - floor, 0.0)
-        where = place + 0.28 * (column - 1)
-        bars = here.bar(where, height, 0.26, bottom=floor, color=COLOURS[column], label=name)
+        where = place + pitch * (column - (len(names) - 1) / 2)
+        bars = here.bar(where, height, 0.93 * pitch, bottom=floor, color=CYCLE[column], label=name)
         for bar in np.array(bars.patches)[few]:
             bar.set_alpha(0.45)
         if error is not None:
@@ -195,7 +201,7 @@ def third_octaves(
     here.grid(axis="x", visible=False)
     here.set(xlabel="third-octave band in Hz", ylabel=label)
     here.set_xlim(-0.6, len(centre) - 0.4)
-    here.legend(ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0))
+    here.legend(ncols=4, loc="lower left", bbox_to_anchor=(0.0, 1.0))
     return encode(figure)
 
 

@@ -25,7 +25,15 @@ from tireroad.runs.files.disk import is_as_signed, is_table_as_signed, write_tex
 from tireroad.runs.report import live
 from tireroad.runs.report.read import Absent, Results, Section, bounded, digits, quantity
 from tireroad.runs.report.realism import unusual
-from tireroad.runs.report.sections import forces, rotating, spectra, stiffness, tire, vibration
+from tireroad.runs.report.sections import (
+    forces,
+    rotating,
+    sound,
+    spectra,
+    stiffness,
+    tire,
+    vibration,
+)
 from tireroad.runs.scene.plan import STAGES
 from tireroad.runs.scene.schema import every_field, key_of, table_of
 from tireroad.runs.scene.tables.scene import Scene
@@ -33,13 +41,14 @@ from tireroad.runs.version import PROGRAM
 
 Fact = tuple[str, str]
 _MODES = 4
+_HEARD = 3  # microphones among the first figures
 _SPREAD = "error of the deviation of the"
 
 
 def answer(results: Results, stages: Mapping[str, Any]) -> list[Fact]:
     """Facts (what, value) from the result files and the summary's `stages`, as far as available."""
     found: list[Fact] = []
-    for part in (_standing, _rolling, _levels, _power, _modes):
+    for part in (_heard, _standing, _rolling, _levels, _modes):
         try:
             found += part(results, _Headlines(stages))
         except (Absent, InputError, LookupError, ValueError):
@@ -149,12 +158,18 @@ def _summed(level: np.ndarray, error: np.ndarray | None) -> str:
     return text
 
 
-def _power(results: Results, _: Given) -> list[Fact]:
-    """The equivalent radiated power: an upper bound of what the outer face radiates."""
-    total = results.attribute("vibration.h5", "radiated_power_level_a_weighted")
-    if total is None:
-        return []
-    return [("equivalent radiated power", f"{total:.1f} dB(A) re 1 pW")]
+def _heard(results: Results, given: Given) -> list[Fact]:
+    """A-weighted levels at the microphones, in the band of the run."""
+    names = results.dataset("sound.h5", "microphones").attrs["names"]
+    level, error = (results.array("sound.h5", f"total/{key}") for key in ("level_a", "level_error"))
+    top = float(results.array("sound.h5", "frequency")[-1])
+    return [
+        (
+            f"sound at {name}, to {quantity(top, 'Hz')}",
+            f"{value:.1f}" + (f" ± {about:.1f}" if np.isfinite(about) else "") + " dB(A)",
+        )
+        for name, value, about in list(zip(names, level, error, strict=True))[:_HEARD]
+    ]
 
 
 def _modes(results: Results, _: Given) -> list[Fact]:
@@ -215,6 +230,7 @@ SECTIONS: Mapping[str, Callable[[Results], Section]] = {
     "static.h5": tire.static,
     "contact.h5": forces.contact,
     "spectra.h5": spectra.spectra,
+    "sound.h5": sound.sound,
     "vibration.h5": vibration.vibration,
     "response.h5": forces.response,
     "stiffness.h5": stiffness.section,

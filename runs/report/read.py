@@ -90,6 +90,7 @@ class Section:
     facts: list[tuple[str, str]] = field(default_factory=list)
     figures: list[Picture] = field(default_factory=list)
     table: Table | None = None
+    sounds: list[tuple[str, str]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
 

@@ -6,6 +6,7 @@ from tireroad.runs.scene.tables.scene import Scene
 
 STAGES = (
     "static",
+    "radiation",
     "stiffness",
     "modes",
     "rotating",
@@ -15,6 +16,7 @@ STAGES = (
     "response",
     "spectra",
     "vibration",
+    "sound",
     "motion",
     "report",
 )
@@ -44,6 +46,10 @@ def skipped(scene: Scene, until: str | None = None) -> dict[str, str]:
         reasons["accuracy"] = "accuracy.estimate is false"
     if not scene.output.vibration:
         reasons["vibration"] = "output.vibration is false"
+    if scene.sound is None:
+        reasons["radiation"] = reasons["sound"] = "no [sound]"
+    elif scene.time is None or not (scene.force or scene.in_contact):
+        reasons["sound"] = "no [time] with [contact] or a [[force]]"
     if not scene.output.fields:
         reasons["motion"] = "output.fields is false"
     if until is not None:

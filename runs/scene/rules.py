@@ -84,6 +84,21 @@ def check_vibration(scene: Scene, raw: dict[str, Any], error: Where) -> Iterator
         )
 
 
+def check_sound(scene: Scene, raw: dict[str, Any], error: Where) -> Iterator[InputError]:
+    """Check that there is a plane road, and vibrations seen through the modes."""
+    if scene.sound is None:
+        return
+    rotation = scene.rotation
+    if not scene.static.on_road:
+        yield error(("sound", "microphones"), "are over the road: give [static] a load (N)")
+    if scene.road is not None and scene.road.drum_radius is not None:
+        yield error(("road", "drum_radius"), "is not possible with [sound], whose road is a plane")
+    if rotation is not None and rotation.speed and rotation.method == "full":
+        yield error(("sound", "microphones"), 'hear the modes: take rotation.method = "projected"')
+    if scene.in_contact and not scene.output.spectra:
+        yield error(("output", "spectra"), "find the run-in and the limit of [sound]: take them in")
+
+
 def check(scene: Scene, raw: dict[str, Any], source: Source) -> None:
     """Note contradictions between keys or tables.
 
@@ -297,6 +312,7 @@ RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
     (("pattern", "contact"), check_pattern),
     (("axle", "modal", "rotation", "greens", "output", "static"), check_axle),
     (("output", "time", "contact", "static", "force", "rotation"), check_vibration),
+    (("sound", "road", "rotation", "static", "output", "contact", "time"), check_sound),
     (("static", "road", "modal", "tire"), check_shape),
     (("time",), _time),
     (("accuracy", "contact", "road", "time", "static", "output", "force"), check_accuracy),

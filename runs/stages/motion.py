@@ -10,7 +10,9 @@ import numpy as np
 
 from tireroad.greens.basis import Basis
 from tireroad.runs.files.store import put
-from tireroad.runs.stages.whole_tire import Forces, WholeTire, replayed
+from tireroad.runs.process.mpi import on_root
+from tireroad.runs.stages.stage import Record
+from tireroad.runs.stages.whole_tire import Forces, WholeTire, of_run, replayed
 
 _INSTANTS = 400  # at most; the last ones of the run
 _PER_PERIOD = 8  # of the band's upper frequency
@@ -42,18 +44,25 @@ class MotionStage(WholeTire[Motion]):
 
     name: ClassVar[str] = "motion"
 
-    def seen(self, basis: Basis, forces: Forces) -> tuple[Motion, dict[str, tuple[float, str]]]:
-        """The outer face at the stored instants. Root process only."""
+    def compute(self, record: Record) -> Motion | None:
+        """The outer face at the stored instants; None but on the root process. Collective."""
+        made: list[Motion] = []
+        basis, forces = of_run(self)
+        on_root(self.job.comm, lambda: made.append(self._seen(basis, forces())))
+        if not made:
+            return None
+        size = float(np.linalg.norm(made[0].displacement, axis=2).max(initial=0.0))
+        record.headline["instants"] = (len(made[0].time), "-")
+        record.headline["largest displacement of the face"] = (size, "m")
+        return made[0]
+
+    def _seen(self, basis: Basis, forces: Forces) -> Motion:
         points = self.static.product.points
         stride = max(int(1 / (_PER_PERIOD * self.band * forces.step)), 1)
         kept = range(len(forces.time) - 1, -1, -stride)[:_INSTANTS][::-1]
         time, q = forces.time[kept], replayed(basis, forces, kept)
         field = (q @ basis.face(len(points)).T).reshape(len(time), -1, 3)
-        size = float(np.linalg.norm(field, axis=2).max(initial=0.0))
-        return Motion(time=time, displacement=field.astype("f4"), points=points), {
-            "instants": (len(time), "-"),
-            "largest displacement of the face": (size, "m"),
-        }
+        return Motion(time=time, displacement=field.astype("f4"), points=points)
 
     def write(self, file: h5py.File, product: Motion) -> None:
         """All fields of the product."""

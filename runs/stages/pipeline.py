@@ -52,11 +52,13 @@ from tireroad.runs.stages.motion import MotionStage
 from tireroad.runs.stages.obtained import obtained
 from tireroad.runs.stages.response import ResponseStage
 from tireroad.runs.stages.setup import Setup
+from tireroad.runs.stages.sound import RadiationStage, SoundStage
 from tireroad.runs.stages.spectra import SpectraStage
 from tireroad.runs.stages.stage import Done, Job, Part, Shared, Stage
 from tireroad.runs.stages.static import StaticStage
 from tireroad.runs.stages.stiffness import StiffnessStage
 from tireroad.runs.stages.vibration import VibrationStage
+from tireroad.runs.stages.whole_tire import LinesOfRun
 
 
 def share(surface: RoadKind, comm: MPI.Comm) -> None:
@@ -99,13 +101,16 @@ def _sent(road: Road | None, node: MPI.Comm) -> Road | None:
 
 PARTS: tuple[type[Part], ...] = (
     StaticStage,
+    RadiationStage,
     StiffnessStage,
     *STATIC_TO_GREENS,
     ContactStage,
     AccuracyStage,
     ResponseStage,
     SpectraStage,
+    LinesOfRun,
     VibrationStage,
+    SoundStage,
     MotionStage,
 )
 

@@ -8,19 +8,17 @@ from typing import Any, ClassVar
 import h5py
 import numpy as np
 
-from tireroad.contact.results.spectra import a_weighting, amplitudes, band_sums
-from tireroad.fem.errors import InputError
+from tireroad.contact.results.spectra import a_weighting, band_sums
 from tireroad.fem.static.state import StaticState
 from tireroad.greens.basis import Basis
 from tireroad.greens.outputs import Surface, mean_square_velocity, radiated_power
 from tireroad.runs.files.store import put
 from tireroad.runs.stages.spectra import Spectra
-from tireroad.runs.stages.stage import Done
-from tireroad.runs.stages.whole_tire import Forces, WholeTire, replayed
+from tireroad.runs.stages.stage import Done, Record
+from tireroad.runs.stages.whole_tire import Lines, WholeTire
 
 VELOCITY, POWER = 1e-9, 1e-12  # m/s, W: reference values of the levels, ISO 1683
 _LARGEST = 2e8  # bytes: largest size of the stored displacement fields
-_AT_ONCE = 64  # coordinates transformed at a time, to save memory
 HANN = 1.5  # noise bandwidth of the window in lines: mean of w^2 over the square of its mean
 
 
@@ -75,39 +73,23 @@ class VibrationStage(WholeTire[Vibration]):
     """From the states of the modes, after the run-in."""
 
     name: ClassVar[str] = "vibration"
+    lines: Done[Lines | None]
     spectra: Done[Spectra] | None = None
 
     def inputs(self) -> dict:
         """Also the spectra, which set the run-in and the model's frequency limit."""
         return super().inputs() | {"spectra": self.spectra.key if self.spectra else None}
 
-    def seen(self, basis: Basis, forces: Forces) -> tuple[Vibration, dict[str, tuple[float, str]]]:
-        """The vibration of the outer face, line by line. Root process only."""
-        state = self.static.product
-        left_out = self.spectra.product.left_out if self.spectra else 0.0
-        frequency, a = self._coordinates(basis, forces, left_out)
+    def compute(self, record: Record) -> Vibration | None:
+        """The vibration of the outer face, line by line; None but on the root process. Collective."""
+        lines, state = self.lines.product, self.static.product
+        if lines is None:
+            return None
         surface = Surface.of(state.points, self.job.tire.lattice.quads())
-        found = _seen(basis.face(len(state.points)), surface, state, frequency, a)
-        return found, _headline(found, surface)
-
-    def _coordinates(
-        self, basis: Basis, forces: Forces, left_out: float
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Lines (f,) Hz to the model's limit, and coordinates a (f, m) there. Root process only."""
-        steps = range(round(left_out / forces.step), len(forces.time))
-        frequency = np.fft.rfftfreq(len(steps), forces.step)
-        top = self.spectra.product.limit.frequency if self.spectra else self.band
-        below = (frequency > 0) & (frequency <= top)
-        if not below.any():
-            raise InputError(
-                f"output.vibration: {len(steps) * forces.step:.3g} s of forces have no spectral line up to the "
-                f"{top:.4g} Hz to which the modes are an answer; raise time.duration or modal.count"
-            )
-        # Not the receptance times the forces of the window: what rings at its start is part of it.
-        moved = replayed(basis, forces, steps)
-        some = (slice(k, k + _AT_ONCE) for k in range(0, moved.shape[1], _AT_ONCE))
-        a = [amplitudes(moved[:, part], forces.step)[1][below] for part in some]
-        return frequency[below], np.hstack(a)
+        shape = Basis.of(self.rotating.product).face(len(state.points))
+        found = _seen(shape, surface, state, lines.frequency, lines.amplitude)
+        record.headline |= _headline(found, surface)
+        return found
 
     def write(self, file: h5py.File, product: Vibration) -> None:
         """All fields of the product."""

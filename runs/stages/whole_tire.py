@@ -5,17 +5,18 @@ Common base of the stages that show the whole tire under the forces of a complet
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, ClassVar, Protocol, TypeVar
 
 import h5py
 import numpy as np
 from mpi4py import MPI
-from scipy import sparse
+from scipy import signal, sparse
 
+from tireroad.contact.results.spectra import amplitudes
 from tireroad.contact.setup import ContactSetup
+from tireroad.fem.errors import InputError
 from tireroad.fem.static.state import StaticState
 from tireroad.greens.basis import Basis
 from tireroad.greens.recursion import Recursion
@@ -27,9 +28,12 @@ from tireroad.runs.process.mpi import on_root
 from tireroad.runs.stages.contact_file import ContactHistory
 from tireroad.runs.stages.rolling import histories, of_given_forces, recursive
 from tireroad.runs.stages.setup import components, leaning, leaning_loads, probes
-from tireroad.runs.stages.stage import Computed, Done, Job, Record
+from tireroad.runs.stages.spectra import Spectra
+from tireroad.runs.stages.stage import Computed, Done, Job, Shared
 
 _ROWS = 4096  # steps read at a time
+_AT_ONCE = 64  # coordinates transformed at a time, to save memory
+FADE = 0.05  # of a record at each end, where its motion over time fades in and out
 
 
 def driven_loads(job: Job, state: StaticState, setup: ContactSetup | None) -> sparse.csr_matrix:
@@ -104,12 +108,96 @@ class Forces:
         return np.hstack([*parts, prescribed])
 
 
+class OfRun(Protocol):
+    """A part that takes the run's forces and states."""
+
+    @property
+    def job(self) -> Job: ...
+    @property
+    def static(self) -> Done[StaticState]: ...
+    @property
+    def rotating(self) -> Done[RollingModes]: ...
+    @property
+    def setup(self) -> Done[ContactSetup | None]: ...
+    @property
+    def contact(self) -> Done[ContactHistory] | None: ...
+
+
+def of_run(part: OfRun) -> tuple[Basis, Callable[[], Forces]]:
+    """The basis, and what reads the forces on the root process. Collective."""
+    basis, setup = Basis.of(part.rotating.product), part.setup.product
+    loads = driven_loads(part.job, part.static.product, setup)
+    contact = part.contact.product if part.contact else None
+    return basis, lambda: Forces.of(part.job, setup, contact, basis.seen(loads))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lines:
+    """The coordinates of the tire over frequency, after the run-in, up to the model's limit.
+
+    `frequency` (f,) Hz; `amplitude` (f, m): under a Hann window, scaled to show a sine in full;
+    `spectrum` (f, m): the transform of the record of `duration` s whose ends fade, so that the
+    motion over time is that of its lines.
+    """
+
+    frequency: np.ndarray
+    amplitude: np.ndarray
+    spectrum: np.ndarray
+    duration: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinesOfRun(Shared[Lines | None]):
+    """Not the receptance times the forces of the window: what rings at its start is part of it."""
+
+    name: ClassVar[str] = "lines"
+    static: Done[StaticState]
+    rotating: Done[RollingModes]
+    setup: Done[ContactSetup | None]
+    contact: Done[ContactHistory] | None = None
+    spectra: Done[Spectra] | None = None
+
+    def make(self) -> Lines | None:
+        """On the root process, None on the others. Collective."""
+        made: list[Lines] = []
+        basis, forces = of_run(self)
+        spectra = self.spectra.product if self.spectra else None
+        wanted = Wanted(band=self.job.scene.greens.band)
+        top = spectra.limit.frequency if spectra else band(self.rotating.product, wanted)
+        left_out = spectra.left_out if spectra else 0.0
+        on_root(self.job.comm, lambda: made.append(_lines(basis, forces(), left_out, top)))
+        return made[0] if made else None
+
+
+def _lines(basis: Basis, forces: Forces, left_out: float, top: float) -> Lines:
+    """After `left_out` s and up to `top` Hz."""
+    steps = range(round(left_out / forces.step), len(forces.time))
+    frequency = np.fft.rfftfreq(len(steps), forces.step)
+    below = (frequency > 0) & (frequency <= top)
+    if not below.any():
+        raise InputError(
+            f"output.vibration, [sound]: {len(steps) * forces.step:.3g} s of forces have no spectral line up to "
+            f"the {top:.4g} Hz to which the modes are an answer; raise time.duration or modal.count"
+        )
+    moved = replayed(basis, forces, steps)
+    moved -= moved.mean(axis=0)
+    some = [slice(k, k + _AT_ONCE) for k in range(0, moved.shape[1], _AT_ONCE)]
+    faded = signal.windows.tukey(len(steps), 2 * FADE)[:, None]
+    return Lines(
+        frequency=frequency[below],
+        amplitude=np.hstack([amplitudes(moved[:, part], forces.step)[1][below] for part in some]),
+        spectrum=np.hstack([np.fft.rfft(faded * moved[:, part], axis=0)[below] for part in some])
+        / len(steps),
+        duration=len(steps) * forces.step,
+    )
+
+
 P = TypeVar("P")
 
 
 @dataclass(frozen=True, kw_only=True)
 class WholeTire(Computed[P]):
-    """Computed on the root process from contact and prescribed forces as stored in their files."""
+    """A stage that shows the whole tire under the forces of the run. Its product is the root's alone."""
 
     static: Done[StaticState]
     rotating: Done[RollingModes]
@@ -126,26 +214,6 @@ class WholeTire(Computed[P]):
             "time": vars(scene.time),
             "band": scene.greens.band,
         }
-
-    def compute(self, record: Record) -> P | None:
-        """The product on the root process, None on the others. Collective."""
-        made: list[P] = []
-        basis, setup = Basis.of(self.rotating.product), self.setup.product
-        loads = driven_loads(self.job, self.static.product, setup)
-
-        def on_one() -> dict[str, tuple[float, str]]:
-            contact = self.contact.product if self.contact else None
-            forces = Forces.of(self.job, setup, contact, basis.seen(loads))
-            product, figures = self.seen(basis, forces)
-            made.append(product)
-            return figures
-
-        record.headline |= on_root(self.job.comm, on_one)
-        return made[0] if made else None
-
-    @abstractmethod
-    def seen(self, basis: Basis, forces: Forces) -> tuple[P, dict[str, tuple[float, str]]]:
-        """The product and its headline figures. Root process only."""
 
     @property
     def band(self) -> float:

@@ -68,7 +68,7 @@ def test_sources_inside_a_body_on_the_road(height: float) -> None:
     points[:, 2] = np.maximum(points[:, 2], 0.0)
     f = np.array([100.0, 400.0, 1000.0])
     k, body = 2 * np.pi * f / C, Body(points[quads], np.arange(len(quads)), True)
-    place, weight = body._gauss(4)
+    place, weight = body.points_and_weights(4)
     area = np.linalg.norm(weight, axis=2)[..., None]
     step = 1e-5 * body.normal[:, None]
     for at in ([0, 0, height / 4], [0.1, 0.05, height / 3], [-0.1, 0.1, height]):

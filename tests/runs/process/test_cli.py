@@ -202,5 +202,5 @@ def test_stages_follow_from_the_scene(scene: Path, overrides, until, expected) -
     reasons = skipped(load(scene, overrides, until=until), until)
     wanted = expected if expected is not None else {"response", "spectra", "stiffness"}
     bars = {"accuracy"} if "contact" in wanted else set()
-    assert set(reasons) == wanted | {"vibration", "motion"} | bars
+    assert set(reasons) == wanted | {"radiation", "sound", "vibration", "motion"} | bars
     assert all(reasons.values())

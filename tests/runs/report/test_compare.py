@@ -22,7 +22,7 @@ def write(folder: Path, load: float, level: float, frequencies: list[float], tur
     (folder / "scene.toml").write_text(signed(text))
     headline = {"load": {"value": load, "unit": "N"}}
     stages = {"static": {"seconds": 1.0, "headline": headline}}
-    stages |= {name: {} for name in ("modes", "spectra", "vibration")}
+    stages |= {name: {} for name in ("modes", "spectra", "sound")}
     (folder / "summary.json").write_text(json.dumps({"stages": stages}))
     shape = np.random.default_rng(1).standard_normal((3, 20, 3))
     points = np.random.default_rng(2).random((20, 3))
@@ -35,9 +35,11 @@ def write(folder: Path, load: float, level: float, frequencies: list[float], tur
         file["third_octave/centre"] = np.array([100.0, 125.892541, 158.489319])
         file["third_octave/level"] = np.array([[1.0, 2.0, level + 3 * n] for n in range(3)])
         file["third_octave/contact_level"] = file["third_octave/level"][:] + 4.0
-    with h5py.File(folder / "vibration.h5", "w") as file:
+    with h5py.File(folder / "sound.h5", "w") as file:
         file["third_octave/centre"] = np.array([100.0])
-        file["third_octave/radiated_power_level"] = np.array([level + 50.0])
+        file["third_octave/level_a"] = np.array([[level + 60.0], [level + 70.0]])
+        file["power"] = np.array([level + 50.0])
+        file.attrs["microphone_names"] = ["cpx front", "cpx rear"]
     return folder
 
 
@@ -55,12 +57,13 @@ def test_table_has_what_differs(pair: list[Path], tmp_path: Path) -> None:
     assert rows["scene", "static.load"]["b"] == "550.0"
     assert float(rows["axle force z", "125 Hz"]["b"]) == 19.0
     assert float(rows["contact force x", "100 Hz"]["b"]) == 5.0
-    assert float(rows["radiated power", "100 Hz"]["b"]) == 66.0
-    assert rows["radiated power", "100 Hz"]["unit"] == "dB re 1 pW"
+    assert float(rows["sound power", "100 Hz"]["b"]) == 66.0
+    assert rows["sound power", "100 Hz"]["unit"] == "dB re 1 pW"
+    assert float(rows["sound pressure at cpx rear", "100 Hz"]["b"]) == 86.0
     assert "+6.0 dB" in page and "+10 %" in page
     for what in ("vertical axle force", "vertical contact force"):
         assert f"Third octaves of the {what}." in page
-    assert "Third octaves of the equivalent radiated power." not in page, "one band is no chart"
+    assert "Third octaves of the sound power." not in page, "one band is no chart"
     # Modes are matched by shape, whatever their order and sign.
     assert float(rows["modes", "mode 1, MAC 1.00"]["b"]) == 51.0
     assert float(rows["modes", "mode 3, MAC 1.00"]["b"]) == 71.0

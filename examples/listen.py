@@ -1,0 +1,15 @@
+"""What microphones hear of a finished run: levels, and the sound to listen to.
+
+./tireroad run runs/scenes/quickstart.toml -n 2 && ./tireroad python examples/listen.py
+"""
+
+import sys
+from pathlib import Path
+
+import tireroad as tr
+
+folder = Path(sys.argv[1] if len(sys.argv) > 1 else "results/quickstart")
+heard = tr.listen(folder, ["cpx", "pass-by", (1.0, 0.5, 0.2)])
+for name, level, error in zip(heard.names, heard.total_weighted, heard.total_error, strict=True):
+    print(f"{name}: {level:.1f} ± {error:.1f} dB(A) re 20 µPa, to {heard.frequency[-1]:.0f} Hz")
+print(f"sound power: {heard.total_power[1]:.1f} dB(A) re 1 pW")

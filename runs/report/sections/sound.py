@@ -1,0 +1,209 @@
+"""Report section about the sound beside the tire."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+
+import numpy as np
+from matplotlib.collections import PolyCollection
+from numpy.typing import NDArray
+
+from tireroad.contact.results.spectra import nominal
+from tireroad.runs.files.wave import wave_file
+from tireroad.runs.report import live
+from tireroad.runs.report.figures import (
+    CYCLE,
+    FEWEST_BANDS,
+    WIDE,
+    bare_canvas,
+    canvas,
+    encode,
+    level_range,
+    line_canvas,
+    styled,
+    third_octaves,
+)
+from tireroad.runs.report.read import Results, Section, Table, digits
+from tireroad.runs.report.sections.spectra import few_lines
+
+FILE = "sound.h5"
+_CHARTED = 4  # microphones in one chart of bars
+_LIMITS = (
+    "Sound of the tire's vibrations alone: no air pumping, no resonances of grooves, a rigid road, no car; the "
+    "contact's own local flexibility is left out. A rolling tire heard outdoors has those on top, most above 800 Hz."
+)
+
+
+def sound(results: Results) -> Section:
+    """Levels at the microphones, sound power, directivity, and which part of the tire is heard."""
+    names = [str(name) for name in results.dataset(FILE, "microphones").attrs["names"]]
+    frequency = results.array(FILE, "frequency")
+    section = Section("Sound beside the tire", _LIMITS)
+    total, weighted, error = (
+        results.array(FILE, f"total/{key}") for key in ("level", "level_a", "level_error")
+    )
+    band = f"{digits(float(frequency[0]))} to {digits(float(frequency[-1]))} Hz"
+    section.table = Table(
+        ("microphone", f"dB re 20 µPa, {band}", "dB(A)", "error, dB"),
+        [
+            (name, f"{a:.1f}", f"{b:.1f}", f"± {c:.1f}" if np.isfinite(c) else "unknown")
+            for name, a, b, c in zip(names, total, weighted, error, strict=True)
+        ],
+    )
+    power = results.array(FILE, "total/power")
+    section.facts.append(("sound power", f"{power[0]:.1f} dB, {power[1]:.1f} dB(A) re 1 pW"))
+    centre = results.array(FILE, "third_octave/centre")
+    for name, one in zip(names, results.array(FILE, "signal/pressure"), strict=True):
+        data, full = wave_file(one, float(results.dataset(FILE, "signal/pressure").attrs["rate"]))
+        uri = f"data:audio/wav;base64,{b64encode(data).decode()}"
+        section.sounds.append((f"{name}: full scale is {full:g} Pa", uri))
+    if len(centre) < FEWEST_BANDS:
+        section.notes.append("Too few third-octave bands for charts: lengthen time.duration.")
+        return section
+    _bands(results, section, names, centre)
+    _power(results, section, centre)
+    loudest = int(results.array(FILE, "third_octave/level_a")[0].argmax())
+    section.show(
+        directivity(results, centre, loudest),
+        "Level over the road's horizon at 7.5 m, by direction (ahead is up, the left side is left): lowest ring of the "
+        "hemisphere, three loudest bands.",
+    )
+    _parts(results, section, names, centre, loudest)
+    return section
+
+
+def _bands(results: Results, section: Section, names: list[str], centre: NDArray) -> None:
+    level, error = (
+        results.array(FILE, f"third_octave/{key}") for key in ("level_a", "level_error")
+    )
+    few = few_lines(results, len(centre))
+    label = "sound pressure in dB(A) re 20 µPa"
+    for first in range(0, len(names), _CHARTED):
+        some = slice(first, first + _CHARTED)
+        shown, about = level[some].T, error[some].T
+        series = {name: (shown[:, k], about[:, k]) for k, name in enumerate(names[some])}
+        drawn = live.bars(
+            [f"{c:g}" for c in nominal(centre)],
+            series,
+            ("third-octave band in Hz", label),
+            CYCLE[: len(series)],
+            ends=level_range(shown),
+            few=few,
+        )
+        picture = third_octaves(centre, shown, about, label, few, names[some])
+        section.show(
+            picture,
+            "A-weighted third octaves at the microphones. Lines on the bars: estimated error, of the boundary elements "
+            "(by elements of twice the size, and by sources inside whose field is known) and of the contact force.",
+            drawn,
+        )
+
+
+def _power(results: Results, section: Section, centre: NDArray) -> None:
+    power, efficiency = results.array(FILE, "power"), results.array(FILE, "efficiency")
+    level = 10 * np.log10(np.maximum(efficiency, 1e-30))
+    section.show(
+        power_and_efficiency(centre, power, level),
+        "Sound power in third octaves, and radiation efficiency: the power over that of a plane wave with the face's "
+        "mean square velocity. Waves on a tire are short against those in the air, so most of its motion radiates little.",
+    )
+
+
+@styled
+def power_and_efficiency(centre: NDArray, power: NDArray, efficiency: NDArray) -> str:
+    """Levels (b,) dB re 1 pW and efficiencies (b,) dB over bands (b,) Hz."""
+    figure, axes = line_canvas(WIDE, 4.2, 2, below=0.62, sharex=True)
+    place = np.arange(len(centre))
+    floor, _ = level_range(power[:, None])
+    axes[0, 0].bar(place, np.maximum(power - floor, 0.0), 0.7, bottom=floor, color=CYCLE[0])
+    axes[0, 0].set_ylabel("sound power\nin dB re 1 pW")
+    axes[1, 0].plot(place, efficiency, "o-", color=CYCLE[2])
+    axes[1, 0].set_ylabel("efficiency in dB")
+    axes[1, 0].set_xticks(place, [f"{value:g}" for value in nominal(centre)], rotation=45)
+    axes[1, 0].set_xlabel("third-octave band in Hz")
+    return encode(figure)
+
+
+@styled
+def directivity(results: Results, centre: NDArray, loudest: int) -> str:
+    """Polar lines of the lowest ring of the hemisphere, for the loudest bands."""
+    level = results.array(FILE, "directivity/level")[:, 0]
+    azimuth = np.radians(results.array(FILE, "directivity/azimuth"))
+    order = np.argsort(-results.array(FILE, "third_octave/level_a")[0])[:3]
+    figure, axes = canvas(4.0, 4.0, subplot_kw={"projection": "polar"})
+    here = axes[0, 0]
+    here.set_theta_zero_location("N")
+    closed = np.append(azimuth, azimuth[:1])
+    for number, band in enumerate(sorted(order)):
+        ring = np.append(level[band], level[band, :1])
+        here.plot(closed, ring, color=CYCLE[number], label=f"{nominal(centre)[band]:g} Hz")
+    shown = level[order]
+    here.set_ylim(shown.min() - 6, shown.max() + 2)
+    here.set_xticks(np.radians([0, 90, 180, 270]), ["ahead", "left", "behind", "right"])
+    here.legend(loc="upper center", bbox_to_anchor=(0.5, -0.08), ncols=3)
+    return encode(figure)
+
+
+def _parts(
+    results: Results, section: Section, names: list[str], centre: NDArray, loudest: int
+) -> None:
+    held = results.dataset(FILE, "contribution/region")
+    regions = [str(name) for name in held.attrs["names"]]
+    share = held[()]
+    section.show(
+        parts(centre, share[0], regions),
+        f"Where the sound at {names[0]} comes from: each part's share of the mean square pressure. Shares add up to 1; "
+        "below 0 are parts that cancel others.",
+    )
+    outline = results.array(FILE, "contribution/outline")
+    each = results.array(FILE, "contribution/element")[0, loudest]
+    section.show(
+        unrolled(outline, each),
+        f"The same on the unrolled face at {nominal(centre)[loudest]:g} Hz, the loudest band: contribution per area of the "
+        "picture, red adds, blue cancels; white in the middle is the contact.",
+    )
+
+
+@styled
+def parts(centre: NDArray, share: NDArray, regions: list[str]) -> str:
+    """Shares (b, r) of regions over bands (b,) Hz, stacked up- and downwards."""
+    figure, axes = line_canvas(WIDE, 3.4, below=0.62)
+    here, place = axes[0, 0], np.arange(len(centre))
+    for sign in (1, -1):
+        base = np.zeros(len(centre))
+        for r, name in enumerate(regions):
+            part = np.maximum(sign * share[:, r], 0.0) * sign
+            label = name if sign > 0 else None
+            here.bar(place, part, 0.7, bottom=base, color=CYCLE[r % len(CYCLE)], label=label)
+            base += part
+    here.axhline(0.0, color="#1f2933", linewidth=0.8)
+    here.set_xticks(place, [f"{value:g}" for value in nominal(centre)], rotation=45)
+    here.set(xlabel="third-octave band in Hz", ylabel="share of the pressure's square")
+    here.grid(axis="x", visible=False)
+    here.legend(ncols=3, loc="lower left", bbox_to_anchor=(0.0, 0.98), fontsize=8)
+    figure.subplots_adjust(top=1 - 0.5 / 3.4)
+    return encode(figure)
+
+
+@styled
+def unrolled(outline: NDArray, share: NDArray) -> str:
+    """Shares (e,) per area of elements with corners (e, 4, 2): degrees from the lowest point, place across."""
+    known = np.isfinite(outline).all(axis=(1, 2))
+    corners = outline[known]
+    size = np.abs(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])) / 2
+    density = share[known] / np.maximum(size, 1e-12)
+    top = float(np.quantile(np.abs(density), 0.995)) or 1.0
+    figure, axes = bare_canvas(WIDE, 2.6)
+    here = axes[0, 0]
+    colours = PolyCollection(
+        corners, array=density / top, cmap="RdBu_r", clim=(-1, 1), edgecolors="face", linewidths=0.2
+    )
+    here.add_collection(colours)
+    here.set(
+        xlim=(-180, 180), ylim=(0, 1), xlabel="angle from the lowest point in deg, positive ahead"
+    )
+    here.set_xticks(range(-180, 181, 45))
+    here.set_yticks([0, 0.5, 1], ["right bead", "crown", "left bead"])
+    here.grid(visible=False)
+    figure.subplots_adjust(left=0.13, right=0.98, bottom=0.2, top=0.96)
+    return encode(figure, "png", 140)

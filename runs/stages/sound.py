@@ -1,0 +1,630 @@
+"""Stages radiation and sound: from the tire to microphones, and what these hear of a run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from functools import cached_property, partial
+from pathlib import Path
+from typing import Any, ClassVar
+
+import h5py
+import numpy as np
+from mpi4py import MPI
+from scipy import sparse
+
+from tireroad.contact.results.spectra import USABLE, a_weighting, band_sums
+from tireroad.fem.errors import InputError
+from tireroad.fem.parameters import key_of
+from tireroad.fem.static.state import StaticState
+from tireroad.greens.basis import Basis
+from tireroad.greens.tire_sound import (
+    FAR,
+    Air,
+    SoundingTire,
+    Transfer,
+    directions,
+    elements_for,
+    solved_frequencies,
+    source_errors,
+    transfer,
+)
+from tireroad.modal.corner import BODY, SEEN
+from tireroad.runs.files.store import put
+from tireroad.runs.scene.plan import skipped
+from tireroad.runs.scene.tables.scene import Sound as Table
+from tireroad.runs.stages.spectra import Spectra
+from tireroad.runs.stages.stage import Computed, Done, Job, Record, Shared, Stage
+from tireroad.runs.stages.vibration import HANN, POWER
+from tireroad.runs.stages.whole_tire import Lines, WholeTire
+
+PRESSURE = 2e-5  # Pa: reference of the levels
+RATE = 8000.0  # Hz, of the signals to listen to, or more by powers of two
+COARSER = 2.0  # size of the companion's elements over that of the elements
+ORDER = 2  # of the elements: the companion's error is four times theirs, three times the difference
+WORST = 1.0  # dB: larger errors of the sources inside are warned of
+
+REGIONS = ("tread ahead", "tread behind", "tread above", "left sidewall", "right sidewall", "wheel")
+SIDE = 0.7  # |n_y| of a sidewall
+
+
+def microphones(given: tuple, state: StaticState) -> tuple[list[str], np.ndarray]:
+    """Names and places (k, 3) m of a scene's microphones beside the tire in its static state.
+
+    cpx: ISO 11819-2, 0.2 m beside the undeformed sidewall, 0.1 m high, 0.2 m ahead and behind.
+    obsi: AASHTO T 360, pairs 16 mm apart around 0.1 m beside it, 76 mm high, at the contact's ends.
+    pass-by: 7.5 m to the left, 1.2 m high.
+    """
+    side = float(np.abs(state.points[:, 1]).max())
+    half = state.footprint().length / 2
+    known = {
+        "cpx": {"cpx front": (0.2, side + 0.2, 0.1), "cpx rear": (-0.2, side + 0.2, 0.1)},
+        "pass-by": {"pass-by": (0.0, 7.5, 1.2)},
+        "obsi": {
+            f"obsi {end} {place}": (x, side + 0.1 + 0.008 * sign, 0.076)
+            for end, x in (("leading", half), ("trailing", -half))
+            for place, sign in (("inner", -1), ("outer", 1))
+        },
+    }
+    found: dict[str, tuple[float, ...]] = {}
+    for one in given:
+        found |= (
+            known[one]
+            if isinstance(one, str)
+            else {f"at {one[0]:g}, {one[1]:g}, {one[2]:g} m": one}
+        )
+    return list(found), np.array(list(found.values()))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Paths:
+    """Green's functions of the air, from the elements to microphones and to directions far away.
+
+    `names` and `places` (k, 3) m; `near`: to the microphones, `far`: to the directions of a
+    hemisphere of `FAR` m, `coarse`: to the microphones from larger elements; `error` (k, f) dB: the
+    largest one of sources inside at the frequencies solved but 0 Hz; `size` m: of the elements.
+    """
+
+    names: list[str]
+    places: np.ndarray
+    near: Transfer
+    far: Transfer
+    coarse: Transfer
+    error: np.ndarray
+    size: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class RadiationStage(Computed[Paths]):
+    """Once for a tire, load and speed: the same on every road."""
+
+    name: ClassVar[str] = "radiation"
+    static: Done[StaticState]
+
+    @property
+    def table(self) -> Table:
+        """The table [sound]."""
+        found = self.job.scene.sound
+        assert found is not None, "the stage runs with [sound] only"
+        return found
+
+    @property
+    def up_to(self) -> float:
+        """Highest frequency, Hz."""
+        modal = self.job.scene.modal
+        if self.table.up_to is not None:
+            return self.table.up_to
+        return min(1000.0, USABLE * modal.up_to) if modal and modal.up_to else 1000.0
+
+    def inputs(self) -> dict:
+        """The shape of the tire on the road, the air, and the microphones."""
+        return {"static": self.static.key, "sound": vars(self.table), "up_to": self.up_to}
+
+    def compute(self, record: Record) -> Paths:
+        """Two meshes, all microphones and directions at each frequency. Collective."""
+        table, comm = self.table, self.job.comm
+        air, frequency = Air.at(table.temperature), solved_frequencies(self.up_to)
+        size = elements_for(self.up_to, air)
+        with record.timing("elements"):
+            tire, rough = (sounding(self.static.product, table, size, by) for by in (1.0, COARSER))
+        names, places = microphones(table.microphones, self.static.product)
+        tire.body.check_microphones(places, "sound.microphones", names)
+        every = np.vstack([places, FAR * directions()[0]])
+        apart = np.linalg.norm(every - tire.center, axis=1)
+        with record.timing("solve"):
+            found = transfer(tire, every, frequency, air, comm)
+        with record.timing("larger elements"):
+            coarse = transfer(rough, places, frequency, air, comm)
+        k = len(places)
+        kept: dict[str, Any] = {"frequency": frequency, "air": air}
+        near = Transfer(ahead=found[:, :k], distance=apart[:k], **kept)
+        with record.timing("sources inside"):
+            error = np.abs(source_errors(tire, near, places)).max(axis=0)
+        record.headline |= {
+            "elements": (len(tire.body.area), "-"),
+            "frequencies": (len(frequency), "-"),
+            "up to": (float(frequency[-1]), "Hz"),
+            "error of sources inside": (float(error.max()), "dB"),
+        }
+        record.indicators["largest element"] = (tire.body.edge, "m")
+        record.indicators["solid angles lack"] = (float(np.abs(tire.body.defect).max()), "-")
+        if error.max() > WORST:
+            record.warnings.append(
+                f"the fields of sources inside the tire are up to {error.max():.2g} dB off at the microphones: the "
+                "levels there may be as much"
+            )
+        return Paths(
+            names=names,
+            places=places,
+            near=near,
+            far=Transfer(ahead=found[:, k:], distance=apart[k:], **kept),
+            coarse=Transfer(ahead=coarse, distance=apart[:k], **kept),
+            error=error,
+            size=size,
+        )
+
+    def write(self, file: h5py.File, product: Paths) -> None:
+        """All fields."""
+        put(file, "microphones", product.places, "m")
+        file["microphones"].attrs["names"] = product.names
+        put(file, "frequency", product.near.frequency, "Hz")
+        put(file, "near", product.near.ahead, "1/m")
+        put(file, "far", product.far.ahead, "1/m")
+        put(file, "coarse", product.coarse.ahead, "1/m")
+        put(file, "error_of_sources_inside", product.error, "dB")
+        file.attrs["speed_of_sound"], file.attrs["density"] = vars(product.near.air).values()
+        file.attrs["size"] = product.size
+
+    def read(self, file: h5py.File) -> Paths:
+        """The same, read back."""
+        air = Air(speed=float(file.attrs["speed_of_sound"]), density=float(file.attrs["density"]))
+        places = file["microphones"][:]
+        kept: dict[str, Any] = {"frequency": file["frequency"][:], "air": air}
+        near, far = (np.linalg.norm(one, axis=1) for one in (places, FAR * directions()[0]))
+        return Paths(
+            names=[str(name) for name in file["microphones"].attrs["names"]],
+            places=places,
+            near=Transfer(ahead=file["near"][:], distance=near, **kept),
+            far=Transfer(ahead=file["far"][:], distance=far, **kept),
+            coarse=Transfer(ahead=file["coarse"][:], distance=near, **kept),
+            error=file["error_of_sources_inside"][:],
+            size=float(file.attrs["size"]),
+        )
+
+
+def sounding(state: StaticState, table: Table, size: float, coarser: float = 1.0) -> SoundingTire:
+    """The tire of a static state in elements of at most `coarser` times `size` m."""
+    rest = {"wheel_depth": table.wheel_depth, "leak": table.leak}
+    return SoundingTire.of(state, size, coarser=coarser, **rest)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sound:
+    """What k microphones hear of the vibrations of a run, up to the limit of the model.
+
+    `names` and `places` (k, 3) m; `frequency` (f,) Hz, `pressure` (k, f) Pa: complex amplitudes
+    for e^{+iwt}, from a Hann window; `centre` (b,) Hz with the third-octave `level` (k, b) dB re
+    20 uPa, A-weighted `weighted` (k, b), its `error` (k, b) dB (NaN: unknown), the sound power
+    `power` (b,) dB re 1 pW and the `efficiency` (b,) of radiation; `total`, `total_weighted`,
+    `total_error` (k,) and `total_power`, its A-weighted value second, (2,): of all lines;
+    `directivity` (b, elevations, azimuths) dB re 20 uPa at 7.5 m; `signal` (k, n) Pa at `rate` Hz;
+    `solved` (g,) Hz and `weight` (g, k, s) Pa s/m3: pressure per volume velocity at each node of
+    the outer face; `share` (k, b, r): of the pressure's square, from each of `REGIONS`; `shares`
+    (k, b, e): from each element, with `outline` (e, 4, 2) deg and -: angle around the axle from the
+    lowest point, and place from bead to bead from 0 to 1, NaN on the wheel.
+    """
+
+    names: list[str]
+    places: np.ndarray
+    frequency: np.ndarray
+    pressure: np.ndarray
+    centre: np.ndarray
+    level: np.ndarray
+    weighted: np.ndarray
+    error: np.ndarray
+    power: np.ndarray
+    efficiency: np.ndarray
+    total: np.ndarray
+    total_weighted: np.ndarray
+    total_error: np.ndarray
+    total_power: np.ndarray
+    directivity: np.ndarray
+    signal: np.ndarray
+    rate: float
+    solved: np.ndarray
+    weight: np.ndarray
+    share: np.ndarray
+    shares: np.ndarray
+    outline: np.ndarray
+
+
+_UNITS = {
+    "places": ("microphones", "m"),
+    "frequency": ("frequency", "Hz"),
+    "pressure": ("pressure", "Pa"),
+    "centre": ("third_octave/centre", "Hz"),
+    "level": ("third_octave/level", "dB re 20 uPa"),
+    "weighted": ("third_octave/level_a", "dB(A) re 20 uPa"),
+    "error": ("third_octave/level_error", "dB"),
+    "power": ("power", "dB re 1 pW"),
+    "efficiency": ("efficiency", "-"),
+    "total": ("total/level", "dB re 20 uPa"),
+    "total_weighted": ("total/level_a", "dB(A) re 20 uPa"),
+    "total_error": ("total/level_error", "dB"),
+    "total_power": ("total/power", "dB re 1 pW"),
+    "directivity": ("directivity/level", "dB re 20 uPa at 7.5 m"),
+    "signal": ("signal/pressure", "Pa"),
+    "solved": ("transfer/frequency", "Hz"),
+    "weight": ("transfer/weight", "Pa s/m3"),
+    "share": ("contribution/region", "-"),
+    "shares": ("contribution/element", "-"),
+    "outline": ("contribution/outline", "deg, -"),
+}
+PASS_BY = 7.5  # m: distance of the directivity
+
+
+@dataclass(frozen=True, kw_only=True)
+class SoundStage(WholeTire[Sound]):
+    """Pressure from the coordinates of the run and the Green's functions of the air."""
+
+    name: ClassVar[str] = "sound"
+    radiation: Done[Paths]
+    lines: Done[Lines | None]
+    spectra: Done[Spectra] | None = None
+
+    def inputs(self) -> dict[str, Any]:
+        """The forces and states, their limit and error bars, and the air."""
+        return super().inputs() | {
+            "spectra": self.spectra.key if self.spectra else None,
+            "radiation": self.radiation.key,
+        }
+
+    def compute(self, record: Record) -> Sound | None:
+        """None but on the root process. Collective."""
+        paths, lines, state = self.radiation.product, self.lines.product, self.static.product
+        if lines is None:
+            return None
+        table = self.job.scene.sound
+        assert table is not None, "the stage runs with [sound] only"
+        top = float(paths.near.frequency[-1])
+        below = lines.frequency <= top
+        if not below.all():
+            record.warnings.append(
+                f"the sound ends at sound.up_to = {top:g} Hz, the forces at {lines.frequency[-1]:.4g} Hz"
+            )
+        basis = Basis.of(self.rotating.product)
+        shape, rigid = basis.face(len(state.points)), wheel_motion(basis)
+        with record.timing("elements"):
+            tire = sounding(state, table, paths.size)
+            volumes = tire.volumes(shape, rigid)
+            rough = sounding(state, table, paths.size, COARSER).volumes(shape, rigid)
+        heard = Heard(
+            paths=paths,
+            tire=tire,
+            frequency=lines.frequency[below],
+            volume=volumes @ lines.amplitude[below].T,
+            rough=rough @ lines.amplitude[below].T,
+        )
+        with record.timing("pressure"):
+            parts = _sound(heard, self._errors, volumes @ lines.spectrum[below].T, lines.duration)
+            normal = _normal_velocity(tire, shape, lines.amplitude[below], heard.frequency)
+            efficiency = heard.efficiency(normal)
+        found = Sound(efficiency=efficiency, **parts)
+        _describe(record, found)
+        return found
+
+    @cached_property
+    def _errors(self) -> tuple[np.ndarray, np.ndarray]:
+        """Bands (b,) Hz and the errors (b,) dB of the contact force in them, NaN where unknown."""
+        found = self.spectra.product if self.spectra else None
+        if found is None or found.contact_level_error is None:
+            return np.zeros(0), np.zeros(0)
+        return found.levels["third_octave/centre"], found.contact_level_error[:, 2]
+
+    def write(self, file: h5py.File, product: Sound) -> None:
+        """All fields of the product."""
+        for name, (stored, unit) in _UNITS.items():
+            put(file, stored, getattr(product, name), unit)
+        file["microphones"].attrs["names"] = file.attrs["microphone_names"] = product.names
+        file["contribution/region"].attrs["names"] = REGIONS
+        file["signal/pressure"].attrs["rate"] = product.rate
+        elevation, azimuth = angles()
+        put(file, "directivity/elevation", elevation, "deg")
+        put(file, "directivity/azimuth", azimuth, "deg")
+
+    def read(self, file: h5py.File) -> Sound:
+        """The same, read back."""
+        kept: dict[str, Any] = {name: file[stored][:] for name, (stored, _) in _UNITS.items()}
+        names = [str(name) for name in file["microphones"].attrs["names"]]
+        return Sound(names=names, rate=float(file["signal/pressure"].attrs["rate"]), **kept)
+
+
+def angles() -> tuple[np.ndarray, np.ndarray]:
+    """Elevations over the road and azimuths from ahead to the left, deg, of `directions`."""
+    way = directions()[0]
+    elevation = np.unique(np.degrees(np.arcsin(way[:, 2])).round(9))
+    azimuth = np.unique((np.degrees(np.arctan2(way[:, 1], way[:, 0])) % 360).round(9))
+    return elevation, azimuth
+
+
+def wheel_motion(basis: Basis) -> np.ndarray | None:
+    """Motion (6, m) of the wheel in m and rad per coordinate; None of a wheel that is held."""
+    s3 = len(basis.shape) if basis.projection.moves else len(basis.shape) // 3 * 3
+    if basis.projection.moves:
+        probes = sparse.hstack(
+            [sparse.csr_matrix((BODY, s3)), sparse.identity(SEEN, format="csr")[:BODY]],
+            format="csr",
+        )
+        return basis.seen(probes)
+    return None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Heard:
+    """Displaced volumes of the elements, `volume` (e, f) and `rough` (e', f) m3, of larger ones."""
+
+    paths: Paths
+    tire: SoundingTire
+    frequency: np.ndarray
+    volume: np.ndarray
+    rough: np.ndarray
+
+    @cached_property
+    def pressure(self) -> np.ndarray:
+        """At the microphones, (k, f) Pa."""
+        return self.paths.near.pressure(self.volume, self.frequency)
+
+    @cached_property
+    def coarse(self) -> np.ndarray:
+        """The same of larger elements."""
+        return self.paths.coarse.pressure(self.rough, self.frequency)
+
+    @cached_property
+    def far(self) -> np.ndarray:
+        """In the directions of the hemisphere, (d, f) Pa at `FAR` m."""
+        return self.paths.far.pressure(self.volume, self.frequency)
+
+    @cached_property
+    def power(self) -> np.ndarray:
+        """Sound power (f,) W, mean over time."""
+        angle = directions()[1][:, None]
+        return (
+            (np.abs(self.far) ** 2 * angle).sum(axis=0)
+            * FAR**2
+            / (2 * self.paths.near.air.impedance)
+        )
+
+    def efficiency(self, normal: np.ndarray) -> np.ndarray:
+        """Sound power over that of a plane wave with the face's mean square normal velocity, (b,).
+
+        `normal` (f,) m4/s2: the integral over the face of the velocity's mean square.
+        """
+        _, power = self.bands(self.power)
+        _, plane = self.bands(self.paths.near.air.impedance * normal)
+        return power / np.maximum(plane, np.finfo(float).tiny)
+
+    def bands(self, square: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Third octaves (b,) Hz and sums (b, ...) of (f, ...) which the Hann window makes larger."""
+        return band_sums(self.frequency, square / HANN)
+
+
+def _normal_velocity(
+    tire: SoundingTire, shape: np.ndarray, a: np.ndarray, frequency: np.ndarray
+) -> np.ndarray:
+    """The integral over the face in the air of the mean square normal velocity, (f,) m4/s2."""
+    size = np.linalg.norm(tire.area, axis=1)
+    some = size > 0
+    unit = tire.area[some] / np.sqrt(size[some])[:, None]
+    moved = np.einsum("sc,scm->sm", unit, shape.reshape(len(size), 3, -1)[some])
+    square = (moved @ a.T.real) ** 2 + (moved @ a.T.imag) ** 2
+    return square.sum(axis=0) * (2 * np.pi * frequency) ** 2 / 2
+
+
+def _decibel(square: np.ndarray, reference: float) -> np.ndarray:
+    return 10 * np.log10(np.maximum(square, np.finfo(float).tiny) / reference)
+
+
+def _sound(
+    heard: Heard, of_forces: tuple[np.ndarray, np.ndarray], volume: np.ndarray, duration: float
+) -> dict[str, Any]:
+    """The fields of Sound but the efficiency; `volume` (e, f): of the record over time."""
+    paths, frequency = heard.paths, heard.frequency
+    ears = 10 ** (a_weighting(frequency) / 10)
+    square = (np.abs(heard.pressure) ** 2 / 2).T
+    centre, band = heard.bands(square)
+    _, weighted = heard.bands(square * ears[:, None])
+    _, coarse = heard.bands((np.abs(heard.coarse) ** 2 / 2).T)
+    _, power = heard.bands(heard.power)
+    _, away = heard.bands((np.abs(heard.far) ** 2 / 2).T)
+    error = _errors(paths, centre, 10 * np.log10(coarse / band), of_forces)
+    every = square.sum(axis=0) / HANN
+    share, shares = _shares(heard)
+    elevation, azimuth = angles()
+    near = _decibel(away * (FAR / PASS_BY) ** 2, PRESSURE**2)
+    rate = RATE * 2 ** max(0, math.ceil(math.log2(4 * frequency[-1] / RATE)))
+    known = np.isfinite(error).all(axis=0)
+    total_error = (band * np.nan_to_num(error.T)).sum(axis=0) / np.maximum(band.sum(axis=0), 1e-300)
+    return {
+        "names": paths.names,
+        "places": paths.places,
+        "frequency": frequency,
+        "pressure": heard.pressure,
+        "centre": centre,
+        "level": _decibel(band, PRESSURE**2).T,
+        "weighted": _decibel(weighted, PRESSURE**2).T,
+        "error": error,
+        "power": _decibel(power, POWER),
+        "total": _decibel(every, PRESSURE**2),
+        "total_weighted": _decibel((square * ears[:, None]).sum(axis=0) / HANN, PRESSURE**2),
+        "total_error": total_error
+        if len(centre) and known.any()
+        else np.full(len(paths.names), np.nan),
+        "total_power": _decibel(
+            np.array([heard.power.sum(), (heard.power * ears).sum()]) / HANN, POWER
+        ),
+        "directivity": near.reshape(len(centre), len(elevation), len(azimuth)),
+        "signal": _signal(paths, volume, frequency, duration, rate).astype("f4"),
+        "rate": rate,
+        "solved": paths.near.frequency,
+        "weight": _weights(paths, heard.tire),
+        "share": share,
+        "shares": shares.astype("f4"),
+        "outline": heard.tire.outline,
+    }
+
+
+def _errors(
+    paths: Paths, centre: np.ndarray, coarser: np.ndarray, of_forces: tuple[np.ndarray, np.ndarray]
+) -> np.ndarray:
+    """Errors (k, b) dB: of the elements, by larger ones (b, k) dB and sources inside, and of the force."""
+    elements = coarser.T / (COARSER**ORDER - 1)
+    solved = paths.near.frequency[1:]
+    inside = np.array([np.interp(centre, solved, one) for one in paths.error]).reshape(
+        len(paths.names), -1
+    )
+    force = np.full(len(centre), np.nan)
+    for band, value in zip(*of_forces, strict=True):
+        force[np.isclose(centre, band)] = value
+    whole = np.sqrt(elements**2 + inside**2 + np.nan_to_num(force) ** 2)
+    return whole if not len(of_forces[0]) else np.where(np.isnan(force), np.nan, whole)
+
+
+def _signal(
+    paths: Paths, volume: np.ndarray, frequency: np.ndarray, duration: float, rate: float
+) -> np.ndarray:
+    """Pressure (k, n) Pa over time at `rate` Hz, of the transform of the record."""
+    pressure = paths.near.pressure(volume, frequency)
+    count = round(duration * rate)
+    whole = np.zeros((len(pressure), count // 2 + 1), complex)
+    which = np.rint(frequency * duration).astype(int)
+    whole[:, which] = pressure
+    return np.fft.irfft(whole, count, axis=1) * count
+
+
+def _weights(paths: Paths, tire: SoundingTire) -> np.ndarray:
+    """Pressure per volume velocity of each node (g, k, s) Pa s/m3, single precision."""
+    near = paths.near
+    wave = 2 * np.pi * near.frequency[:, None, None]
+    delay = np.exp(-1j * wave / near.air.speed * near.distance[:, None])
+    weight = np.stack([(tire.nodes @ one.T).T for one in near.ahead])
+    return (1j * wave * near.air.density * delay * weight).astype(np.complex64)
+
+
+def _shares(heard: Heard) -> tuple[np.ndarray, np.ndarray]:
+    """Shares of the pressure's square in a band, of the regions (k, b, r) and the elements (k, b, e).
+
+    Of one line, Re(conj(p) p_e) / |p|^2 with p_e the pressure of one element; of a band, its lines
+    by their squares. They add up to 1; what cancels others is negative.
+    """
+    near, tire = heard.paths.near, heard.tire
+    centre, _ = heard.bands(np.zeros(len(heard.frequency)))
+    region = _regions(tire)
+    k, e = len(heard.pressure), len(region)
+    shares = np.zeros((k, len(centre), e))
+    wave = 2 * np.pi * heard.frequency
+    delay = np.exp(-1j * wave / near.air.speed * near.distance[:, None])
+    for b, middle in enumerate(centre):
+        some = np.flatnonzero(
+            (heard.frequency > middle * 10**-0.05) & (heard.frequency < middle * 10**0.05)
+        )
+        # g at the middle of the band: a picture needs no more.
+        after = min(int(np.searchsorted(near.frequency, middle)), len(near.frequency) - 1)
+        ahead = max(after - 1, 0)
+        part = (middle - near.frequency[ahead]) / max(
+            near.frequency[after] - near.frequency[ahead], 1e-9
+        )
+        g = (1 - part) * near.ahead[ahead] + part * near.ahead[after]
+        undelayed = heard.pressure[:, some] / delay[:, some]
+        for m in range(k):
+            each = -(wave[some] ** 2) * near.air.density * g[m][:, None] * heard.volume[:, some]
+            parts = (undelayed[m].conj() * each).real.sum(axis=1)
+            shares[m, b] = parts / max(abs(parts.sum()), 1e-300)
+    regions = np.stack(
+        [shares[..., region == r].sum(axis=-1) for r in range(len(REGIONS))], axis=-1
+    )
+    return regions, shares
+
+
+def _regions(tire: SoundingTire) -> np.ndarray:
+    """Number of the region of each element, (e,)."""
+    side, place = tire.body.normal[:, 1], tire.body.center
+    found = np.where(place[:, 0] >= 0, 0, 1)
+    found[place[:, 2] > tire.height] = 2
+    found[side > SIDE], found[side < -SIDE] = 3, 4
+    found[~tire.face] = 5
+    return found
+
+
+def _describe(record: Record, found: Sound) -> None:
+    """Levels at the microphones with their errors, the CPX level, and the sound power."""
+    for k, name in enumerate(found.names):
+        record.headline[f"level at {name}"] = (float(found.total[k]), "dB re 20 uPa")
+        record.headline[f"A-weighted level at {name}"] = (
+            float(found.total_weighted[k]),
+            "dB(A) re 20 uPa",
+        )
+        if np.isfinite(found.total_error[k]):
+            record.headline[f"error of the level at {name}"] = (float(found.total_error[k]), "dB")
+    if {"cpx front", "cpx rear"} <= set(found.names):
+        both = [found.names.index(name) for name in ("cpx front", "cpx rear")]
+        mean = 10 * np.log10((10 ** (found.total_weighted[both] / 10)).mean())
+        record.headline["CPX level"] = (float(mean), "dB(A) re 20 uPa")
+    record.headline["sound power level"] = (float(found.total_power[0]), "dB re 1 pW")
+    record.headline["A-weighted sound power level"] = (float(found.total_power[1]), "dB(A) re 1 pW")
+    record.headline["band"] = (f"{found.frequency[0]:.3g} to {found.frequency[-1]:.4g} Hz", "-")
+
+
+def listen(
+    run: str | Path | Mapping[str, Any],
+    microphones: Any = ("cpx",),
+    *,
+    temperature: float = 293.15,
+    up_to: float | None = None,
+) -> Sound:
+    """What microphones hear of a finished run: its folder, or tireroad.load of it. Not collective.
+
+    `microphones`: as sound.microphones in a scene, names or places (x, y, z) in m; `temperature` K of the
+    air; `up_to` Hz. Nothing is written. Raises InputError for a folder without the results of a
+    rolling contact, for places inside the tire or under the road, and values out of range.
+    """
+    from tireroad.runs.files.reader import RunResults
+    from tireroad.runs.scene.load import load
+    from tireroad.runs.stages.pipeline import PARTS
+
+    results = run if isinstance(run, RunResults) else RunResults(run)  # type: ignore[arg-type]
+    scene = load(results.directory / "scene.toml")
+    given = {"microphones": microphones, "temperature": temperature, "up_to": up_to}
+    table = Table(
+        **{item.name: _read(item, given[item.name]) for item in fields(Table) if item.name in given}
+    )
+    job = Job(replace(scene, sound=table), results.directory, MPI.COMM_SELF)
+    done: dict[str, Done] = {}
+    for kind in PARTS:
+        part = kind.taken(job, done)
+        if isinstance(part, RadiationStage | SoundStage):
+            done[kind.name] = Done("", partial(part.compute, Record()))
+        elif isinstance(part, Shared):
+            done[kind.name] = Done("", part.make)
+        elif isinstance(part, Stage) and kind.name not in skipped(scene):
+            if f"{kind.name}.h5" in results.left_out or not job.path(kind.name).is_file():
+                continue
+            done[kind.name] = Done("", part.stored)
+        job.settle(done)
+    if "sound" not in done:
+        raise InputError(
+            f"{results.directory}: listen needs the results of a tire that rolls or is driven over time: run "
+            "the scene with [time] and [contact] to its end"
+        )
+    return done["sound"].product
+
+
+def _read(item: Any, value: Any) -> Any:
+    key = key_of(item)
+    assert key is not None
+    if value is None and key.optional:
+        return None
+    try:
+        return key.read(value)
+    except ValueError as error:
+        raise InputError(f"listen: {item.name} {error}") from None

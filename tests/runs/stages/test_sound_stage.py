@@ -1,0 +1,158 @@
+"""[sound]: what microphones hear of a run, against a sum over the nodes made apart."""
+
+from __future__ import annotations
+
+import json
+import wave
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from scipy.interpolate import CubicSpline
+
+import tireroad
+from tireroad.greens.outputs import Surface
+from tireroad.greens.tire_sound import directions
+from tireroad.runs.files.export import export
+from tireroad.runs.report.page import write_report
+from tireroad.runs.scene.load import load
+from tireroad.runs.stages.pipeline import run_scene
+
+pytestmark = pytest.mark.slow
+
+SCENE = """
+[tire]
+segments = 16
+elements_arc = 6
+order = 2
+[tire.material]
+youngs_modulus = 48e6
+[static]
+load = 300.0
+error_estimate = false
+[modal]
+count = 20
+[output]
+vibration = true
+[rotation]
+speed = 20.0
+[contact]
+tread = "winkler"
+[road]
+kind = "sine"
+wavelength = 0.3
+[time]
+duration = 0.3
+step = 2e-4
+[accuracy]
+estimate = false
+[sound]
+microphones = ["cpx", [3.0, 1.0, 1.0]]
+up_to = 150.0
+"""
+
+
+def run(folder: Path, *overrides: str) -> tireroad.RunResults:
+    folder.mkdir(exist_ok=True)
+    (folder / "scene.toml").write_text(SCENE)
+    scene = load(folder / "scene.toml", overrides)
+    run_scene(scene, folder, MPI.COMM_SELF, until="sound", fresh=False, petsc_options=[])
+    return tireroad.load(folder)
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> tireroad.RunResults:
+    return run(tmp_path_factory.mktemp("sound") / "run")
+
+
+def test_the_pressure_is_the_sum_over_the_nodes(results: tireroad.RunResults) -> None:
+    """p = sum of weight times volume velocity i w (n A).u, with the stored field of the vibration."""
+    frequency, field = (results[f"vibration/surface/{k}"] for k in ("frequency", "displacement"))
+    static = results["static/surface/points"] + results["static/surface/displacement"]
+    quads, touching = results["static/surface/quads"], results["static/surface/force"] > 0
+    area = Surface.of(static, quads[~touching[quads].all(axis=1)]).normal
+    if (area * static).sum() < 0:
+        area = -area
+    solved, weight = results["sound/transfer/frequency"], results["sound/transfer/weight"]
+    places, heard = results["sound/microphones"], results["sound/pressure"]
+    delay = 2j * np.pi * solved[:, None] / 343.23 * np.linalg.norm(places, axis=1)
+    smooth = CubicSpline(solved, weight * np.exp(delay)[:, :, None])
+    own = results["sound/frequency"]
+    for line in np.flatnonzero(own > 40)[::5]:
+        here = int(np.argmin(np.abs(frequency - own[line])))
+        flow = 2j * np.pi * own[line] * (area * field[here]).sum(axis=1)
+        back = np.exp(-2j * np.pi * own[line] / 343.23 * np.linalg.norm(places, axis=1))
+        pressure = (smooth(own[line]) @ flow) * back
+        assert np.abs(pressure - heard[:, line]).max() < 0.01 * np.abs(heard[:, line]).max()
+
+
+def test_levels_and_signals_are_those_of_the_pressure(results: tireroad.RunResults) -> None:
+    """Total levels from the lines, and from the signal over time within a decibel."""
+    square = (np.abs(results["sound/pressure"]) ** 2).sum(axis=1) / 2 / 1.5
+    total = 10 * np.log10(square / 4e-10)
+    np.testing.assert_allclose(results["sound/total/level"], total, atol=1e-9)
+    bands = 10 * np.log10((10 ** (results["sound/third_octave/level"] / 10)).sum(axis=1))
+    assert (bands <= total + 0.1).all(), "the road's own 20 Hz lie in no band"
+    assert results["sound/third_octave/level"].shape == results["sound/third_octave/level_a"].shape
+    signal = results["sound/signal/pressure"]
+    meant = 10 * np.log10((signal**2).mean(axis=1) / 4e-10)
+    np.testing.assert_allclose(meant, total, atol=2.0)
+    share = results["sound/contribution/region"]
+    np.testing.assert_allclose(share.sum(axis=2), 1.0, atol=1e-6)
+    stage = json.loads((results.directory / "summary.json").read_text())["stages"]["sound"]
+    assert stage["headline"]["level at cpx front"]["value"] == pytest.approx(total[0])
+    assert stage["headline"]["error of the level at cpx front"]["value"] > 0
+
+
+def test_the_far_level_is_that_of_the_power(results: tireroad.RunResults) -> None:
+    """The mean over the hemisphere of the directivity at 7.5 m is the power's."""
+    level = results["sound/directivity/level"]
+    _, angle = directions()
+    square = 4e-10 * 10 ** (level.reshape(len(level), -1) / 10)
+    power = (square * angle).sum(axis=1) * 7.5**2 / (1.2041 * 343.23)
+    np.testing.assert_allclose(10 * np.log10(power / 1e-12), results["sound/power"], atol=0.01)
+    assert (results["sound/efficiency"] < 2).all()
+
+
+def test_another_road_hears_through_the_same_air(
+    tmp_path: Path, results: tireroad.RunResults
+) -> None:
+    """Radiation is reused; louder roads are louder; what listens afterwards hears the same."""
+    other = run(results.directory, "road.amplitude=2e-3")
+    stages = other.summary
+    assert stages["radiation"]["status"] == "reused" and stages["sound"]["status"] == "computed"
+    heard = tireroad.listen(other, ["cpx", (3.0, 1.0, 1.0)], up_to=150.0)
+    np.testing.assert_allclose(heard.level, other["sound/third_octave/level"], atol=1e-6)
+    for bad in (["cpx", "nowhere"], [(0.0, 0.0, 0.3)], [(1.0, 0.0, -0.1)]):
+        with pytest.raises(tireroad.InputError, match="microphone"):
+            tireroad.listen(other, bad)
+    write_report(results.directory)
+    page = (results.directory / "report.html").read_text()
+    assert "Sound beside the tire" in page and page.count("<audio") == 3
+    names = [path.name for path in export(results.directory)]
+    waves = [name for name in names if name.endswith(".wav")]
+    assert "sound.csv" in names and len(waves) == 3
+    full = float(waves[0].split("_")[-2])
+    with wave.open(str(results.directory / "export" / waves[0])) as file:
+        samples = np.frombuffer(file.readframes(file.getnframes()), "<i2") * full / 32767
+        assert file.getframerate() == 8000
+    np.testing.assert_allclose(samples, other["sound/signal/pressure"][0], atol=full / 30000)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ("sound.microphones=[[0.0,0.0,0.3]]", "lies inside"),
+        ("sound.microphones=[[0.0,0.0,-0.3]]", "lies under it"),
+        ("sound.microphones=['ear']", "cpx, obsi, pass-by"),
+        ("sound.microphones=[]", "list of names and places"),
+        ("output.spectra=false", "output.spectra"),
+        ("road.drum_radius=1.0", "whose road is a plane"),
+    ],
+)
+def test_what_cannot_be_heard_is_refused(
+    results: tireroad.RunResults, tmp_path: Path, change: str, message: str
+) -> None:
+    with pytest.raises(tireroad.InputError, match=message):
+        run(tmp_path / "run", change)
