@@ -21,6 +21,7 @@ from dataclasses import Field, fields, replace
 from pathlib import Path
 from typing import Any
 
+from tireroad.contact.results.spectra import USABLE
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Key, ParameterError, described
 from tireroad.runs.scene import rules
@@ -168,6 +169,46 @@ def by_section(raw: dict[str, Any]) -> None:
         contact.setdefault("tread", SECTIONS[kind].tread_law)
 
 
+BAND_EDGE = 10**0.05  # upper edge of a third octave over its middle
+STEPS_A_PERIOD = 20  # of the band's upper edge
+COARSE_UP_TO = 450.0  # Hz: to there 24 segments of 16 elements carry the waves of a radial tire
+
+
+def with_band(scene: Scene, raw: dict[str, Any], say: Say) -> Scene:
+    """Choose by accuracy.up_to, where a scene gives it, what it leaves open: mesh, modes, step.
+
+    A search chooses for itself. Points follow the same key (contact.spacing).
+    """
+    tables = {
+        name: found if isinstance(found := raw.get(name), dict) else {}
+        for name in ("accuracy", "modal", "time", "tire")
+    }
+    method = scene.rotation.method if scene.rotation else "projected"
+    wanted = scene.in_contact and "up_to" in tables["accuracy"] and method == "projected"
+    if not wanted or scene.accuracy.searches:
+        return scene
+    top, chosen = BAND_EDGE * scene.accuracy.up_to, []
+    if not {"count", "up_to"} & set(tables["modal"]):
+        highest = float(f"{top / USABLE:.3g}")
+        scene = replace(scene, modal=replace(scene.modes, up_to=highest))
+        chosen.append(f"modal.up_to = {highest:g} Hz, of which {USABLE:.0%} are an answer")
+    assert scene.time is not None, "there is contact in time"
+    if "step" not in tables["time"]:
+        step = float(f"{1 / (STEPS_A_PERIOD * top):.2g}")
+        scene = replace(scene, time=replace(scene.time, step=step))
+        chosen.append(f"time.step = {step:g} s, {STEPS_A_PERIOD} to a period")
+    open_mesh = not {"segments", "elements_arc"} & set(tables["tire"])
+    if scene.tire.section == "radial" and open_mesh and scene.accuracy.up_to <= COARSE_UP_TO:
+        tire = replace(scene.tire, segments=24, shape=scene.tire.shape.elements_along(16))
+        scene = replace(scene, tire=tire)
+        chosen.append(
+            "tire.segments = 24 and tire.elements_arc = 16, which carry waves to that frequency"
+        )
+    if chosen:
+        say(f"accuracy.up_to = {scene.accuracy.up_to:g} Hz chooses " + "; ".join(chosen))
+    return scene
+
+
 def with_speed(scene: Scene) -> Scene:
     """Set the wheel's speed for a travel speed until the static state gives its rolling radius."""
     rotation = scene.rotation
@@ -269,7 +310,7 @@ def load(
         source.add(
             ("name",), f"must be letters, digits, '.', '_', '-', not {described(scene.name)}"
         )
-    scene = filled(scene)
+    scene = with_band(filled(scene), raw, say)
     scene = replace(scene, tire=scene.tire.with_elements(scene.static.on_road))
     if "tire" not in source.broken():
         scene.tire.shape.check(scene.tire, source)

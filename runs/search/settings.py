@@ -15,7 +15,7 @@ FINER = 2**0.5  # factor per rung of modes; step and spacing of the points are h
 # tire was 10, 14 and 10 % off with points 7.8, 5.5 and 3.9 mm apart. Halved, the next grid has all
 # points of this one, and was this one's companion.
 RUNGS = {"mesh": 10, "modes": 10, "points": 5, "step": 10}
-MODES = 2.25  # highest mode over highest frequency of interest, lowest rung: valid to half of it
+MODES = 1.6  # highest mode over highest frequency of interest, lowest rung: valid to 0.8 of it
 SAMPLES = 8  # steps per period of that frequency on the lowest rung
 PASSING = 2.25  # contact points that pass per period of it, at least
 # Of the outer radius: largest spacing of points, 8 mm. The closest at which the error bars of a

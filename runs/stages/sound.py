@@ -14,7 +14,7 @@ import numpy as np
 from mpi4py import MPI
 from scipy import sparse
 
-from tireroad.contact.results.spectra import USABLE, a_weighting, band_sums
+from tireroad.contact.results.spectra import a_weighting, band_sums
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import key_of
 from tireroad.fem.static.state import StaticState
@@ -33,7 +33,7 @@ from tireroad.greens.tire_sound import (
 from tireroad.modal.corner import BODY, SEEN
 from tireroad.runs.files.store import put
 from tireroad.runs.scene.plan import skipped
-from tireroad.runs.scene.tables.scene import Sound as Table
+from tireroad.runs.scene.tables.sound import Sound as Table
 from tireroad.runs.stages.spectra import Spectra
 from tireroad.runs.stages.stage import Computed, Done, Job, Record, Shared, Stage
 from tireroad.runs.stages.vibration import HANN, POWER
@@ -109,23 +109,19 @@ class RadiationStage(Computed[Paths]):
         assert found is not None, "the stage runs with [sound] only"
         return found
 
-    @property
-    def up_to(self) -> float:
-        """Highest frequency, Hz."""
-        modal = self.job.scene.modal
-        if self.table.up_to is not None:
-            return self.table.up_to
-        return min(1000.0, USABLE * modal.up_to) if modal and modal.up_to else 1000.0
-
     def inputs(self) -> dict:
         """The shape of the tire on the road, the air, and the microphones."""
-        return {"static": self.static.key, "sound": vars(self.table), "up_to": self.up_to}
+        return {
+            "static": self.static.key,
+            "sound": vars(self.table),
+            "up_to": self.job.scene.heard_up_to,
+        }
 
     def compute(self, record: Record) -> Paths:
         """Two meshes, all microphones and directions at each frequency. Collective."""
         table, comm = self.table, self.job.comm
-        air, frequency = Air.at(table.temperature), solved_frequencies(self.up_to)
-        size = elements_for(self.up_to, air)
+        up_to, air = self.job.scene.heard_up_to, Air.at(table.temperature)
+        frequency, size = solved_frequencies(up_to), elements_for(up_to, air)
         with record.timing("elements"):
             tire, rough = (sounding(self.static.product, table, size, by) for by in (1.0, COARSER))
         names, places = microphones(table.microphones, self.static.product)

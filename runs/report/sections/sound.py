@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.collections import PolyCollection
 from numpy.typing import NDArray
 
-from tireroad.contact.results.spectra import nominal
+from tireroad.contact.results.spectra import FEW, lines, nominal
 from tireroad.runs.files.wave import wave_file
 from tireroad.runs.report import live
 from tireroad.runs.report.figures import (
@@ -24,7 +24,6 @@ from tireroad.runs.report.figures import (
     third_octaves,
 )
 from tireroad.runs.report.read import Results, Section, Table, digits
-from tireroad.runs.report.sections.spectra import few_lines
 
 FILE = "sound.h5"
 _CHARTED = 4  # microphones in one chart of bars
@@ -76,7 +75,8 @@ def _bands(results: Results, section: Section, names: list[str], centre: NDArray
     level, error = (
         results.array(FILE, f"third_octave/{key}") for key in ("level_a", "level_error")
     )
-    few = few_lines(results, len(centre))
+    frequency = results.array(FILE, "frequency")
+    few = lines(centre, frequency[1] - frequency[0]) < FEW
     label = "sound pressure in dB(A) re 20 µPa"
     for first in range(0, len(names), _CHARTED):
         some = slice(first, first + _CHARTED)

@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from tireroad.contact.results.spectra import USABLE
 from tireroad.contact.roads.placement import Placement
 from tireroad.contact.roads.road import ROADS, RoadKind
 from tireroad.contact.roads.under_tire import Motion
@@ -44,6 +45,7 @@ from tireroad.runs.scene.schema import (
     vector,
 )
 from tireroad.runs.scene.tables.contact import Contact, PatternTable, Time
+from tireroad.runs.scene.tables.sound import Sound
 from tireroad.runs.scene.tables.tire import Cavity, Tire
 
 
@@ -347,7 +349,8 @@ class Accuracy:
     up_to: float = number(
         400.0,
         "Hz",
-        'highest frequency of interest: of the error, and of the waves by which contact.points = "auto" is chosen',
+        'highest frequency of interest: of the error, and of the waves by which contact.points = "auto" is chosen; where '
+        "it is given, also of modal.up_to, time.step and the mesh of a radial tire, as far as these are absent",
         least=1,
         most=1e5,
     )
@@ -655,71 +658,6 @@ class Output(Collects):
     kinds: tuple[tuple[str, PointOutput], ...] = collection(OUTPUTS)
 
 
-MICROPHONES = ("cpx", "obsi", "pass-by")
-
-
-def _microphones() -> Any:
-    """Names of `MICROPHONES`, and places of three coordinates."""
-    limits = Limits(-1000.0, 1000.0)
-
-    def read(value: Any) -> tuple[str | tuple[float, ...], ...]:
-        if isinstance(value, str):
-            value = (value,)
-        if not isinstance(value, list | tuple) or not value:
-            raise ValueError(f"must be a list of names and places, not {described(value)}")
-        return tuple(one(part) for part in value)
-
-    def one(part: Any) -> str | tuple[float, ...]:
-        if isinstance(part, str):
-            if part not in MICROPHONES:
-                raise ValueError(
-                    f"must be of {', '.join(MICROPHONES)} or [x, y, z], not {described(part)}"
-                )
-            return part
-        if not isinstance(part, list | tuple) or len(part) != 3:
-            raise ValueError(f"must be of names or places [x, y, z], not {described(part)}")
-        place = tuple(finite(x) for x in part)
-        for x in place:
-            limits.check(x, "m")
-        if place[2] < 0:
-            raise ValueError(
-                f"must be over the road, z ≥ 0 m: {described(list(place))} lies under it"
-            )
-        return place
-
-    key = Key(
-        read=read,
-        unit="m",
-        doc="microphones: cpx, the two mandatory ones of ISO 11819-2; obsi, the pairs of AASHTO T 360; pass-by, "
-        "7.5 m beside; or x forward, y left along the axle, z over the road under the axle",
-        values=f"names ({', '.join(MICROPHONES)}) or [x, y, z]",
-    )
-    return parameter(key, ("cpx",))
-
-
-@dataclass(frozen=True)
-class Sound:
-    microphones: tuple[str | tuple[float, ...], ...] = _microphones()
-    temperature: float = number(293.15, "K", "temperature of the air outside", least=200, most=350)
-    up_to: float | None = number(
-        None,
-        "Hz",
-        "highest frequency; absent: half of modal.up_to, at most 1000 Hz, or 1000 Hz",
-        least=50,
-        most=3000,
-    )
-    wheel_depth: float = number(
-        0.0, "m", "depth of the wheel's discs behind the beads", least=0, most=0.2
-    )
-    leak: float = number(
-        0.0,
-        "m",
-        "height of the contact over the acoustic plane: a gap that texture and grooves leave",
-        least=0,
-        most=0.02,
-    )
-
-
 @dataclass(frozen=True)
 class Scene:
     name: str = text("scene", "name of the scene and its result folder")
@@ -775,6 +713,15 @@ class Scene:
         rotation, road = self.rotation, self.road
         rolls = rotation is not None and (rotation.travel_speed or rotation.speed) > 0
         return rolls and road is not None and road.kind != "flat"
+
+    @property
+    def heard_up_to(self) -> float:
+        """Highest frequency (Hz) of the sound: sound.up_to, or where the modes end, at most 1 kHz."""
+        assert self.sound is not None, "of scenes with [sound] only"
+        if self.sound.up_to is not None:
+            return self.sound.up_to
+        highest = self.modal.up_to if self.modal else None
+        return min(1000.0, USABLE * highest) if highest else 1000.0
 
     @property
     def joins_shapes(self) -> bool:

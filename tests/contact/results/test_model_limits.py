@@ -11,9 +11,9 @@ from tireroad.contact.results.spectra import limits, lowest, pitch
 @pytest.mark.parametrize(
     ("changed", "frequency", "cause"),
     [
-        ({}, 200.0, "highest mode"),
+        ({}, 320.0, "highest mode"),
         ({"highest": 4000.0}, 1500.0, "passing frequency of the contact points, 3000 Hz"),
-        ({"highest": 4000.0, "speed": 0.0}, 2000.0, "highest mode"),
+        ({"highest": 4000.0, "speed": 0.0}, 3200.0, "highest mode"),
         ({"highest": 4000.0, "speed": 0.0, "step": 1e-3}, 500.0, "time step"),
     ],
 )

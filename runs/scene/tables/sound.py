@@ -1,0 +1,72 @@
+"""The table [sound]: microphones beside the tire, and the air around it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from tireroad.fem.parameters import Key, Limits, described, finite, number, parameter
+
+MICROPHONES = ("cpx", "obsi", "pass-by")
+
+
+def _microphones() -> Any:
+    """Names of `MICROPHONES`, and places of three coordinates."""
+    limits = Limits(-1000.0, 1000.0)
+
+    def read(value: Any) -> tuple[str | tuple[float, ...], ...]:
+        if isinstance(value, str):
+            value = (value,)
+        if not isinstance(value, list | tuple) or not value:
+            raise ValueError(f"must be a list of names and places, not {described(value)}")
+        return tuple(one(part) for part in value)
+
+    def one(part: Any) -> str | tuple[float, ...]:
+        if isinstance(part, str):
+            if part not in MICROPHONES:
+                raise ValueError(
+                    f"must be of {', '.join(MICROPHONES)} or [x, y, z], not {described(part)}"
+                )
+            return part
+        if not isinstance(part, list | tuple) or len(part) != 3:
+            raise ValueError(f"must be of names or places [x, y, z], not {described(part)}")
+        place = tuple(finite(x) for x in part)
+        for x in place:
+            limits.check(x, "m")
+        if place[2] < 0:
+            raise ValueError(
+                f"must be over the road, z ≥ 0 m: {described(list(place))} lies under it"
+            )
+        return place
+
+    key = Key(
+        read=read,
+        unit="m",
+        doc="microphones: cpx, the two mandatory ones of ISO 11819-2; obsi, the pairs of AASHTO T 360; pass-by, "
+        "7.5 m beside; or x forward, y left along the axle, z over the road under the axle",
+        values=f"names ({', '.join(MICROPHONES)}) or [x, y, z]",
+    )
+    return parameter(key, ("cpx",))
+
+
+@dataclass(frozen=True)
+class Sound:
+    microphones: tuple[str | tuple[float, ...], ...] = _microphones()
+    temperature: float = number(293.15, "K", "temperature of the air outside", least=200, most=350)
+    up_to: float | None = number(
+        None,
+        "Hz",
+        "highest frequency; absent: 0.8 of modal.up_to, at most 1000 Hz, or 1000 Hz",
+        least=50,
+        most=3000,
+    )
+    wheel_depth: float = number(
+        0.0, "m", "depth of the wheel's discs behind the beads", least=0, most=0.2
+    )
+    leak: float = number(
+        0.0,
+        "m",
+        "height of the contact over the acoustic plane: a gap that texture and grooves leave",
+        least=0,
+        most=0.02,
+    )
