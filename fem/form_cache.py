@@ -111,6 +111,8 @@ def _workshop() -> Path:
             " every run: name another folder by XDG_CACHE_HOME"
         )
         folder = Path(tempfile.mkdtemp(prefix="tireroad-forms-"))
+        # The compiler of the wheels keeps its own beside ours.
+        os.environ.setdefault("ZIG_GLOBAL_CACHE_DIR", str(folder / "zig"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return folder
 

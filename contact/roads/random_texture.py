@@ -376,6 +376,8 @@ def band_power(wavelength: Sequence[float], level: Sequence[float], edges: Array
 
 
 _NEIGHBOURS = 11
+# Flanks of stones are that steep at most, times the pitch (as the limit of ISO 13473-1 for spikes).
+STEEP = 3.0
 _NOISE = 50e-6  # m
 MOST_LOST = 0.1  # share of a profile that may be bridged
 
@@ -410,7 +412,7 @@ def cleaned(profile: Array, pitch: float, limit: float, longest: float, source: 
     if missing.all():
         raise InputError(f"{source}: none of the {len(profile)} heights is a number")
     bridged = _bridged(profile, missing)
-    outlier = _outliers(bridged, limit) & ~missing
+    outlier = _outliers(bridged, limit, STEEP * pitch) & ~missing
     lost = missing | outlier
     gap, place = _longest_run(lost)
     if gap * pitch > longest * (1 + 1e-9):
@@ -422,17 +424,17 @@ def cleaned(profile: Array, pitch: float, limit: float, longest: float, source: 
         raise InputError(
             f"{source}: {int(missing.sum())} heights are missing and {int(outlier.sum())} are outliers, "
             f"{100 * lost.mean():.3g} % of {len(profile)}, more than {100 * MOST_LOST:g} %: the measurement "
-            "is of no use"
+            f"is of no use, unless road.outlier = {limit:g} takes steep stones for outliers: then raise it"
         )
     whole = _bridged(profile, lost)
     return Cleaned(whole, int(missing.sum()), int(outlier.sum()), gap * pitch)
 
 
-def _outliers(profile: Array, limit: float) -> NDArray[np.bool_]:
+def _outliers(profile: Array, limit: float, least: float) -> NDArray[np.bool_]:
     from scipy.ndimage import median_filter  # not needed to read a scene
 
     distance = np.abs(profile - median_filter(profile, _NEIGHBOURS, mode="nearest"))
-    return distance > max(limit * 1.4826 * float(np.median(distance)), _NOISE)
+    return distance > max(limit * 1.4826 * float(np.median(distance)), _NOISE, least)
 
 
 def _bridged(profile: Array, lost: NDArray[np.bool_]) -> Array:

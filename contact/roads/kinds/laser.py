@@ -7,15 +7,26 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.contact.roads.grid import Grid, check_count
+from tireroad.contact.roads.grid import Grid
 from tireroad.contact.roads.grid_file import UNITS
+from tireroad.contact.roads.profile_file import check_relief, read_profile
 from tireroad.contact.roads.random_texture import cleaned, memory, widened
 from tireroad.contact.roads.road import Levelled, road_kind
 from tireroad.fem.errors import InputError
-from tireroad.fem.parameters import ParameterError, choice, filename, integer, number
+from tireroad.fem.parameters import (
+    Limits,
+    ParameterError,
+    choice,
+    filename,
+    integer,
+    number,
+    numbers,
+)
 
 Array = NDArray[np.float64]
 MOST_HEIGHTS = 20_000_000  # of a widened profile: 160 MB, and four times that during its making
+ENDINGS = ".csv", ".txt", ".dat", ".asc", ".prn", ".tsv", ".xyz"
+_MANY = 100  # places of a file whose x may be rounded
 _EVEN = 0.02  # of a step: tolerance of even positions
 
 
@@ -33,13 +44,18 @@ class LaserFile(Levelled):
     """The file and how it is read, cleaned, and extended across."""
 
     file: str | None = filename(
-        "measured profile (.csv): one height per line, or x and a height; nan where it is missing"
+        "measured profile (.csv, .txt, .dat): one height per line, x and a height, or columns with headings"
     )
     pitch: float = number(
         4e-5, "m", "distance between heights, where the file has no x", least=1e-7, most=0.1
     )
     length_unit: str = choice("mm", tuple(UNITS), "unit of x in the file")
-    height_unit: str = choice("mm", tuple(UNITS), "unit of the heights in the file")
+    height_unit: str | None = choice(
+        None, tuple(UNITS), "unit of the heights in the file; absent: mm, if the heights can be"
+    )
+    missing: tuple[float, ...] = numbers(
+        'values in the file that mean "no height", such as -9999; nan always does', "-", Limits()
+    )
     outlier: float = number(
         8.0, "-", "a height is an outlier this many times the usual distance (1.48 times the median) from "
         "the median of its 11 neighbours", least=3, most=1e6,
@@ -78,7 +94,7 @@ class LaserFile(Levelled):
         InputError if the measurement cannot be used.
         """
         source = f"road.file {self.file}"
-        line = self._read(self.reads, source)
+        line, notes = self._read(self.reads, source)
         sound = cleaned(line.profile, line.pitch, self.outlier, self.longest_gap, source)
         profile, pitch = self._resampled(sound.profile, line.pitch, source)
         if self.across == "ruts":
@@ -91,46 +107,39 @@ class LaserFile(Levelled):
         x: Array = np.float64(line.first) + np.float64(pitch) * np.arange(len(profile))
         road = Grid(x, y, z, end=self.end, source=source)
         road.making = 0.0 if self.across == "ruts" else memory(len(profile), pitch, self.width)
-        road.notes = (sound.summary, f"extended to {self.width:g} m: {how}")
+        road.notes = (*notes, sound.summary, f"extended to {self.width:g} m: {how}")
         return road
 
-    def _read(self, path: Path, source: str) -> _Line:
+    def _read(self, path: Path, source: str) -> tuple[_Line, list[str]]:
         if not path.is_file():
             raise InputError(f"{source}: no such file")
-        if path.suffix.lower() != ".csv":
-            raise InputError(f"{source}: the ending {path.suffix!r} is not .csv")
-        try:
-            text = path.read_text(encoding="utf-8-sig")
-            lines = [row for row in text.splitlines() if row.strip() and not row.startswith("#")]
-            begin = 1 if lines and _is_heading(lines[0]) else 0
-            if len(lines) - begin < 3:
-                raise InputError(f"only {len(lines) - begin} heights: too few for a road")
-            check_count(path, len(lines))
-            table = np.loadtxt(lines[begin:], delimiter=",", ndmin=2, dtype=float)
-        except UnicodeDecodeError as error:
-            raise InputError(f"{source}: is not a text file (byte {error.start})") from error
-        except (OSError, ValueError) as error:
-            raise InputError(f"{source}: {error}") from error
-        return self._line(table, source)
-
-    def _line(self, table: Array, source: str) -> _Line:
-        if table.shape[1] not in (1, 2):
-            raise InputError(
-                f"{source}: {table.shape[0]} lines of {table.shape[1]} numbers; a measured line has one "
-                "height a line, or x and a height"
-            )
-        profile = table[:, -1] * UNITS[self.height_unit]
-        if np.isinf(profile).any():
-            raise InputError(f"{source}: {int(np.isinf(profile).sum())} heights are infinite")
-        if table.shape[1] == 1:
-            return _Line(profile, self.pitch)
-        x = table[:, 0] * UNITS[self.length_unit]
+        if path.suffix.lower() not in ENDINGS:
+            raise InputError(f"{source}: the ending {path.suffix!r} is not {', '.join(ENDINGS)}")
+        found = read_profile(path, source, self.missing)
+        unit = self.height_unit or "mm"
+        profile, notes = found.heights * UNITS[unit], list(found.notes)
+        if self.height_unit is None:
+            check_relief(profile, unit, source)
+        if found.x is None:
+            return _Line(profile, self.pitch), notes
+        x = found.x * UNITS[self.length_unit]
+        if not np.isfinite(x).all():
+            line = int(found.lines[np.flatnonzero(~np.isfinite(x))[0]])
+            raise InputError(f"{source}, line {line}: x is missing")
         pitch = (x[-1] - x[0]) / (len(x) - 1)
-        if not (
-            np.isfinite(x).all() and pitch > 0 and np.abs(np.diff(x) / pitch - 1).max() < _EVEN
-        ):
-            raise InputError(f"{source}: x must ascend in even steps, within {100 * _EVEN:g} %")
-        return _Line(profile, float(pitch), float(x[0]))
+        off = np.abs(x - x[0] - pitch * np.arange(len(x)))
+        # Both ends are rounded, too. Few places tell no rounding from uneven steps.
+        rounded = 2.1 * found.rounding * UNITS[self.length_unit] if len(x) >= _MANY else 0.0
+        steps = np.abs(np.diff(x) - pitch)
+        if not (pitch > 0 and (steps.max() < _EVEN * pitch or off.max() <= rounded)):
+            worst = int(steps.argmax())
+            raise InputError(
+                f"{source}, line {int(found.lines[worst + 1])}: x must ascend in even steps, within {100 * _EVEN:g} % or "
+                f"its last digit, and here goes on by {x[worst + 1] - x[worst]:.4g} m where {pitch:.4g} m is usual"
+            )
+        if steps.max() >= _EVEN * pitch:
+            notes.append(f"x is rounded; its even steps are {1e3 * pitch:.5g} mm")
+        return _Line(profile, float(pitch), float(x[0])), notes
 
     def _resampled(self, profile: Array, pitch: float, source: str) -> tuple[Array, float]:
         """Without waves shorter than `shortest_wave` (ISO 16610-21), sampled at a quarter of it."""
@@ -159,12 +168,3 @@ class LaserFile(Levelled):
                 f"{heights:.3g} heights, more than {MOST_HEIGHTS:g}: take a longer road.shortest_wave, a smaller "
                 'road.width or across = "ruts", or cut the file'
             )
-
-
-def _is_heading(line: str) -> bool:
-    """Whether the first field of a line is not a number."""
-    try:
-        float(line.split(",")[0])
-    except ValueError:
-        return True
-    return False

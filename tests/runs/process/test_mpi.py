@@ -67,7 +67,9 @@ def test_endings(launch, case: str, status: int, message: str, processes: int) -
 def test_hanging_processes_are_ended(launch, case: str, status: int, message: str) -> None:
     began = time.monotonic()
     done = launch("-c", CASE, case, processes=3)
-    assert done.returncode == status, done.stderr
+    # Two processes end it: MPICH's mpirun may give the status of the one that it killed meanwhile.
+    killed = {9} if "MPICH" in MPI.Get_library_version() else set()
+    assert done.returncode in {status} | killed, done.stderr
     assert done.stderr.count(message) == 1
     assert time.monotonic() - began < 600  # without an end to it, for ever
 
