@@ -31,6 +31,7 @@ def standing_modes(
     air: Column | None = None,
     axle: Axle | None = None,
     turning: Turning | None = None,
+    solver: str = "auto",
 ) -> ModalBasis:
     """The `count` lowest modes, or all below `up_to` (Hz), with their fields on all unknowns.
 
@@ -41,7 +42,7 @@ def standing_modes(
     `up_to` is given, within its range; ConvergenceError if a mode is missing, inaccurate or
     unstable. Collective.
     """
-    modes = solved(motions.operators, count=count, up_to=up_to)
+    modes = solved(motions.operators, count=count, up_to=up_to, solver=solver)
     return projected(motions, modes, rotation, air, axle, turning)
 
 
@@ -64,8 +65,9 @@ def solved(
     up_to: float | None = None,
     teams: int | None = None,
     journal: Journal | None = None,
+    solver: str = "auto",
 ) -> Modes:
-    """The modes alone, found by `teams` of processes (modal.solver.slicing).
+    """The modes alone, found by `teams` of processes (modal.solver.slicing) and a `solver`.
 
     Results that the `journal` holds are not computed again. InputError unless one of `count` and
     `up_to` (Hz) is given, within its range. Collective.
@@ -79,6 +81,7 @@ def solved(
         sites=sites(operators),
         teams=teams,
         journal=journal,
+        solver=solver,
     )
 
 
@@ -136,6 +139,7 @@ def with_fields(
     air: Column | None = None,
     axle: Axle | None = None,
     turning: Turning | None = None,
+    solver: str = "auto",
 ) -> ModalBasis:
     """The basis with its fields on all unknowns.
 
@@ -154,6 +158,7 @@ def with_fields(
         air=air,
         axle=axle,
         turning=turning,
+        solver=solver,
     )
     top = max(float(basis.frequency.max(initial=0.0)), 1e-300)
     alike = len(again.frequency) == len(basis.frequency)

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tireroad.contact.patch import Patch
+from tireroad.contact.results.band import USABLE
 
 _PREFERRED = np.array((1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0))
 FEWEST = 3  # lines across a band; with fewer it has no level
@@ -314,12 +315,6 @@ def low_part(values: np.ndarray, duration: float, band: float) -> np.ndarray:
     shifted = np.concatenate([values[:1], values[:-1]])
     keep = np.arange(n // 2 + 1) <= band * duration * (1 + 1e-9)
     return np.fft.rfft(window * shifted, axis=0)[keep] / n
-
-
-# Of the highest mode: beyond, the truncated modes respond dynamically, not by their static residual
-# alone. Against twice the modes, third octaves with their upper edge below it are within 0.5 dB in
-# nine of ten bands and 1 dB in all; up to 0.9 within 1.6 dB (docs/verification/band.md).
-USABLE = 0.8
 
 
 @dataclass(frozen=True)

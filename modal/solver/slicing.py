@@ -421,6 +421,80 @@ def eigenpairs(
     return values, vectors
 
 
+def by_slepc(
+    matrix: sparse.csr_matrix, interval: Interval, team: Team = ALONE
+) -> tuple[np.ndarray, np.ndarray]:
+    """The same by SLEPc: Krylov-Schur with spectrum slicing, which chooses slices and shifts itself.
+
+    Its own inertias at the ends of the interval must count what it finds. Collective in the team.
+    """
+    from slepc4py import SLEPc
+
+    rows, size = matrix.shape
+    if interval.count == 0 or size <= _DENSE:
+        return eigenpairs(matrix, interval, team)
+    sizes = ((rows, size), (rows, size))
+    whole = from_local_rows(matrix, sizes, team.comm)
+    whole.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    options, prefix = PETSc.Options(), "modes_"
+    # As in Shifted: null pivots are none by rounding; the last block on one process for its inertia.
+    given = {"st_mat_mumps_icntl_24": 1, "st_mat_mumps_icntl_13": 1}
+    mine = [prefix + name for name in given if not options.hasName(prefix + name)]
+    for name, value in given.items():
+        options.setValue(prefix + name, value)
+    solver = SLEPc.EPS().create(team.comm)
+    solver.setOptionsPrefix(prefix)
+    solver.setOperators(whole)
+    solver.setProblemType(SLEPc.EPS.ProblemType.HEP)
+    solver.setType(SLEPc.EPS.Type.KRYLOVSCHUR)
+    solver.setWhichEigenpairs(SLEPc.EPS.Which.ALL)
+    solver.setInterval(interval.low, interval.high)
+    transform = solver.getST()
+    transform.setType(SLEPc.ST.Type.SINVERT)
+    inner = transform.getKSP()
+    inner.setType(PETSc.KSP.Type.PREONLY)
+    inner.getPC().setType(PETSc.PC.Type.CHOLESKY)
+    inner.getPC().setFactorSolverType("mumps")
+    solver.setKrylovSchurDetectZeros(True)
+    each = int(np.clip(interval.count, 10, _SLICE[0]))  # SLEPc's own slices have but a few tens
+    solver.setKrylovSchurDimensions(each, min(3 * each + 20, size), PETSc.DECIDE)
+    solver.setTolerances(TOLERANCE)
+    try:
+        solver.setFromOptions()
+        solver.solve()
+        count = solver.getConverged()
+        inertia = solver.getKrylovSchurInertias()[1]
+        if inertia[-1] - inertia[0] != interval.count:
+            _check_count(int(inertia[-1] - inertia[0]), interval)
+        _check_count(count, interval)
+        values, vectors = np.empty(count), np.empty((rows, count), order="F")
+        vector = whole.createVecRight()
+        for k in range(count):
+            values[k] = solver.getEigenpair(k, vector).real
+            vectors[:, k] = vector.array_r
+    except PETSc.Error as error:
+        raise ConvergenceError(
+            f"modes: SLEPc's spectrum slicing failed from {_hertz(interval.low):.3f} to {_hertz(interval.high):.3f} Hz "
+            f'({str(error).splitlines()[-1].strip()}): take modal.solver = "lanczos"'
+        ) from error
+    finally:
+        for name in mine:
+            options.delValue(name)
+        solver.destroy()
+        whole.destroy()
+    order = np.argsort(values, kind="stable")
+    values, vectors = values[order], np.ascontiguousarray(vectors[:, order])
+    shifted = _regular_shift(matrix, interval, team)
+    _polish(matrix, shifted, values, vectors)
+    shifted.destroy()
+    return values, vectors
+
+
+SOLVERS = {"lanczos": eigenpairs, "slepc": by_slepc}
+"""What finds the eigenpairs of a part in an interval."""
+AUTO = "lanczos"
+
+
 def _check_count(found: int, interval: Interval) -> None:
     if found != interval.count:
         raise ConvergenceError(
@@ -538,7 +612,7 @@ class Bottom:
 
 class Spectrum:
     """Independent parts of a symmetric problem, the same in all teams of the processes of `comm`;
-    no eigenvalue is larger than `norm`. The `journal` holds earlier results.
+    no eigenvalue is larger than `norm`. The `journal` holds earlier results; `solver`, of `SOLVERS`.
     """
 
     def __init__(
@@ -548,8 +622,10 @@ class Spectrum:
         team: Team,
         norm: float,
         journal: Journal | None = None,
+        solver: str = AUTO,
     ) -> None:
         self.comm, self.parts, self.team = comm, parts, team
+        self._solver = solver
         self._journal = journal or Journal()
         self.bound = 1.001 * norm
 
@@ -597,8 +673,12 @@ class Spectrum:
         From zero to the first value with `count` eigenvalues below, or to `limit`, if that is
         lower. Collective.
         """
-        limit = min(limit, self.bound)
         done = [(-bottom.zero, np.zeros(len(self.parts), int))]
+        if self._solver == "slepc" and limit < self.bound:
+            below = self.below(limit)
+            if below.sum() <= count:  # SLEPc makes the slices
+                return [*done, (limit, below)]
+        limit = min(limit, self.bound)
         # A slice costs two factorisations: make no more than keep all teams busy.
         rounds = -(-len(self.team.roots) // len(self.parts))
         each = count / (len(self.parts) * rounds) if rounds > 1 else np.inf
@@ -611,7 +691,7 @@ class Spectrum:
             low, known = done[-1]
             remaining = count - known.sum()
             if remaining <= 0 or low >= limit:
-                return merged(done, largest)
+                return merged(done, np.inf if self._solver == "slepc" else largest)
             # Two per cent and two more: a little too far costs less than another step.
             goal = min(1.02 * remaining + 2, largest)
             trial = onward(max(low, 0.0), goal / density)
@@ -633,10 +713,10 @@ class Spectrum:
             ceiling = None
 
     def _found(self, part: int, interval: Interval) -> tuple[np.ndarray, np.ndarray]:
-        """`slices.eigenpairs` of a part, or the journal's copy of them. Collective in the team."""
+        """The eigenpairs of a part, or the journal's copy of them. Collective in the team."""
 
         def solve() -> Entry:
-            values, vectors = eigenpairs(self.parts[part].matrix, interval, self.team)
+            values, vectors = SOLVERS[self._solver](self.parts[part].matrix, interval, self.team)
             return {"values": values, "vectors": vectors}
 
         entry = self._journal.step(self.team.comm, solve)

@@ -30,7 +30,7 @@ from tireroad.modal.solver.fields import (
     scaled_by,
     turn_to_rule,
 )
-from tireroad.modal.solver.slicing import Bottom, Modes, Part, Slice, Spectrum, Team
+from tireroad.modal.solver.slicing import AUTO, Bottom, Modes, Part, Slice, Spectrum, Team
 from tireroad.modal.solver.symmetry import Sites, sectors, symmetries, whole
 
 RESIDUAL_TOLERANCE = 1e-8  # relative, per eigenpair
@@ -68,14 +68,15 @@ def solve(
     waves: bool = True,
     teams: int | None = None,
     journal: Journal | None = None,
+    solver: str = "auto",
 ) -> Modes:
     """The `count` lowest modes, or all below `up_to` (Hz); at least one of the two is given.
 
     The stiffness (n, n) is in N/m, the diagonal mass (own rows) in kg. Symmetries are sought at the
     `sites` of own unknowns, equal segments unless `waves` is False. A split whose modes are not
     modes of A is discarded for the next. The processes work in `teams`, each of which distributes A
-    over its members; by default each process is its own (modal.solver.slicing). Counts and slices that
-    the `journal` holds are not computed again. Raises ConvergenceError if a mode is missing,
+    over its members; by default each process is its own (modal.solver.slicing). `solver`: auto, slepc
+    or lanczos, who finds the eigenpairs of a part. Counts and slices that the `journal` holds are not computed again. Raises ConvergenceError if a mode is missing,
     inaccurate or unstable. Collective.
     """
     comm = stiffness.comm.tompi4py()
@@ -85,7 +86,8 @@ def solve(
     rank = np.arange(size) if all_sites is None else all_sites.rank()
     own = slice(*scaled.getOwnershipRange())
     team = Team.of(comm, teams or comm.size)
-    problem = _Problem(scaled, team, row_sum(scaled), mass, rank[own], journal or Journal())
+    taken = AUTO if solver == "auto" else solver
+    problem = _Problem(scaled, team, row_sum(scaled), mass, rank[own], journal or Journal(), taken)
     count, limit = min(count or size, size), (2 * np.pi * up_to) ** 2
     for split in _splits(scaled, all_sites, waves, team):
         modes = problem.solve(split, count, limit)
@@ -123,6 +125,7 @@ class _Problem:
     mass: np.ndarray
     rank: np.ndarray
     journal: Journal
+    solver: str
 
     @property
     def comm(self) -> MPI.Comm:
@@ -130,7 +133,7 @@ class _Problem:
 
     def solve(self, split: _Split, count: int, limit: float) -> Modes:
         """Solve all slices of the parts. Collective."""
-        spectrum = Spectrum(self.comm, split.parts, self.team, self.norm, self.journal)
+        spectrum = Spectrum(self.comm, split.parts, self.team, self.norm, self.journal, self.solver)
         bottom = spectrum.bottom()
         bottom.check_stable()
         boundaries = spectrum.boundaries(bottom, count, limit)

@@ -13,7 +13,7 @@ import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from tireroad.contact.results.spectra import USABLE
+from tireroad.contact.results.band import USABLE
 from tireroad.fem.errors import InputError
 from tireroad.runs.process.surroundings import available_memory
 from tireroad.runs.scene.plan import meets_road, skipped

@@ -154,7 +154,7 @@ def test_the_power_of_a_small_body_is_that_of_its_volume() -> None:
     assert power == pytest.approx(exact, rel=0.02)
 
 
-@pytest.mark.mpi(3)
+@pytest.mark.mpi
 def test_processes_share_the_frequencies() -> None:
     tire = SoundingTire.of(ring(30, 13), 0.08)
     frequency = solved_frequencies(200.0)

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from tireroad.contact.results.spectra import USABLE
+from tireroad.contact.results.band import USABLE
 from tireroad.contact.roads.placement import Placement
 from tireroad.contact.roads.road import ROADS, RoadKind
 from tireroad.contact.roads.under_tire import Motion
@@ -126,6 +126,12 @@ class Modal:
         ("forces", "held"),
         "road in the modes: replaced by its static forces, or the touching nodes held in height",
     )
+    solver: str = choice(
+        "auto",
+        ("auto", "slepc", "lanczos"),
+        "who finds the modes of each part that symmetry leaves: SLEPc's spectrum slicing, or block Lanczos in slices of "
+        "equal numbers, which auto takes",
+    )
 
     @property
     def on_axle_alone(self) -> bool:
@@ -134,8 +140,9 @@ class Modal:
 
     @property
     def asked(self) -> dict[str, Any]:
-        """`count` or `up_to` (Hz), whichever decides; the other is None."""
-        return {"count": None if self.up_to else self.count, "up_to": self.up_to}
+        """`count` or `up_to` (Hz), whichever decides, the other None; and the `solver`."""
+        count = None if self.up_to else self.count
+        return {"count": count, "up_to": self.up_to, "solver": self.solver}
 
 
 @dataclass(frozen=True, kw_only=True)
