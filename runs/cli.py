@@ -220,7 +220,8 @@ COMMANDS = {
     ),
     "resume": Command("continue from the last checkpoint of a result folder", _resume),
     "check": Command(
-        "validate a scene; print it with all defaults, its stages and its memory", _check_options
+        "validate a scene, printed with all defaults, its stages and its memory; or a road file alone",
+        _check_options,
     ),
     "report": Command("write report.html of a result folder again", _directory),
     "export": Command(
@@ -386,6 +387,9 @@ def _resumed(args: argparse.Namespace) -> argparse.Namespace:
 
 
 def _check(args: argparse.Namespace) -> None:
+    if args.scene.suffix.lower() not in ("", ".toml"):
+        _check_file(args.scene)
+        return
     from tireroad.runs.report.section_figure import write_section
     from tireroad.runs.scene.check import explain
     from tireroad.runs.scene.load import load
@@ -393,6 +397,18 @@ def _check(args: argparse.Namespace) -> None:
     scene = load(args.scene, args.set, lambda remark: print(f"note: {remark}"), args.until)
     print(explain(scene, args.processes, args.until))
     print(write_section(scene, Path("results") / scene.name))
+
+
+def _check_file(path: Path) -> None:
+    """Say what a file that is no scene holds."""
+    from tireroad.runs.report.road_figure import KINDS, describe_road, is_road_file
+
+    if not is_road_file(path):
+        raise InputError(
+            f"{path}: check takes a scene (.toml) or a road file ({', '.join(KINDS)}); a tire's file is checked through "
+            f'a scene: [tire] section = "file", file = "{path.name}"'
+        )
+    print(describe_road(path, Path("results") / path.stem))
 
 
 def _report(args: argparse.Namespace) -> None:
