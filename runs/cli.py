@@ -95,6 +95,15 @@ def _until(command: argparse.ArgumentParser) -> None:
     )
 
 
+def _export_options(command: argparse.ArgumentParser) -> None:
+    _directory(command)
+    command.add_argument(
+        "--uff",
+        action="store_true",
+        help="also frequency responses as Universal File 58: response.uff",
+    )
+
+
 def _check_options(command: argparse.ArgumentParser) -> None:
     _scene(command)
     _until(command)
@@ -225,7 +234,7 @@ COMMANDS = {
     ),
     "report": Command("write report.html of a result folder again", _directory),
     "export": Command(
-        "XDMF for ParaView and CSV for spreadsheets from a result folder", _directory
+        "XDMF for ParaView and CSV for spreadsheets from a result folder", _export_options
     ),
     "sweep": Command("run a family of scenes that share stages, in one table", _sweep_options),
     "compare": Command("compare two to twelve runs in one page and one table", _compare_options),
@@ -422,7 +431,7 @@ def _export(args: argparse.Namespace) -> None:
     directory = _results(args.directory)
     from tireroad.runs.files.export import export
 
-    for path in export(directory):
+    for path in export(directory, uff=args.uff):
         print(path)
 
 

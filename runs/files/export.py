@@ -10,6 +10,7 @@ Exports for other programs: CSV for spreadsheets, and XDMF for ParaView.
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -26,6 +27,7 @@ from tireroad.fem.errors import InputError
 from tireroad.runs.files.disk import replacing
 from tireroad.runs.files.folder import left_out
 from tireroad.runs.files.store import opened
+from tireroad.runs.files.universal import frequency_responses
 from tireroad.runs.files.wave import wave_file
 
 SHAPES = 20  # modes written
@@ -193,6 +195,7 @@ NAMES = {  # levels in third_octave/ whose names do not give the quantity
 MADE = {
     *(f"{name}.csv" for name in ("footprint", "modes", "contact_force", "spectra", "third_octave")),
     *(f"{name}.csv" for name in ("density", "response", "receptance", "vibration", "sound")),
+    "response.uff",
     *(f"{name}.xdmf" for name in ("static", "modes", "contact", "motion")),
     *(f"{name}_fields.h5" for name in ("static", "modes", "contact", "motion")),
 }
@@ -200,8 +203,10 @@ MADE = {
 Columns = dict[str, NDArray]  # heading with unit -> values (n)
 
 
-def export(directory: Path) -> list[Path]:
+def export(directory: Path, uff: bool = False) -> list[Path]:
     """Write directory/export/*.csv and *.xdmf from the existing result files; returns the paths.
+
+    `uff`: also response.uff, frequency responses as Universal File 58.
 
     XDMF files refer to the HDF5 results beside `export` and copy no data: do not move that folder.
     Every CSV column names its unit. Each file is written to a temporary name and renamed. Results
@@ -216,6 +221,8 @@ def export(directory: Path) -> list[Path]:
     for name, reader in READERS.items():
         if (directory / name).is_file() and name not in others:
             files |= _read(directory / name, reader)
+    if uff:
+        files["response.uff"] = partial(Path.write_text, data=_universal(directory, others))
     if not files:
         raise InputError(
             f"{directory} holds nothing to export (none of {', '.join(READERS)}): "
@@ -235,6 +242,21 @@ def export(directory: Path) -> list[Path]:
         if old.name not in files:
             old.unlink()
     return [folder / name for name in files]
+
+
+def _universal(directory: Path, others: Mapping[str, str]) -> str:
+    name = "response.h5"
+    text = ""
+    if (directory / name).is_file() and name not in others:
+        scene = tomllib.loads((directory / "scene.toml").read_text(encoding="utf-8"))
+        ways = [force["direction"] for force in scene.get("force", [])]
+        with opened(directory / name) as file:
+            text = frequency_responses(file, ways)
+    if not text:
+        raise InputError(
+            f"{directory} has no frequency responses: add [[force]] and [output.receptance] to the scene"
+        )
+    return text
 
 
 def _read(path: Path, reader: Callable[[h5py.File], dict]) -> dict:
