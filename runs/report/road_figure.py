@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.contact.roads.grid import Grid
 from tireroad.contact.roads.kinds.iso8608 import CLASSES
 from tireroad.contact.roads.kinds.iso8608 import REFERENCE as PER_METRE
 from tireroad.contact.roads.road import ROADS
@@ -67,7 +67,7 @@ def describe_road(path: Path, out: Path) -> str:
     return "\n".join([*lines, "", "[road]", f'kind = "{kind}"', f'file = "{path.name}"'])
 
 
-def _read(path: Path) -> tuple[str, Grid]:
+def _read(path: Path) -> tuple[str, Any]:
     refused: list[str] = []
     kinds = KINDS[path.suffix.lower()]
     if len(kinds) > 1 and _is_line(path):
@@ -96,7 +96,7 @@ def _is_line(path: Path) -> bool:
     return all(max(line.count(mark) for mark in (b",", b";", b"\t")) < 2 for line in first)
 
 
-def _middle(road: Grid) -> tuple[NDArray, NDArray]:
+def _middle(road: Any) -> tuple[NDArray, NDArray]:
     """x (n,) m from the road's beginning, and heights (n,) m of its middle line, holes bridged."""
     (first, last), (right, left) = road.measured, road.extent[1]
     pitch = max(road.steps[0], (last - first) / _MOST)
