@@ -258,7 +258,8 @@ class Projection:
         gyroscopic = self.gyroscopic if full else self.body
         convective = self.convective if full else self.body_convective
         if gyroscopic is None or convective is None or self.body is None:
-            raise InputError("modes: these are of a standing wheel and have no rotating states")
+            what = "standing wheel" if self.gyroscopic is None else "wheel of another inertia"
+            raise InputError(f"modes: these are of a {what} and have no rotating states")
         return gyroscopic, convective, self.body
 
     def first(self, count: int) -> Projection:
@@ -333,8 +334,11 @@ def project(
     comm: MPI.Comm,
     known: Projection | None = None,
     loss: PETSc.Mat | None = None,
+    doppler: bool = True,
 ) -> Projection:
     """Project the rotation matrices (fem.matrices.operators.Rotation, or None) and the momentum.
+
+    `doppler`: also the convective matrix that only this inertia needs.
 
     `carried` (3, n) kg, own rows, and `loss`, the loss stiffness or None, are those of
     fem.matrices.operators. `known`, the projection on the first of the modes, is reused: a basis
@@ -357,7 +361,7 @@ def project(
         gyroscopic=reduced("gyroscopic", -1),
         convective=reduced("convective", 1),
         body=reduced("body", -1),
-        body_convective=reduced("body_convective", 1),
+        body_convective=reduced("body_convective", 1) if doppler else None,
         loss_factor=losing,
         shapes=shapes,
     )

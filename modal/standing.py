@@ -113,10 +113,11 @@ def projected(
     operators = motions.operators
     matrices = motions.rotation if rotation else None
     comm, loss = operators.body.comm, operators.loss_stiffness()
-    projection = project(modes, matrices, operators.carried, comm, loss=loss)
+    doppler = turning is None or turning.inertia == "doppler"
+    projection = project(modes, matrices, operators.carried, comm, loss=loss, doppler=doppler)
     if turning is not None and turning.speed:
         modes = with_rotation_shapes(modes, projection, operators, matrices, turning)
-        projection = project(modes, matrices, operators.carried, comm, projection, loss)
+        projection = project(modes, matrices, operators.carried, comm, projection, loss, doppler)
     if loss is not None:
         loss.destroy()
     given = axle, motions.rim_motion(rotation), motions.static.positions, comm

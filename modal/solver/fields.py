@@ -201,14 +201,18 @@ def projected(
     Collective.
     """
     m, k = vectors.shape[1], 0 if known is None else len(known)
-    out = np.empty((m, m))
-    out[:, k:] = between(comm, vectors, matrix, vectors[:, k:])
-    own = out[k:, k:]
-    out[k:, k:] = (own + sign * own.T) / 2
-    out[k:, :k] = sign * out[:k, k:].T
+    upper = np.zeros((m, m))
+    for start in range(k, m, _BETWEEN):
+        end = min(start + _BETWEEN, m)  # the part below follows by symmetry: half of the work
+        upper[:end, start:end] = vectors[:, :end].T @ multiply(matrix, vectors[:, start:end])
+    upper = summed(comm, upper)
+    for start in range(k, m, _BETWEEN):
+        own = upper[start : start + _BETWEEN, start : start + _BETWEEN]
+        own[:] = (own + sign * own.T) / 2
+        upper[start : start + _BETWEEN, :start] = sign * upper[:start, start : start + _BETWEEN].T
     if known is not None:
-        out[:k, :k] = known
-    return out
+        upper[:k, :k] = known
+    return upper
 
 
 def loss_factors(
