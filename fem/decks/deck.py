@@ -16,7 +16,7 @@ import difflib
 import re
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import BinaryIO
 
@@ -638,7 +638,8 @@ class Deck:
     labels (n,) ascending and points (n, 3) of the nodes; surfaces: name -> (k, 2) of (element
     label, face), faces counted from 0, or ALL_FACES or BOTH_SIDES; `held`: node sets fixed to the
     rim; `pressed`: surfaces under pressure in a step; `lines`: surfaces that may be cord lines
-    inside the body. `used` and `unused` are lines for the user.
+    inside the body. `used` and `unused` are lines for the user; `same` (n,): the row that stands for
+    each node, where nodes were merged.
     """
 
     file: str
@@ -658,6 +659,7 @@ class Deck:
     lines: tuple[str, ...] = ()
     used: tuple[str, ...] = ()
     unused: tuple[str, ...] = ()
+    same: np.ndarray | None = None
 
     @property
     def dimension(self) -> int:
@@ -678,7 +680,41 @@ class Deck:
                 labels.ravel()[0] if not len(self.labels) else labels[self.labels[at] != labels][0]
             )
             raise _error(place, f"node {wrong % SCOPE} is used by an element and not defined")
-        return at
+        return at if self.same is None else self.same[at]
+
+    def merged(self, tolerance: float) -> tuple[Deck, int]:
+        """The deck with nodes of its solids nearer to each other than `tolerance` as one, and their number.
+
+        In the file's unit of length. Nodes of one element stay apart.
+        """
+        from scipy.sparse import coo_matrix
+        from scipy.sparse.csgraph import connected_components
+        from scipy.spatial import cKDTree
+
+        solids = [block for block in self.blocks if block.kind.role == "solid"]
+        if not solids or tolerance <= 0:
+            return self, 0
+        nodes = [self.rows(block.nodes, block.place) for block in solids]
+        used = np.unique(np.concatenate([one.ravel() for one in nodes]))
+        pairs = used[
+            cKDTree(self.points[used]).query_pairs(tolerance, p=np.inf, output_type="ndarray")
+        ]
+        if not len(pairs):
+            return self, 0
+        n = len(self.labels)
+        links = coo_matrix((np.ones(len(pairs)), pairs.T), (n, n))
+        _, group = connected_components(links, directed=False)
+        _, first = np.unique(group, return_index=True)
+        same = first[group]
+        for block, rows in zip(solids, nodes, strict=True):
+            ordered = np.sort(same[rows], axis=1)
+            folded = np.flatnonzero((np.diff(ordered, axis=1) == 0).any(axis=1))
+            if len(folded):
+                raise block.place.error(
+                    f"element {block.labels[folded[0]] % SCOPE} has nodes nearer to each other than tire.merge: take a "
+                    "smaller one, or 0"
+                )
+        return replace(self, same=same), int((same != np.arange(n)).sum())
 
 
 SCOPE = 10**10  # labels are offset by SCOPE * number of their part

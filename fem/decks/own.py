@@ -186,11 +186,15 @@ def _ply(line: CordLine, mesh: SectionMesh) -> Ply:
     return Ply(sides=mesh.plies[line.name], **given)
 
 
+MERGE = 1e-6  # m
+
+
 @dataclass(frozen=True, kw_only=True)
 class Wishes:
     """Settings of the scene for a file: face names, length unit ("m", "mm", "in"), half section.
 
-    `materials`: regions or materials that the scene defines itself; the deck's are ignored.
+    `merge` m: nodes nearer than this are one, 0: none are. `materials`: regions or materials that
+    the scene defines itself; the deck's are ignored.
     """
 
     inner: str | None = None
@@ -198,6 +202,7 @@ class Wishes:
     rim: tuple[str, ...] = ()
     length_unit: str = "m"
     mirror: bool = False
+    merge: float = MERGE
     materials: frozenset[str] = frozenset()
 
 
@@ -247,6 +252,7 @@ def _section(deck: Deck, ring_angles: np.ndarray | None, wishes: Wishes) -> OwnS
     units = SYSTEMS[wishes.length_unit]
     found = regions(deck)
     _check_radius(deck, wishes.length_unit)
+    deck, together = deck.merged(wishes.merge / units.length)
     quads, edges, split = build(deck, found.of)
     one_body(quads, lambda label: f"element {label % SCOPE}")
     origins = Origins(len(edges.ends))
@@ -277,6 +283,10 @@ def _section(deck: Deck, ring_angles: np.ndarray | None, wishes: Wishes) -> OwnS
         plies=lines,
     )
     notes = [*shape.notes, *_said(deck, split, shift, wishes, found, units)]
+    if together:
+        notes.append(
+            f"{together} nodes nearer than {wishes.merge:g} m to another are one with it (tire.merge)"
+        )
     notes += [note for one in compounds if one for note in one.notes]
     return OwnSection(
         mesh=mesh,

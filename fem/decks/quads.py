@@ -480,7 +480,7 @@ def one_body(quads: Quads, name: Callable[[int], str]) -> None:
         a, b = (name(quads.element[cell]) for cell in first[:2])
         raise InputError(
             f"{len(bodies)} bodies that share no nodes, one with {a} and one with {b}: the section must be "
-            "one; merge the nodes at their border"
+            "one; merge the nodes at their border, or raise tire.merge"
         )
 
 

@@ -54,7 +54,9 @@ class LaserFile(Levelled):
         None, tuple(UNITS), "unit of the heights in the file; absent: mm, if the heights can be"
     )
     missing: tuple[float, ...] = numbers(
-        'values in the file that mean "no height", such as -9999; nan always does', "-", Limits()
+        'values in the file that mean "no height", such as -9999; nan always does',
+        "-",
+        Limits(-1e12, 1e12),
     )
     outlier: float = number(
         8.0, "-", "a height is an outlier this many times the usual distance (1.48 times the median) from "

@@ -8,6 +8,7 @@ from ring_decks import solids
 from torus_decks import CENTRE, HALF_ANGLE, MINOR, RUBBER, WALL, Torus, plain
 
 from tireroad.fem.decks.own import read
+from tireroad.fem.errors import InputError
 
 EXACT = 2 * np.pi * HALF_ANGLE * (MINOR**2 - (MINOR - WALL) ** 2) * CENTRE + 2 * np.pi * (
     2 * np.sin(HALF_ANGLE) * (MINOR**3 - (MINOR - WALL) ** 3) / 3
@@ -159,3 +160,40 @@ def test_parts_and_instances(own):
     text += "*ASSEMBLY, NAME=A\n*INSTANCE, NAME=T-1, PART=TIRE\n*END INSTANCE\n*NSET, NSET=AIR, INSTANCE=T-1\nINSIDE\n"
     text += "*END ASSEMBLY\n" + RUBBER
     assert len(own(text, inner="AIR").mesh.inner) == 12
+
+
+class Unmerged(Torus):
+    """Two halves whose nodes on the middle plane are two each, a few ulp apart."""
+
+    def cells(self):
+        middle = len(self.arc) // 2
+        for number, nodes in super().cells():
+            left = min((node - 1) % 1000 for node in nodes) >= middle
+            yield (
+                number,
+                [node + 500 if left and (node - 1) % 1000 == middle else node for node in nodes],
+            )
+
+    def nodes(self, columns="{:d}, {:.15g}, {:.15g}") -> str:
+        twice = ""
+        for line in super().nodes(columns).splitlines():
+            label, r, z = line.split(",")
+            if (int(label) - 1) % 1000 == len(self.arc) // 2:
+                twice += f"{int(label) + 500}, {r}, {float(z) + 4e-17!r}\n"
+        return super().nodes(columns) + twice
+
+
+@pytest.mark.parametrize("quadratic", [True, False])
+def test_coincident_nodes_are_one(own, quadratic):
+    """As meshers leave them between the parts of a section; apart they are two bodies."""
+    kind = "CGAX8H" if quadratic else "CAX4"
+    whole = own(plain(Torus(quadratic), kind), **dict(FULL))
+    merged = own(plain(Unmerged(quadratic), kind), **dict(FULL))
+    assert any("tire.merge" in note for note in merged.notes)
+    assert len(merged.mesh.nodes) == len(whole.mesh.nodes)
+    assert volume(merged.mesh) == pytest.approx(volume(whole.mesh), rel=1e-12)
+    assert len(merged.mesh.outer) == len(whole.mesh.outer)
+    with pytest.raises(InputError, match="2 bodies that share no nodes"):
+        own(plain(Unmerged(quadratic), kind), **dict(FULL), merge=0.0)
+    with pytest.raises(InputError, match="nearer to each other than tire.merge"):
+        own(plain(Torus(quadratic), kind), **dict(FULL), merge=0.01)

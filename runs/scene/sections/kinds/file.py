@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from tireroad.fem.errors import InputError
-from tireroad.fem.parameters import choice, filename, flag, text, texts
+from tireroad.fem.parameters import choice, filename, flag, number, text, texts
 from tireroad.runs.scene.source import Source
 from tireroad.runs.scene.tables.tire import (
     Proportions,
@@ -63,6 +63,7 @@ def _source(tire: Tire) -> tuple[Path, int, Wishes]:
         rim=keys.rim,
         length_unit=keys.length_unit,
         mirror=keys.mirror,
+        merge=keys.merge,
         materials=frozenset(r.name for r in tire.region if r.name and r.material is not None),
     )
     try:
@@ -114,21 +115,21 @@ def fingerprint(tire: Tire) -> str:
 def check_regions(tire: Tire, own: OwnSection) -> None:
     """Check that every [[tire.region]] names a region of the file."""
     known = {name.upper() for name in own.mesh.regions}
-    for number, region in enumerate(tire.region):
+    for place, region in enumerate(tire.region):
         if region.name is None or region.name.upper() not in known:
             shown = "has no name" if region.name is None else f'name = "{region.name}" is none'
             raise InputError(
-                f"tire.region.{number} {shown} of the file's regions: {', '.join(own.mesh.regions)}"
+                f"tire.region.{place} {shown} of the file's regions: {', '.join(own.mesh.regions)}"
             )
 
 
 def check_cords(tire: Tire, own: OwnSection) -> None:
     """Check that every [[tire.cords]] names a line of the file."""
-    for number, cords in enumerate(spelt(tire.cords, own.mesh.plies)):
+    for place, cords in enumerate(spelt(tire.cords, own.mesh.plies)):
         if cords.name not in own.mesh.plies:
             known = ", ".join(own.mesh.plies) or "none"
             raise InputError(
-                f'tire.cords.{number} name = "{cords.name}" is not a line of the file: {known}'
+                f'tire.cords.{place} name = "{cords.name}" is not a line of the file: {known}'
             )
 
 
@@ -230,6 +231,13 @@ class FileSection(SectionKind):
         "m",
         ("m", "mm", "in"),
         "length unit of the file; mm implies N, MPa and tonnes, in implies lbf and psi",
+    )
+    merge: float = number(
+        1e-6,
+        "m",
+        "nodes of the file nearer to each other than this are one; 0: none are",
+        least=0,
+        most=0.01,
     )
     mirror: bool = flag(
         False, "true: the file holds half the section, which ends on z = 0, and is mirrored"
