@@ -240,6 +240,12 @@ LONGEST_STEP = 1e6
 FORMATS = ("KRBI", "KDBI", "LRFI", "LDFI")
 # Options for searching, checking and logging, which do not affect heights.
 HARMLESS_OPTIONS = ("REFLINE_SEARCH_", "WARN_", "LOG_", "CHECK_")
+# Options that act beyond the ends and sides of what was measured, where no tire rolls, or where
+# heights are missing, which `holes` treats; and a height of the whole road, which is levelled.
+BEYOND = (
+    "REFLINE_CONTINUATION", "BORDER_MODE_", "BORDER_OFFSET_", "BORDER_SMOOTH_", "GRID_NAN_MODE",
+    "GRID_NAN_OFFSET", "REFPOINT_Z",
+)  # fmt: skip
 # Modifiers that only move the road within its plane.
 HARMLESS_MODIFIERS = (
     "REFPOINT_U", "REFPOINT_V", "REFPOINT_X", "REFPOINT_Y", "REFPOINT_PHI",
@@ -259,7 +265,7 @@ def read_opencrg(file: Path | str, holes: str = "refuse", end: str = "refuse") -
         raise InputError(f"road.file {file}: no such file")
     try:
         blocks, start, line = read_header(file)
-        _refuse_blocks(file, blocks)
+        unused = _refuse_blocks(file, blocks)
         parameters = key_values(file, blocks.get("ROAD_CRG", []))
         code, channels = _definition(file, blocks)
         step, rows = _rows(file, parameters, blocks["KD_DEFINITION"])
@@ -273,11 +279,17 @@ def read_opencrg(file: Path | str, holes: str = "refuse", end: str = "refuse") -
     _check_line(file, channels, parameters, table, step)
     v, columns = _sections(file, channels, parameters)
     u = step * np.arange(count, dtype=float)
-    return Grid(u, v, Columns(table, columns), holes=holes, end=end, source=f"road.file {file}")
+    road = Grid(u, v, Columns(table, columns), holes=holes, end=end, source=f"road.file {file}")
+    if unused:
+        road.notes = (
+            f"not used, as they act beyond the road or where it has holes: {', '.join(unused)}",
+        )
+    return road
 
 
-def _refuse_blocks(file: Path, blocks: Blocks) -> None:
-    """InputError for what would change the heights and is not supported, by name."""
+def _refuse_blocks(file: Path, blocks: Blocks) -> list[str]:
+    """Options without an effect on the road. InputError for what would change heights, by name."""
+    unused = []
     for name in ("ROAD_CRG", "KD_DEFINITION"):
         if name not in blocks and "ROAD_CRG_FILE" not in blocks:
             raise InputError(
@@ -291,11 +303,14 @@ def _refuse_blocks(file: Path, blocks: Blocks) -> None:
     ):
         for key, value in key_values(file, blocks.get(block, [])).items():
             without_effect = value == 0.0 or (value == 1.0 and key.startswith("SCALE_"))
-            if not without_effect and not key.startswith(harmless):
+            if not without_effect and key.startswith(BEYOND):
+                unused.append(f"{key} = {value:g}")
+            elif not without_effect and not key.startswith(harmless):
                 raise InputError(
                     f"{file}: ${block} {key} = {value:g} is not supported; apply it to the file "
                     "first, or remove it"
                 )
+    return unused
 
 
 def _definition(file: Path, blocks: Blocks) -> tuple[str, list[Channel]]:
@@ -326,7 +341,9 @@ def _rows(
         if fields[:2] != ["u:reference line u", "m"] or len(fields) < 4:
             continue
         (virtual,) = key_values(file, [(number, f"U={fields[3]}")]).values()
-        if step is not None and abs(virtual - step) > 1e-3 * abs(step):
+        # Writers of the format round it to three decimals: the key decides.
+        rounded = 0.501 * 10.0 ** -len(fields[3].partition(".")[2].partition("e")[0])
+        if step is not None and abs(virtual - step) > max(1e-3 * abs(step), min(rounded, 1e-3)):
             raise InputError(
                 f"{file}, line {number}: step {virtual:g} m, but REFERENCE_LINE_INCREMENT = "
                 f"{step:g} m"
@@ -413,7 +430,7 @@ def _check_line(
             if parameters.get(key, 0.0) != 0.0:
                 raise InputError(f"{file}: {key} = {parameters[key]:g}: {name} is not supported")
     start = parameters.get("REFERENCE_LINE_START_Z", 0.0)
-    if abs(parameters.get("REFERENCE_LINE_END_Z", start) - start) > 1e-9:
+    if abs(parameters.get("REFERENCE_LINE_END_Z", start) - start) > 1e-6:  # m, as written
         raise InputError(f"{file}: REFERENCE_LINE_START_Z and END_Z differ: slope is not supported")
     lines = [c for c in channels if c[1].startswith("reference line ")]
     for line, name, _ in lines:

@@ -166,7 +166,6 @@ SLOPE = PHI.replace("phi,rad", "slope,m/m")
         ({"parameters": "REFERENCE_LINE_END_U = 1e300\n"}, "not a whole number"),
         ({"parameters": "LONG_SECTION_V_RIGHT = one\n"}, "line 8: .*KEY = number"),
         ({"blocks": "$ROAD_CRG_MODS\nSCALE_Z_GRID = 2.0\n"}, "SCALE_Z_GRID = 2"),
-        ({"blocks": "$ROAD_CRG_OPTS\nBORDER_MODE_U = 1\n"}, "BORDER_MODE_U = 1"),
         ({"blocks": "$ROAD_CRG_FILE\nother.crg\n"}, "refers to another file"),
         ({"code": "XRFI"}, "'XRFI'"),
         ({"channels": "D:long section 1,m\n"}, "at least 2"),
@@ -198,6 +197,30 @@ def test_blocks_without_effect_on_heights_are_accepted(tmp_path: Path) -> None:
     blocks += "$ROAD_CRG_OPTS\nCHECK_EPS = 1e-5\n$\n"
     (tmp_path / "road.crg").write_bytes(crg("KDBI", Z, blocks=blocks))
     assert np.allclose(heights(tmp_path / "road.crg"), Z, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    "option",
+    ["BORDER_MODE_U = 2", "BORDER_OFFSET_V = 0.1", "REFLINE_CONTINUATION = 1", "GRID_NAN_MODE = 2"],
+)
+def test_options_that_act_beyond_the_road_are_said_and_not_used(
+    tmp_path: Path, option: str
+) -> None:
+    block = "MODS" if option.startswith("GRID") else "OPTS"
+    (tmp_path / "road.crg").write_bytes(crg("KDBI", Z, blocks=f"$ROAD_CRG_{block}\n{option}\n$\n"))
+    assert option in read_opencrg(tmp_path / "road.crg").notes[0]
+    assert np.allclose(heights(tmp_path / "road.crg"), Z, atol=1e-8)
+
+
+def test_a_rounded_step_gives_way_to_the_key(tmp_path: Path) -> None:
+    """The format's writer prints three decimals of the increment in the line of the channel."""
+    channels = "U:reference line u,m,0.000,0.001\n" + "".join(
+        f"D:long section {i + 1},m\n" for i in range(11)
+    )
+    parameters = f"REFERENCE_LINE_INCREMENT = 0.0005\nREFERENCE_LINE_END_U = {0.0005 * (len(Z) - 1)}\n"
+    parameters += "LONG_SECTION_V_RIGHT = -1.25\nLONG_SECTION_V_LEFT = 1.25\n"
+    (tmp_path / "road.crg").write_bytes(crg("KDBI", Z, parameters=parameters, channels=channels))
+    assert read_opencrg(tmp_path / "road.crg").steps[0] == pytest.approx(0.0005)
 
 
 def test_other_files_are_refused(tmp_path: Path) -> None:
