@@ -190,7 +190,8 @@ def unrolled(outline: NDArray, share: NDArray) -> str:
     """Shares (e,) per area of elements with corners (e, 4, 2): degrees from the lowest point, place across."""
     known = np.isfinite(outline).all(axis=(1, 2))
     corners = outline[known]
-    size = np.abs(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])) / 2
+    one, other = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
+    size = np.abs(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]) / 2
     density = share[known] / np.maximum(size, 1e-12)
     top = float(np.quantile(np.abs(density), 0.995)) or 1.0
     figure, axes = bare_canvas(WIDE, 2.6)

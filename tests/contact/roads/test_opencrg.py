@@ -217,7 +217,7 @@ def test_a_rounded_step_gives_way_to_the_key(tmp_path: Path) -> None:
     channels = "U:reference line u,m,0.000,0.001\n" + "".join(
         f"D:long section {i + 1},m\n" for i in range(11)
     )
-    parameters = f"REFERENCE_LINE_INCREMENT = 0.0005\nREFERENCE_LINE_END_U = {0.0005 * (len(Z) - 1)}\n"
+    parameters = f"REFERENCE_LINE_INCREMENT = 0.0005\nREFERENCE_LINE_START_U = 0\nREFERENCE_LINE_END_U = {0.0005 * (len(Z) - 1)}\n"
     parameters += "LONG_SECTION_V_RIGHT = -1.25\nLONG_SECTION_V_LEFT = 1.25\n"
     (tmp_path / "road.crg").write_bytes(crg("KDBI", Z, parameters=parameters, channels=channels))
     assert read_opencrg(tmp_path / "road.crg").steps[0] == pytest.approx(0.0005)
