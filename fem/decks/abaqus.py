@@ -63,6 +63,8 @@ class SectionReader:
         self.orientations: dict[str, Orientation] = {}
         self.unused: list[str] = []
         self._membranes: str | None = None
+        self._mass: float = 0.0
+        self._covering: tuple[str, float] | None = None
         self._material: str | None = None
         self._materials: dict[str, tuple[list, Place]] = {}
         self.handlers = {
@@ -88,10 +90,17 @@ class SectionReader:
         self._membranes = card.options.get("ELSET", "").upper()
         if not self._membranes:
             raise card.place.error(f"*{card.keyword} needs ELSET=")
-        if card.keyword == "MEMBRANE SECTION" and card.options.get("MATERIAL"):
+        density = card.options.get("DENSITY", "")
+        self._mass = number(density, card.place) if density else 0.0
+        self._covering = None
+        material = card.options.get("MATERIAL")
+        if card.keyword == "MEMBRANE SECTION" and material:
+            rows = [parts for _, parts in data_lines(lines) if parts and parts[0]]
+            thickness = number(rows[0][0], card.place) if rows else 0.0
+            self._covering = material.upper(), thickness
             self.unused.append(
-                f"*MEMBRANE SECTION: its cords are used, the stiffness of the membrane itself "
-                f"({card.options['MATERIAL']}) is not ({card.place})"
+                f"*MEMBRANE SECTION: its cords and its mass are used, the stiffness of the membrane itself "
+                f"({material}) is not ({card.place})"
             )
 
     def _shell(self, card: Card, lines: list[Data], _: int) -> None:
@@ -129,9 +138,12 @@ class SectionReader:
                     extension=numbers.get(7, 0.0),
                     radius=numbers.get(8, 0.0),
                     orientation=card.options.get("ORIENTATION", "").upper(),
+                    mass=self._mass,
+                    covering=self._covering,
                     place=place,
                 )
             )
+            self._mass, self._covering = 0.0, None
 
     def _embed(self, card: Card, lines: list[Data], _: int) -> None:
         host = card.options.get("HOST ELSET", card.options.get("HOST"))

@@ -162,6 +162,11 @@ def cord(compound: Compound, units: Units) -> CordMaterial:
     raise compound.place.error(f"material {compound.name} of cords has no *ELASTIC")
 
 
+def density_of(compound: Compound, units: Units) -> float | None:
+    """Density, kg/m3; None if it has none."""
+    return _density(_parts(compound), units, compound)
+
+
 def _parts(compound: Compound) -> dict:
     return {keyword: (options, rows, place) for keyword, options, rows, place in compound.parts}
 

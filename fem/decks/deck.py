@@ -584,7 +584,8 @@ class Layer:
 
     `angle` in degrees: from the meridian in axisymmetric elements, otherwise from the local first
     direction; `geometry` CONSTANT, ANGULAR (spacing in degrees) or LIFT EQUATION (`extension`,
-    `radius`).
+    `radius`). `mass`: that of the membrane itself per area, and `covering`, its material and
+    thickness; both of the first layer of a section alone.
     """
 
     name: str
@@ -597,6 +598,8 @@ class Layer:
     extension: float = 0.0
     radius: float = 0.0
     orientation: str = ""
+    mass: float = 0.0
+    covering: tuple[str, float] | None = None
     place: Place
 
 

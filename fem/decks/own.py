@@ -16,8 +16,25 @@ from pathlib import Path
 import numpy as np
 
 from tireroad.fem.decks import abaqus, gmsh, revolved
-from tireroad.fem.decks.compounds import SYSTEMS, Rubber, Units, check_size, cord, rubber
-from tireroad.fem.decks.deck import ALL_FACES, BOTH_SIDES, SCOPE, Block, Deck, Place, missing
+from tireroad.fem.decks.compounds import (
+    SYSTEMS,
+    Rubber,
+    Units,
+    check_size,
+    cord,
+    density_of,
+    rubber,
+)
+from tireroad.fem.decks.deck import (
+    ALL_FACES,
+    BOTH_SIDES,
+    SCOPE,
+    Block,
+    Deck,
+    Layer,
+    Place,
+    missing,
+)
 from tireroad.fem.decks.embedding import Laid, Origins, Ply, lay_all, plies
 from tireroad.fem.decks.quads import (
     DeckEdges,
@@ -359,13 +376,30 @@ def _cords(deck: Deck, quads: Quads, laid: dict[str, Laid], units: Units) -> lis
             known = ", ".join(deck.materials) or "none"
             raise layer.place.error(f"there is no material {layer.material}; there are: {known}")
         material = cord(deck.materials[layer.material], units)
-        made += plies(quads, laid[layer.elements], layer, material, units.length)
+        found = plies(quads, laid[layer.elements], layer, material, units.length)
+        itself = _mass_per_area(deck, layer, units)
+        # Carried by the cords, whose mass per area is density A / s.
+        made += [
+            replace(ply, density=ply.density + itself * ply.spacing / ply.area) for ply in found
+        ]
     made = [replace(ply, name=ply.name.replace("/", "-")) for ply in made]
     names = [ply.name for ply in made]
     return [
         replace(ply, name=f"{ply.name} [{n + 1}]") if names.count(ply.name) > 1 else ply
         for n, ply in enumerate(made)
     ]
+
+
+def _mass_per_area(deck: Deck, layer: Layer, units: Units) -> float:
+    """Mass of a layer's membrane itself, kg/m2: of *SURFACE SECTION, DENSITY=, or of its material."""
+    mass = layer.mass * units.density * units.length
+    if layer.covering is None:
+        return mass
+    name, thickness = layer.covering
+    if name not in deck.materials:
+        known = ", ".join(deck.materials) or "none"
+        raise layer.place.error(f"there is no material {name}; there are: {known}")
+    return mass + (density_of(deck.materials[name], units) or 0.0) * thickness * units.length
 
 
 def _lines(deck: Deck, quads: Quads, edges: DeckEdges, origins: Origins, wishes: Wishes) -> dict:

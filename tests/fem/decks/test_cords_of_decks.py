@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from good_decks import BELTED
 from ring_decks import position
 from torus_decks import (
     BELT,
@@ -204,3 +205,21 @@ def test_materials_of_cords(own):
         (ply,) = own(belt + "*MATERIAL, NAME=STEEL\n" + text).plies
         assert ply.youngs_modulus == pytest.approx(modulus)
         assert (ply.density, ply.compression) == (density, compression)
+
+
+@pytest.mark.parametrize(
+    ("section", "added"),
+    [
+        ("*SURFACE SECTION, ELSET=BELT, DENSITY=0.9\n", 0.9),
+        ("*MEMBRANE SECTION, ELSET=BELT, MATERIAL=SKIM\n0.0005\n", 0.5),
+    ],
+)
+def test_the_mass_of_the_membrane_itself_counts(own, section, added):
+    """Per area, kg/m2, beside that of its cords: A rho / s."""
+    plain_deck = BELTED + "*MATERIAL, NAME=SKIM\n*ELASTIC\n6.0E6, 0.45\n*DENSITY\n1000.\n"
+    heavy = plain_deck.replace("*SURFACE SECTION, ELSET=BELT\n", section)
+    assert heavy != plain_deck
+    one, other = (own(deck).plies for deck in (plain_deck, heavy))
+    for light, loaded in zip(one, other, strict=True):
+        per_area = [ply.density * ply.area / ply.spacing for ply in (light, loaded)]
+        assert per_area[1] - per_area[0] == pytest.approx(added, rel=1e-9)
