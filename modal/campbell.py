@@ -100,18 +100,36 @@ def critical_speed(projection: Projection, inertia: str, free_at: float | None =
     motions are stationary by themselves and make K~ singular at that very speed, so they are
     excluded too.
     """
+    return standing_wave(projection, inertia, free_at)[0]
+
+
+def standing_wave(
+    projection: Projection, inertia: str, free_at: float | None = None
+) -> tuple[float, np.ndarray]:
+    """The critical speed (rad/s) and the modal coordinates (m,) of the wave that stands there.
+
+    By the principle of Rayleigh and Ritz more modes can only lower the speed: that of few is an
+    upper bound.
+    """
     _, convective, _ = projection.rotating(inertia)
     flexible = projection.squares > 0
+    wave = np.zeros(len(flexible))
+    turn = np.eye(int(flexible.sum()))
     squares = np.diag(projection.squares[flexible])
     convective = convective[np.ix_(flexible, flexible)]
     if free_at is not None:
         values, motions = linalg.eigh(squares + free_at**2 * convective)
         held = motions[:, np.abs(values) > RIGID * free_at**2]
         squares, convective = held.T @ squares @ held, held.T @ convective @ held
+        turn = held
     if not len(squares):
-        return np.inf
-    largest = linalg.eigh(-convective, squares, eigvals_only=True)[-1]
-    return float(1 / np.sqrt(largest)) if largest > 0 else np.inf
+        return np.inf, wave
+    last = [len(squares) - 1] * 2
+    largest, vector = linalg.eigh(-convective, squares, subset_by_index=last)
+    if not largest[0] > 0:
+        return np.inf, wave
+    wave[flexible] = turn @ vector[:, 0]
+    return float(1 / np.sqrt(largest[0])), wave
 
 
 def onset(projection: Projection, damping: Damping, inertia: str, unstable: float) -> float:

@@ -377,7 +377,7 @@ def _rolling(
     }
     observe.say(
         f"  energy: contact {work:.4g} J + drive {drive:.4g} J = in the tire {left:.4g} J + lost "
-        f"{lost:.4g} J + lost in truncated modes {beyond:.2g} J + dissipated by the scheme {taken:.2g} J; "
+        f"{lost:.4g} J + lost in truncated modes, less what the drive puts into them, {beyond:.2g} J + dissipated by the scheme {taken:.2g} J; "
         f"imbalance {off:.2g} J"
     )
     if abs(off) > _UNBALANCED * moved + slight:

@@ -18,9 +18,17 @@ import numpy as np
 from tireroad.fem.cavity.column import Column
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.parallel import on_root
+from tireroad.fem.static.state import StaticState
 from tireroad.greens.coupling import Wheel, wheel_of
-from tireroad.modal.basis import ModalBasis
-from tireroad.modal.campbell import Campbell, critical_speed, growth, onset, sweep
+from tireroad.modal.basis import ModalBasis, Projection
+from tireroad.modal.campbell import (
+    Campbell,
+    critical_speed,
+    growth,
+    onset,
+    standing_wave,
+    sweep,
+)
 from tireroad.modal.damping import Proportional, StrainEnergy
 from tireroad.modal.rolling import RollingModes, full_states, rolling_modes
 from tireroad.modal.states import StateModes
@@ -101,6 +109,7 @@ class RotatingStage(Computed[RollingModes]):
     """The states of the rolling tire; for a wheel at rest, those of the modes."""
 
     name: ClassVar[str] = "rotating"
+    static: Done[StaticState]
     modes: Done[ModalBasis]
     wheel: Done[Wheel]
 
@@ -138,13 +147,31 @@ class RotatingStage(Computed[RollingModes]):
             rolling = self._full(record, rolling)
         speed = rolling.turning.speed
         free_at = speed if job.scene.modes.rim == "free" else None
-        critical = critical_speed(basis.projection, rolling.turning.inertia, free_at)
+        inertia = rolling.turning.inertia
+        critical, wave = standing_wave(basis.projection, inertia, free_at)
         _describe(record, rolling, critical)
+        if np.isfinite(critical):
+            few = basis.projection.among(_lower(basis.projection))
+            before = critical_speed(few, inertia, free_at)
+            _describe_wave(record, self._where(basis, wave), critical, before)
         if speed > critical:
             record.warnings.append(_beyond(speed, critical))
         if rolling.states.unstable:
             record.warnings.append(_growth(job, rolling, basis))
         return replace(rolling, campbell=self._campbell(record))
+
+    def _where(self, basis: ModalBasis, wave: np.ndarray) -> tuple[int, float]:
+        """Number of waves around, and y (m) where it is largest, of coordinates (m,) of the modes."""
+        state = self.static.product
+        around, along = state.shape
+        field = (basis.shape[: 3 * around * along] @ wave).reshape(around, along, 3)
+        column = int((field**2).sum(axis=(0, 2)).argmax())
+        place = state.points.reshape(around, along, 3)[:, column]
+        ring = np.arctan2(place[:, 0], -place[:, 2]) % (2 * np.pi)
+        order = np.argsort(ring)
+        even = 2 * np.pi * np.arange(8 * around) / (8 * around)
+        line = np.interp(even, ring[order], field[order, column].sum(axis=1), period=2 * np.pi)
+        return int(np.abs(np.fft.rfft(line))[1:].argmax()) + 1, float(place[0, 1])
 
     def _full(self, record: Record, projected: RollingModes) -> RollingModes:
         """The states of the finite elements, which replace the projected ones. Collective."""
@@ -208,6 +235,32 @@ def _beyond(speed: float, critical: float) -> str:
         "rad/s, at which a wave is stationary on the road and grows without bound: the results have "
         "little meaning; take a lower speed, a higher static.inflation or a stiffer material"
     )
+
+
+LOWER = 0.7  # of the highest mode: the modes by which the critical speed is judged
+CONVERGED = 0.03  # largest relative change by the modes above
+
+
+def _lower(projection: Projection) -> np.ndarray:
+    """Mask (m,) of the modes up to `LOWER` of the highest, without rotation shapes."""
+    top = projection.squares[projection.modes - 1]
+    below = projection.squares <= LOWER**2 * top
+    below[projection.modes :] = False
+    return below
+
+
+def _describe_wave(
+    record: Record, where: tuple[int, float], critical: float, before: float
+) -> None:
+    """The wave that stands at the critical speed, and whether modes enough are there to say so."""
+    waves, y = where
+    record.headline["its standing wave"] = (f"{waves} around, largest at y = {1e3 * y:.0f} mm", "-")
+    if not before < (1 + CONVERGED) * critical:
+        record.headline["the critical speed is"] = (
+            f"an upper bound, of the stiffness at the present speed: with modes to {LOWER:g} of the highest it was "
+            f"{before:.4g} rad/s, and more modes lower it further",
+            "-",
+        )
 
 
 def _describe(record: Record, rolling: RollingModes, critical: float) -> None:
