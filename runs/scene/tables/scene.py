@@ -45,7 +45,7 @@ from tireroad.runs.scene.schema import (
     vector,
 )
 from tireroad.runs.scene.tables.contact import Contact, PatternTable, Time
-from tireroad.runs.scene.tables.sound import Sound
+from tireroad.runs.scene.tables.sound import HEARD, Sound
 from tireroad.runs.scene.tables.tire import Cavity, Tire
 
 
@@ -723,12 +723,12 @@ class Scene:
 
     @property
     def heard_up_to(self) -> float:
-        """Highest frequency (Hz) of the sound: sound.up_to, or where the modes end, at most 1 kHz."""
+        """Highest frequency (Hz) of the sound: sound.up_to, or where the modes end, at most `HEARD`."""
         assert self.sound is not None, "of scenes with [sound] only"
         if self.sound.up_to is not None:
             return self.sound.up_to
         highest = self.modal.up_to if self.modal else None
-        return min(1000.0, USABLE * highest) if highest else 1000.0
+        return min(HEARD, USABLE * highest) if highest else HEARD
 
     @property
     def joins_shapes(self) -> bool:

@@ -8,6 +8,7 @@ from typing import Any
 from tireroad.fem.parameters import Key, Limits, described, finite, number, parameter
 
 MICROPHONES = ("cpx", "obsi", "pass-by")
+HEARD = 1130.0  # Hz: the end of the third octave of 1 kHz
 
 
 def _microphones() -> Any:
@@ -56,7 +57,7 @@ class Sound:
     up_to: float | None = number(
         None,
         "Hz",
-        "highest frequency; absent: 0.8 of modal.up_to, at most 1000 Hz, or 1000 Hz",
+        "highest frequency; absent: 0.8 of modal.up_to, at most 1130 Hz, the end of the third octave of 1 kHz",
         least=50,
         most=3000,
     )
