@@ -13,8 +13,7 @@ move, not of the material: what runs through a shape at rest makes no sound.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
 
 import numpy as np
 from mpi4py import MPI
@@ -23,6 +22,8 @@ from scipy import interpolate, sparse
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.static.state import StaticState
+from tireroad.fem.tire.mesh import ring_quads
+from tireroad.greens.outputs import Surface
 from tireroad.greens.sound import APART, MIRROR, ON_ROAD, Body
 
 Array = NDArray[np.float64]
@@ -74,7 +75,7 @@ class SoundingTire:
     and up of the road in the wheel's axes, `height` (m) of the axle's centre over it; `grid` (e, 2):
     row and column of the elements of the face, -1 of a disc; `lines`: the nodes' rows and columns,
     in steps of the face's grid, at which the elements end; `turned`: whether their corners run
-    against the order of the grid.
+    against the order of the grid; `slopes`: of g on the elements of the face (`_slopes`).
     """
 
     body: Body
@@ -86,6 +87,7 @@ class SoundingTire:
     grid: NDArray[np.intp]
     lines: tuple[Array, Array]
     turned: bool
+    slopes: tuple[Array, list[sparse.csr_matrix]]
 
     @staticmethod
     def of(
@@ -99,6 +101,7 @@ class SoundingTire:
         """Of a static state on a plane, with elements of at most `coarser` times `size` m.
 
         `wheel_depth` m: of the discs behind the beads; `leak` m: height of the contact over the road.
+        Whether the body is closed is for `body.checked`.
         """
         if state.road_height is None:
             raise InputError("sound: the tire is not on a road: give [static] a load (N)")
@@ -111,45 +114,42 @@ class SoundingTire:
         place = state.positions @ axes.T
         place[:, 2] += height
         place[:, 2] = np.where(state.force > 0, 0.0, np.maximum(place[:, 2], 0.0))
-        touching = place[:, 2] <= ON_ROAD * 2 * height
         place[:, 2] += leak
+        level = ON_ROAD * 2 * height
         grid = place.reshape(*state.shape, 3)
         lines = _lines(grid, size, coarser)
         corners, number = _face_elements(grid, lines)
-        if leak == 0:
-            rests = (corners[..., 2] <= ON_ROAD * 2 * height).all(axis=1)
-        else:
-            rests = np.zeros(len(corners), bool)
-        beads = [_at(grid, lines[0], np.full(len(lines[0]), c)) for c in (0.0, grid.shape[1] - 1.0)]
-        left, right = (
-            _disc(beads[1], WHEEL * size, -wheel_depth),
-            _disc(beads[0], WHEEL * size, wheel_depth),
+        open_to = (corners[..., 2] > level).any(axis=1)
+        right, left = (
+            _at(grid, lines[0], np.full(len(lines[0]), c)) for c in (0.0, grid.shape[1] - 1.0)
         )
-        discs = np.concatenate([left, right[:, ::-1]])
-        every = np.concatenate([corners[~rests], discs])
-        inwards = float((every.mean(axis=1) * _vectors(every)).sum()) < 0
-        if inwards:
-            every = every[:, ::-1]
-        face = np.arange(len(every)) < (~rests).sum()
-        body = Body(every, np.arange(len(every)), True).checked("sound")
-        own = np.where(
-            face[:, None], np.concatenate([number[~rests], np.full((len(discs), 2), -1)]), -1
+        discs = np.concatenate(
+            [
+                _disc(left, WHEEL * size, -wheel_depth),
+                _disc(right, WHEEL * size, wheel_depth)[:, ::-1],
+            ]
         )
-        quads = _quads(*state.shape)
-        open_to = ~touching[quads].all(axis=1) if leak == 0 else np.ones(len(quads), bool)
-        area = _node_areas(place, quads[open_to]) * (-1.0 if inwards else 1.0)
+        body = Body(
+            np.concatenate([corners[open_to], discs]), np.arange(open_to.sum() + len(discs)), True
+        )
+        turned = float((body.center * body.vector).sum()) < 0
+        if turned:
+            body = replace(body, corners=body.corners[:, ::-1])
+        own = np.concatenate([number[open_to], np.full((len(discs), 2), -1)])
         slopes = _slopes(body, own, len(lines[0]))
-        nodes = _to_nodes(body, own, lines, place, state.shape, slopes)
+        quads = ring_quads(*state.shape)
+        area = Surface.of(place, quads[(place[quads, 2] > level).any(axis=1)]).normal
         return SoundingTire(
             body=body,
-            face=face,
-            nodes=nodes,
-            area=area @ axes,
+            face=own[:, 0] >= 0,
+            nodes=_to_nodes(body, own, lines, place, state.shape, slopes),
+            area=(-area if turned else area) @ axes,
             axes=axes,
             height=height,
             grid=own,
             lines=lines,
-            turned=inwards,
+            turned=turned,
+            slopes=slopes,
         )
 
     def volumes(self, shape: Array, rigid: Array | None = None) -> Array:
@@ -166,11 +166,6 @@ class SoundingTire:
             place, vector = place @ self.axes, self.body.vector[some] @ self.axes
             found[some] += np.hstack([vector, np.cross(place, vector)]) @ rigid
         return found
-
-    @cached_property
-    def center(self) -> Array:
-        """The point (3,) m on the road from which distances to microphones count."""
-        return np.zeros(3)
 
     @property
     def outline(self) -> Array:
@@ -225,16 +220,12 @@ class SoundingTire:
                 * np.exp(-1j * k * r)
                 / (4 * np.pi * r**2)
             )
-        tangent, slopes = self._slopes
+        tangent, slopes = self.slopes
         ahead = np.einsum("eqc,etc->eqt", place - self.body.center[:, None], tangent)
         out = rate.sum(axis=1)
         for t in range(2):
             out = out + slopes[t].T @ (ahead[..., t] * rate).sum(axis=1)
         return -out
-
-    @cached_property
-    def _slopes(self) -> tuple[Array, list[sparse.csr_matrix]]:
-        return _slopes(self.body, self.grid, len(self.lines[0]))
 
 
 def road_axes(state: StaticState) -> tuple[Array, float]:
@@ -243,28 +234,6 @@ def road_axes(state: StaticState) -> tuple[Array, float]:
     axes = np.array([[1.0, 0.0, 0.0], np.cross(up, [1.0, 0.0, 0.0]), up])
     assert state.road_height is not None
     return axes, -state.road_height * state.road.upright
-
-
-def _quads(around: int, along: int) -> NDArray[np.intp]:
-    i, j = np.meshgrid(np.arange(around), np.arange(along - 1), indexing="ij")
-    after = (i + 1) % around
-    corners = [i * along + j, after * along + j, after * along + j + 1, i * along + j + 1]
-    return np.stack(corners, axis=-1).reshape(-1, 4)
-
-
-def _vectors(corners: Array) -> Array:
-    """Vector areas (e, 3) m2 of quadrilaterals (e, 4, 3)."""
-    return np.asarray(
-        np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]) / 2, float
-    )
-
-
-def _node_areas(place: Array, quads: NDArray[np.intp]) -> Array:
-    out = np.zeros_like(place)
-    vector = _vectors(place[quads]) / 4
-    for k in range(4):
-        np.add.at(out, quads[:, k], vector)
-    return out
 
 
 def _lines(grid: Array, size: float, coarser: float) -> tuple[Array, Array]:
@@ -313,7 +282,7 @@ def _face_elements(grid: Array, lines: tuple[Array, Array]) -> tuple[Array, NDAr
     rows, columns = lines
     r, c = np.meshgrid(rows, columns, indexing="ij")
     place = _at(grid, r.ravel(), c.ravel())
-    quads = _quads(len(rows), len(columns))
+    quads = ring_quads(len(rows), len(columns))
     i, j = np.divmod(quads[:, 0], len(columns))
     return place[quads], np.stack([i, j], axis=-1)
 
@@ -463,9 +432,9 @@ def transfer(
 ) -> NDArray[np.complex64]:
     """g e^{ikR} (f, k, e) 1/m, single precision, at the solved frequencies, on every process. Collective.
 
-    R from `tire.center` to each microphone (k, 3) m. The frequencies are dealt out to the processes.
+    R from the road under the axle to each microphone (k, 3) m. The frequencies are dealt out to the processes.
     """
-    apart = np.linalg.norm(microphones - tire.center, axis=1)
+    apart = np.linalg.norm(microphones, axis=1)
     own = {}
     for n in range(comm.rank, len(frequency), comm.size):
         k = 2 * np.pi * frequency[n] / air.speed
@@ -476,7 +445,7 @@ def transfer(
 
 @dataclass(frozen=True, kw_only=True)
 class Transfer:
-    """`ahead` (f, k, e) 1/m: g e^{ikR} at `frequency` (f,) Hz from 0 on; `distance` (k,) m: R."""
+    """`ahead` (f, k, e) 1/m: g e^{ikR} at `frequency` (f,) Hz from 0 on; `distance` (k,) m: R, from the origin."""
 
     frequency: Array
     ahead: NDArray[np.complex64]

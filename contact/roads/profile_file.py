@@ -44,14 +44,13 @@ _SAMPLE = 400  # lines by which separator and decimal mark are found
 class Profile:
     """Heights (n,) in the file's unit, nan where missing; x (n,) in its own, None if it has none.
 
-    `rounding`: half of the last digit of x; `headings`: of the columns taken, as far as there are
-    any; `lines` (n,): their numbers in the file; `notes`: what was found out.
+    `rounding`: half of the last digit of x; `lines` (n,): their numbers in the file; `notes`: what
+    was found out.
     """
 
     heights: Array
     x: Array | None
     rounding: float
-    headings: tuple[str, ...]
     lines: NDArray[np.intp]
     notes: tuple[str, ...]
 
@@ -59,7 +58,7 @@ class Profile:
 def read_profile(path: Path, source: str, missing: Sequence[float] = ()) -> Profile:
     """The profile in a text file; values equal to one of `missing` are. InputError where it is none."""
     text = _text(path, source)
-    rows = [(n, line.strip()) for n, line in enumerate(text.lstrip("\ufeff").splitlines(), 1)]
+    rows = [(n, line.strip()) for n, line in enumerate(text.splitlines(), 1)]
     rows = [(n, _bare(line)) for n, line in rows if line and not line.startswith(("#", "%", "//"))]
     form = _form(rows, source)
     begin = _begin(rows, form)
@@ -92,19 +91,14 @@ def read_profile(path: Path, source: str, missing: Sequence[float] = ()) -> Prof
             f"{source}: heights of exactly {shown} come in runs apart from the heights beside them (first in line {where}): "
             f"if they mean that there is none, say road.missing = [{shown}]; if they are heights, cut them out"
         )
-    place = None if x is None else table[:, x]
-    rounding = (
-        0.0
-        if x is None
-        else _rounding([form.fields(line)[x] for _, line in rows[begin : begin + _SAMPLE]])
-    )
-    if x is not None and place is not None:
-        place, heights, lines, more = _ascending(place, heights, lines, source)
+    place, rounding = None, 0.0
+    if x is not None:
+        rounding = _rounding([form.fields(line)[x] for _, line in rows[begin : begin + _SAMPLE]])
+        place, heights, lines, more = _ascending(table[:, x], heights, lines)
         notes += more
-    named = tuple(headings[k] for k in (x, z) if k is not None) if headings else ()
     if form.comma:
         notes.append("decimal commas")
-    return Profile(heights, place, rounding, named, lines, tuple(notes))
+    return Profile(heights, place, rounding, lines, tuple(notes))
 
 
 def _text(path: Path, source: str) -> str:
@@ -261,7 +255,7 @@ def _rounding(fields: list[str]) -> float:
 
 
 def _ascending(
-    x: Array, z: Array, lines: NDArray[np.intp], source: str
+    x: Array, z: Array, lines: NDArray[np.intp]
 ) -> tuple[Array, Array, NDArray[np.intp], list[str]]:
     """The profile from its lower end on; lines written twice are taken once."""
     notes = []
@@ -285,16 +279,19 @@ def _codes(heights: Array) -> list[float]:
     if len(z) < 20:
         return []
     usual = float(np.median(np.abs(np.diff(z)))) or float(np.std(z)) * 1e-3
-    value, count = np.unique(z, return_counts=True)
+    # Heights of a profile in steps repeat all along: only those that are left by a jump are looked at.
+    jumps = np.flatnonzero(np.abs(np.diff(z)) > _JUMP * usual)
     found = []
-    for one in value[count >= _AT_LEAST]:
+    for one in np.unique(np.concatenate([z[jumps], z[jumps + 1]])):
         at = np.concatenate([[False], z == one, [False]])
+        if at.sum() < _AT_LEAST:
+            continue
         change = np.diff(at.astype(int))
         begin, end = np.flatnonzero(change == 1), np.flatnonzero(change == -1)
         long = end - begin > 1
         beside = np.concatenate([z[begin[begin > 0] - 1], z[end[end < len(z)]]])
         apart = float(np.median(np.abs(beside - one))) if len(beside) else 0.0
-        alone = abs(one) >= 99 and apart > 1e3 * usual and len(begin) >= 1
+        alone = abs(one) >= 99 and apart > 1e3 * usual
         if apart > _JUMP * usual and (long.sum() >= _RUNS or alone):
             found.append(float(one))
     return found

@@ -80,11 +80,15 @@ class Lattice:
 
     def quads(self) -> np.ndarray:
         """The outer face as quadrilaterals (q, 4) of neighbouring nodes, indices into it."""
-        around, along = self.face_shape
-        i, j = np.meshgrid(np.arange(around), np.arange(along - 1), indexing="ij")
-        next_i = (i + 1) % around
-        corners = [i * along + j, next_i * along + j, next_i * along + j + 1, i * along + j + 1]
-        return np.stack(corners, axis=-1).reshape(-1, 4)
+        return ring_quads(*self.face_shape)
+
+
+def ring_quads(around: int, along: int) -> np.ndarray:
+    """Quadrilaterals (q, 4) of neighbouring places of a grid `around` x `along`, closed around."""
+    i, j = np.meshgrid(np.arange(around), np.arange(along - 1), indexing="ij")
+    next_i = (i + 1) % around
+    corners = [i * along + j, next_i * along + j, next_i * along + j + 1, i * along + j + 1]
+    return np.stack(corners, axis=-1).reshape(-1, 4)
 
 
 def position(ring: np.ndarray, place: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from tireroad.greens.basis import Basis
 from tireroad.runs.files.store import put
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.stages.stage import Record
-from tireroad.runs.stages.whole_tire import Forces, WholeTire, of_run, replayed
+from tireroad.runs.stages.whole_tire import Forces, WholeTire, replayed
 
 _INSTANTS = 400  # at most; the last ones of the run
 _PER_PERIOD = 8  # of the band's upper frequency
@@ -47,7 +47,7 @@ class MotionStage(WholeTire[Motion]):
     def compute(self, record: Record) -> Motion | None:
         """The outer face at the stored instants; None but on the root process. Collective."""
         made: list[Motion] = []
-        basis, forces = of_run(self)
+        basis, forces = self.taken_in()
         on_root(self.job.comm, lambda: made.append(self._seen(basis, forces())))
         if not made:
             return None

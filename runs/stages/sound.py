@@ -36,7 +36,7 @@ from tireroad.runs.scene.plan import skipped
 from tireroad.runs.scene.tables.sound import Sound as Table
 from tireroad.runs.stages.spectra import Spectra
 from tireroad.runs.stages.stage import Computed, Done, Job, Record, Shared, Stage
-from tireroad.runs.stages.vibration import HANN, POWER
+from tireroad.runs.stages.vibration import HANN, POWER, decibels
 from tireroad.runs.stages.whole_tire import Lines, WholeTire
 
 PRESSURE = 2e-5  # Pa: reference of the levels
@@ -124,10 +124,12 @@ class RadiationStage(Computed[Paths]):
         frequency, size = solved_frequencies(up_to), elements_for(up_to, air)
         with record.timing("elements"):
             tire, rough = (sounding(self.static.product, table, size, by) for by in (1.0, COARSER))
+            for one in (tire, rough):
+                one.body.checked("sound")
         names, places = microphones(table.microphones, self.static.product)
         tire.body.check_microphones(places, "sound.microphones", names)
         every = np.vstack([places, FAR * directions()[0]])
-        apart = np.linalg.norm(every - tire.center, axis=1)
+        apart = np.linalg.norm(every, axis=1)
         with record.timing("solve"):
             found = transfer(tire, every, frequency, air, comm)
         with record.timing("larger elements"):
@@ -346,14 +348,12 @@ def angles() -> tuple[np.ndarray, np.ndarray]:
 
 def wheel_motion(basis: Basis) -> np.ndarray | None:
     """Motion (6, m) of the wheel in m and rad per coordinate; None of a wheel that is held."""
-    s3 = len(basis.shape) if basis.projection.moves else len(basis.shape) // 3 * 3
-    if basis.projection.moves:
-        probes = sparse.hstack(
-            [sparse.csr_matrix((BODY, s3)), sparse.identity(SEEN, format="csr")[:BODY]],
-            format="csr",
-        )
-        return basis.seen(probes)
-    return None
+    if not basis.projection.moves:
+        return None
+    beside = sparse.identity(SEEN, format="csr")[:BODY]
+    return basis.seen(
+        sparse.hstack([sparse.csr_matrix((BODY, len(basis.shape))), beside], format="csr")
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -417,10 +417,6 @@ def _normal_velocity(
     return square.sum(axis=0) * (2 * np.pi * frequency) ** 2 / 2
 
 
-def _decibel(square: np.ndarray, reference: float) -> np.ndarray:
-    return 10 * np.log10(np.maximum(square, np.finfo(float).tiny) / reference)
-
-
 def _sound(
     heard: Heard, of_forces: tuple[np.ndarray, np.ndarray], volume: np.ndarray, duration: float
 ) -> dict[str, Any]:
@@ -437,7 +433,7 @@ def _sound(
     every = square.sum(axis=0) / HANN
     share, shares = _shares(heard)
     elevation, azimuth = angles()
-    near = _decibel(away * (FAR / PASS_BY) ** 2, PRESSURE**2)
+    near = decibels(away * (FAR / PASS_BY) ** 2, PRESSURE**2)
     rate = RATE * 2 ** max(0, math.ceil(math.log2(4 * frequency[-1] / RATE)))
     known = np.isfinite(error).all(axis=0)
     total_error = (band * np.nan_to_num(error.T)).sum(axis=0) / np.maximum(band.sum(axis=0), 1e-300)
@@ -447,16 +443,16 @@ def _sound(
         "frequency": frequency,
         "pressure": heard.pressure,
         "centre": centre,
-        "level": _decibel(band, PRESSURE**2).T,
-        "weighted": _decibel(weighted, PRESSURE**2).T,
+        "level": decibels(band, PRESSURE**2).T,
+        "weighted": decibels(weighted, PRESSURE**2).T,
         "error": error,
-        "power": _decibel(power, POWER),
-        "total": _decibel(every, PRESSURE**2),
-        "total_weighted": _decibel((square * ears[:, None]).sum(axis=0) / HANN, PRESSURE**2),
+        "power": decibels(power, POWER),
+        "total": decibels(every, PRESSURE**2),
+        "total_weighted": decibels((square * ears[:, None]).sum(axis=0) / HANN, PRESSURE**2),
         "total_error": total_error
         if len(centre) and known.any()
         else np.full(len(paths.names), np.nan),
-        "total_power": _decibel(
+        "total_power": decibels(
             np.array([heard.power.sum(), (heard.power * ears).sum()]) / HANN, POWER
         ),
         "directivity": near.reshape(len(centre), len(elevation), len(azimuth)),

@@ -122,10 +122,10 @@ def _seen(
         frequency=frequency,
         velocity=velocity,
         centre=centre,
-        velocity_level=_level(square, VELOCITY**2),
-        power_level=_level(radiated_power(square, surface.area), POWER),
-        weighted=_level(radiated_power(weighted, surface.area), POWER),
-        velocity_weighted=_level(weighted, VELOCITY**2),
+        velocity_level=decibels(square, VELOCITY**2),
+        power_level=decibels(radiated_power(square, surface.area), POWER),
+        weighted=decibels(radiated_power(weighted, surface.area), POWER),
+        velocity_weighted=decibels(weighted, VELOCITY**2),
         shapes_at=frequency[kept],
         displacement=(a[kept] @ shape.T).reshape(len(kept), -1, 3),
         points=state.points,
@@ -135,14 +135,14 @@ def _seen(
     )
 
 
-def _level(square: np.ndarray | float, reference: float) -> np.ndarray:
-    """Level in dB."""
+def decibels(square: np.ndarray | float, reference: float) -> np.ndarray:
+    """Level in dB of a mean square or a power over its reference."""
     return 10 * np.log10(np.maximum(square, np.finfo(float).tiny) / reference)
 
 
 def _total(square: np.ndarray, reference: float) -> float:
     """Level in dB of all lines together: bands too narrow for a level count as well."""
-    return float(_level(square.sum(), reference))
+    return float(decibels(square.sum(), reference))
 
 
 def _headline(found: Vibration, surface: Surface) -> dict[str, tuple[float, str]]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import h5py
 import numpy as np
@@ -29,7 +29,7 @@ from tireroad.runs.stages.contact_file import ContactHistory
 from tireroad.runs.stages.rolling import histories, of_given_forces, recursive
 from tireroad.runs.stages.setup import components, leaning, leaning_loads, probes
 from tireroad.runs.stages.spectra import Spectra
-from tireroad.runs.stages.stage import Computed, Done, Job, Shared
+from tireroad.runs.stages.stage import Computed, Done, Job, Part, Shared
 
 _ROWS = 4096  # steps read at a time
 _AT_ONCE = 64  # coordinates transformed at a time, to save memory
@@ -108,27 +108,29 @@ class Forces:
         return np.hstack([*parts, prescribed])
 
 
-class OfRun(Protocol):
+P = TypeVar("P")
+
+
+@dataclass(frozen=True, kw_only=True)
+class OfRun(Part[P]):
     """A part that takes the run's forces and states."""
 
-    @property
-    def job(self) -> Job: ...
-    @property
-    def static(self) -> Done[StaticState]: ...
-    @property
-    def rotating(self) -> Done[RollingModes]: ...
-    @property
-    def setup(self) -> Done[ContactSetup | None]: ...
-    @property
-    def contact(self) -> Done[ContactHistory] | None: ...
+    static: Done[StaticState]
+    rotating: Done[RollingModes]
+    setup: Done[ContactSetup | None]
+    contact: Done[ContactHistory] | None = None
 
+    @property
+    def band(self) -> float:
+        """Upper end of the frequency band of interest, Hz."""
+        return band(self.rotating.product, Wanted(band=self.job.scene.greens.band))
 
-def of_run(part: OfRun) -> tuple[Basis, Callable[[], Forces]]:
-    """The basis, and what reads the forces on the root process. Collective."""
-    basis, setup = Basis.of(part.rotating.product), part.setup.product
-    loads = driven_loads(part.job, part.static.product, setup)
-    contact = part.contact.product if part.contact else None
-    return basis, lambda: Forces.of(part.job, setup, contact, basis.seen(loads))
+    def taken_in(self) -> tuple[Basis, Callable[[], Forces]]:
+        """The basis, and what reads the forces on the root process. Collective."""
+        basis, setup = Basis.of(self.rotating.product), self.setup.product
+        loads = driven_loads(self.job, self.static.product, setup)
+        contact = self.contact.product if self.contact else None
+        return basis, lambda: Forces.of(self.job, setup, contact, basis.seen(loads))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,23 +149,18 @@ class Lines:
 
 
 @dataclass(frozen=True, kw_only=True)
-class LinesOfRun(Shared[Lines | None]):
+class LinesOfRun(OfRun[Lines | None], Shared[Lines | None]):
     """Not the receptance times the forces of the window: what rings at its start is part of it."""
 
     name: ClassVar[str] = "lines"
-    static: Done[StaticState]
-    rotating: Done[RollingModes]
-    setup: Done[ContactSetup | None]
-    contact: Done[ContactHistory] | None = None
     spectra: Done[Spectra] | None = None
 
     def make(self) -> Lines | None:
         """On the root process, None on the others. Collective."""
         made: list[Lines] = []
-        basis, forces = of_run(self)
+        basis, forces = self.taken_in()
         spectra = self.spectra.product if self.spectra else None
-        wanted = Wanted(band=self.job.scene.greens.band)
-        top = spectra.limit.frequency if spectra else band(self.rotating.product, wanted)
+        top = spectra.limit.frequency if spectra else self.band
         left_out = spectra.left_out if spectra else 0.0
         on_root(self.job.comm, lambda: made.append(_lines(basis, forces(), left_out, top)))
         return made[0] if made else None
@@ -192,17 +189,9 @@ def _lines(basis: Basis, forces: Forces, left_out: float, top: float) -> Lines:
     )
 
 
-P = TypeVar("P")
-
-
 @dataclass(frozen=True, kw_only=True)
-class WholeTire(Computed[P]):
+class WholeTire(OfRun[P], Computed[P]):
     """A stage that shows the whole tire under the forces of the run. Its product is the root's alone."""
-
-    static: Done[StaticState]
-    rotating: Done[RollingModes]
-    setup: Done[ContactSetup | None]
-    contact: Done[ContactHistory] | None = None
 
     def inputs(self) -> dict[str, Any]:
         """The forces over time, the states, and the band."""
@@ -214,11 +203,6 @@ class WholeTire(Computed[P]):
             "time": vars(scene.time),
             "band": scene.greens.band,
         }
-
-    @property
-    def band(self) -> float:
-        """Upper end of the frequency band of interest, Hz."""
-        return band(self.rotating.product, Wanted(band=self.job.scene.greens.band))
 
 
 def replayed(basis: Basis, forces: Forces, wanted: Collection[int]) -> np.ndarray:

@@ -44,7 +44,7 @@ def run() -> list[Table]:
     return [_spheres(), _over_the_road(), _power(), _horn(), _tires()]
 
 
-def ball(n: int, height: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+def ball(n: int, radius: float = 0.3, height: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Points (p, 3) and outward quads of a sphere of 6 n^2 elements."""
     t, quads = np.tan(np.linspace(-np.pi / 4, np.pi / 4, n + 1)), []
     points: dict[tuple, int] = {}
@@ -56,7 +56,7 @@ def ball(n: int, height: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
                 names = [tuple(np.round(side * w + t[a] * u + t[b] * v, 9)) for a, b in ring]
                 quads.append([points.setdefault(name, len(points)) for name in names])
     place = np.array(list(points))
-    return RADIUS * place / np.linalg.norm(place, axis=1, keepdims=True) + [0, 0, height], np.array(
+    return radius * place / np.linalg.norm(place, axis=1, keepdims=True) + [0, 0, height], np.array(
         quads
     )
 
@@ -73,7 +73,7 @@ def _spheres() -> Table:
         1j * k * RHO * C * RADIUS**2 * np.exp(-1j * k * (r - RADIUS)) / (r * (1 + 1j * k * RADIUS))
     )
     for n in (8, 10, 14):
-        points, quads = ball(n)
+        points, quads = ball(n, RADIUS)
         began = time.perf_counter()
         found = radiate(
             points, quads, np.ones((len(quads), len(k)), complex), FREQUENCIES, EARS, road=False
@@ -132,7 +132,7 @@ def _over_the_road() -> Table:
     rows = []
     for gap in GAPS:
         for n in (8, 12):
-            points, quads = ball(n, RADIUS + gap)
+            points, quads = ball(n, RADIUS, RADIUS + gap)
             body = Body.of(points, quads, True)
             place, weight = body.points_and_weights(4)
             size = np.linalg.norm(weight, axis=2)

@@ -5,25 +5,11 @@ import pytest
 
 import tireroad as tr
 from tireroad.greens.sound import MIRROR, Body, potentials, solid_angles, transfer
+from tireroad.tests.bench.sound import ball
 
 C, RHO = 343.0, 1.2
 HERE = np.array([[1.0, 0.0, 0.0], [0.0, 2.0, 1.0], [-0.5, 0.3, 0.8]])
 BESIDE = np.array([[0.2, 0.5, 0.1], [-0.2, 0.5, 0.1], [0.6, 0.0, 0.05], [7.5, 0.0, 1.2]])
-
-
-def ball(n: int, radius: float = 0.3, height: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """Points and outward quads of a sphere of 6 n^2 elements."""
-    t, points, quads = np.tan(np.linspace(-np.pi / 4, np.pi / 4, n + 1)), {}, []
-    for axis in range(3):
-        for side in (1, -1):
-            w, u, v = (np.roll([1.0, 0, 0], axis + k) for k in range(3))
-            for i, j in np.ndindex(n, n):
-                ring = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)][::side]
-                names = [tuple(np.round(side * w + t[a] * u + t[b] * v, 9)) for a, b in ring]
-                quads.append([points.setdefault(name, len(points)) for name in names])
-    place = np.array(list(points))
-    place *= radius / np.linalg.norm(place, axis=1, keepdims=True)
-    return place + [0, 0, height], np.array(quads)
 
 
 def db(found: np.ndarray, exact: np.ndarray) -> np.ndarray:

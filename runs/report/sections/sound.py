@@ -63,7 +63,7 @@ def sound(results: Results) -> Section:
     _power(results, section, centre)
     loudest = int(results.array(FILE, "third_octave/level_a")[0].argmax())
     section.show(
-        directivity(results, centre, loudest),
+        directivity(results, centre),
         "Level over the road's horizon at 7.5 m, by direction (ahead is up, the left side is left): lowest ring of the "
         "hemisphere, three loudest bands.",
     )
@@ -125,7 +125,7 @@ def power_and_efficiency(centre: NDArray, power: NDArray, efficiency: NDArray) -
 
 
 @styled
-def directivity(results: Results, centre: NDArray, loudest: int) -> str:
+def directivity(results: Results, centre: NDArray) -> str:
     """Polar lines of the lowest ring of the hemisphere, for the loudest bands."""
     level = results.array(FILE, "directivity/level")[:, 0]
     azimuth = np.radians(results.array(FILE, "directivity/azimuth"))
