@@ -93,11 +93,16 @@ def _static(scene: Scene) -> str:
 
 def _modes(scene: Scene) -> str:
     from tireroad.modal.rotation_shapes import TOLERANCE as shapes
-    from tireroad.modal.solver.slicing import BLOCK, TOLERANCE
+    from tireroad.modal.solver.slicing import AUTO, BLOCK, TOLERANCE
     from tireroad.modal.solver.undamped import ORTHONORMALITY_TOLERANCE, RESIDUAL_TOLERANCE
 
+    solver = AUTO if scene.modes.solver == "auto" else scene.modes.solver
+    how = {
+        "lanczos": f"block Lanczos, {BLOCK} vectors a block, on (A - sigma I)^-1 of each slice",
+        "slepc": "SLEPc's spectrum slicing, Krylov-Schur, options -modes_…",
+    }[solver]
     return (
-        f"block Lanczos, {BLOCK} vectors a block, on (A - sigma I)^-1 of each slice to {TOLERANCE:g}; counted by "
+        f"{how} to {TOLERANCE:g}; counted by "
         f"the inertia of L D L^T, {_MUMPS}; residual at most {RESIDUAL_TOLERANCE:g}, orthonormal to "
         f"{ORTHONORMALITY_TOLERANCE:g}; rotation shapes of {shapes:g} and more"
     )

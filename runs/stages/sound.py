@@ -70,9 +70,7 @@ def microphones(given: tuple, state: StaticState) -> tuple[list[str], np.ndarray
     found: dict[str, tuple[float, ...]] = {}
     for one in given:
         found |= (
-            known[one]
-            if isinstance(one, str)
-            else {f"at {one[0]:g}, {one[1]:g}, {one[2]:g} m": one}
+            known[one] if isinstance(one, str) else {f"{one[0]:g}, {one[1]:g}, {one[2]:g} m": one}
         )
     return list(found), np.array(list(found.values()))
 
