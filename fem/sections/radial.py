@@ -54,22 +54,33 @@ BELT_ANGLE = np.radians(22)
 
 # E Pa, Poisson's ratio, kg/m3, dynamic over static modulus, loss factor.
 COMPOUNDS = {
-    "tread": (6.3e6, 0.49, 900.0, 1.15, 0.25),
-    "skim": (11.7e6, 0.49, 1200.0, 1.15, 0.15),
-    "ply": (6.0e6, 0.49, 1150.0, 1.15, 0.15),
-    "sidewall": (5.0e6, 0.49, 1120.0, 1.15, 0.15),
-    "apex": (52e6, 0.49, 1200.0, 1.15, 0.15),
+    "tread": (6.3e6, 0.49, 800.0, 1.15, 0.3),
+    "skim": (11.7e6, 0.49, 1200.0, 1.15, 0.2),
+    "ply": (7.0e6, 0.49, 1150.0, 1.15, 0.2),
+    "sidewall": (8.5e6, 0.49, 1120.0, 1.15, 0.2),
+    "apex": (52e6, 0.49, 1200.0, 1.15, 0.2),
     "bead": (400e6, 0.49, 2200.0, 1.0, 0.05),
 }
 
 FLANGE = 0.016  # m above the rim; below it the rim holds the tire
-RIM, WIDEST, APEX = 0.39, 0.60, 1.0
-FALL, TREAD, SHOULDER = 0.03, 0.29, 0.11
+RIM = 0.383  # half width of the rim over the section's width
+WIDEST = 0.60  # of the section's height
+APEX = 0.5  # of the length from the flange to the widest point
+TREAD = 0.325  # half width of the crown over the section's width, at an aspect ratio of 60 %
+CROWN = 0.13  # drop of the crown at its edge over its half width
+ROUND = 2.6  # exponent of that drop over the half width: flat in the middle, rounder to the edges
+SHOULDER = 0.075, 0.030  # how far out and down the shoulder reaches from there, over the width
+LOWEST = (
+    0.4,
+    0.6,
+)  # largest drop of the crown and of the shoulder over the height above the widest point
+BELT_2 = 0.9  # its width over that of belt 1, which ends at the edge of the crown
 LEAST_HEIGHT = 0.055  # m of a section; less leaves no sidewall above the flange
 
 
 class _Stations(NamedTuple):
-    """Lengths s (m) on the outer face from the crown."""
+    """Lengths s (m) on the outer face from the crown: of belt 1, of the tread, to the widest point, to the apex,
+    to the flange, to the heel."""
 
     belt: float
     shoulder: float
@@ -112,12 +123,15 @@ def _rubber(values: tuple[float, ...]) -> dict[str, float]:
 
 
 def _layers(at: _Stations) -> tuple[Layer, ...]:
-    """Layers with thickness in mm at the crown, under the belt edge, at the tread edge, at the
-    widest point, halfway from there to the flange, at the flange and at the heel.
+    """Layers with thickness in mm at the crown, under the belts, at their edge, at the end of the
+    tread, at the widest point, halfway from there to the flange, at the flange and at the heel.
+
+    A cushion under the belt edges, part of the belt base, carries the shoulder.
     """
     places = (
         0.0,
-        0.8 * at.belt,
+        0.75 * at.belt,
+        at.belt,
         at.shoulder,
         at.widest,
         (at.widest + at.held) / 2,
@@ -129,10 +143,10 @@ def _layers(at: _Stations) -> tuple[Layer, ...]:
         return Layer(name, compound, tuple(zip(places, np.multiply(1e-3, values), strict=True)))
 
     return (
-        layer("tread", "tread", 8.0, 8.0, 6.3, 1.7, 2.0, 2.8, 3.0),
-        layer("belt skim", "skim", 1.3, 1.3, 1.8, 0.6, 1.4, 1.8, 2.0),
-        layer("belt base", "skim", 1.5, 1.6, 2.25, 1.0, 3.0, 5.5, 9.0),
-        layer("carcass", "ply", 2.0, 2.0, 2.0, 1.7, 1.6, 1.9, 2.0),
+        layer("tread", "tread", 8.0, 8.0, 8.0, 7.0, 1.7, 2.0, 2.8, 3.0),
+        layer("belt skim", "skim", 1.3, 1.3, 1.8, 1.8, 0.6, 1.4, 1.8, 2.0),
+        layer("belt base", "skim", 1.5, 1.6, 3.0, 4.0, 1.0, 3.0, 5.5, 9.0),
+        layer("carcass", "ply", 2.0, 2.0, 2.0, 2.0, 1.7, 1.6, 1.9, 2.0),
     )
 
 
@@ -141,11 +155,13 @@ def _outline(tire: Size) -> np.ndarray:
     top, w, flat = tire.rim + tire.height, tire.width, _flat(tire)
     widest, rim = tire.rim + WIDEST * tire.height, RIM * tire.width
     upper = top - widest
+    drop = min(CROWN * flat, LOWEST[0] * upper)
     y = flat * np.array([0, 0.25, 0.5, 0.75, 0.92])
-    crown = np.stack([top - FALL * upper * (y / flat) ** 2, y], axis=-1)
+    crown = np.stack([top - drop * (y / flat) ** ROUND, y], axis=-1)
     middle = np.array([widest, 0.5 * w])
-    shoulder = min(flat + SHOULDER * w, 0.47 * w)
-    above = _leaving(middle, np.array([widest + 0.72 * upper, shoulder]))
+    out, down = (part * w for part in SHOULDER)
+    down = min(drop + down, LOWEST[1] * upper)
+    above = _leaving(middle, np.array([top - down, min(flat + out, 0.47 * w)]))
     lean = min(0.009, 0.044 * w)  # of the flange, outwards
     below = _leaving(middle, np.array([tire.rim + FLANGE, rim + lean]))
     seat = [(tire.rim + FLANGE / 2, rim + lean / 3), (tire.rim, rim)]
@@ -161,9 +177,9 @@ def _leaving(middle: np.ndarray, end: np.ndarray) -> np.ndarray:
 
 
 def _flat(tire: Size) -> float:
-    """Half width of the tread up to its rounded shoulder, m: larger for low aspect ratios."""
+    """Half width of the crown up to its rounded shoulder, m: larger for low aspect ratios."""
     ratio = tire.height / tire.width
-    return float(np.clip(TREAD + 0.3 * (0.6 - ratio), 0.27, 0.42)) * tire.width
+    return float(np.clip(TREAD + 0.3 * (0.6 - ratio), 0.27, 0.45)) * tire.width
 
 
 def _stations(tire: Size, outline: Outline) -> _Stations:
@@ -173,13 +189,13 @@ def _stations(tire: Size, outline: Outline) -> _Stations:
     edge = float(s[np.argmax(y > _flat(tire))])
     held = float(s[np.flatnonzero(r > tire.rim + FLANGE)[-1]])
     shoulder, apex = edge + 0.25 * (widest - edge), held - APEX * (held - widest)
-    return _Stations(0.97 * edge, shoulder, widest, apex, held, outline.length)
+    return _Stations(edge, shoulder, widest, apex, held, outline.length)
 
 
 def _cords(at: _Stations) -> tuple[CordLine, ...]:
     return (
         CordLine(name="cap ply", under="tread", to=at.belt, angle=0.0, **NYLON),
-        CordLine(name="belt 2", under="tread", to=0.95 * at.belt, angle=-BELT_ANGLE, **STEEL),
+        CordLine(name="belt 2", under="tread", to=BELT_2 * at.belt, angle=-BELT_ANGLE, **STEEL),
         CordLine(name="belt 1", under="belt skim", to=at.belt, angle=BELT_ANGLE, **STEEL),
         CordLine(name="carcass", under="belt base", to=at.end, angle=np.pi / 2, **POLYESTER),
     )

@@ -62,12 +62,12 @@ def test_passenger_is_as_measured(root: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("segments", "along", "taken"), [(16, 12, 1.5), (20, 16, 2.4), (30, 26, 6.8)]
+    ("segments", "along", "taken"), [(16, 12, 2.1), (20, 16, 2.4), (30, 26, 6.8)]
 )
 def test_the_estimate_of_the_load_is_in_it(
     root: Path, segments: int, along: int, taken: float
 ) -> None:
-    """Measured on one process: GB of the static state of 26,784 to 102,060 unknowns, of which 1.4 to 2 were told before."""
+    """Measured on one process: GB of the static state of 30,240 to 102,060 unknowns, of which 1.4 to 2 were told before."""
     mesh = [f"tire.segments={segments}", f"tire.elements_arc={along}", "static.error_estimate=true"]
     wanted = estimate(load(root / "runs" / "scenes" / "passenger.toml", mesh), until="static")
     assert taken / 1.25 < sum(wanted.memory.values()) / 1e9 < taken * 1.25
