@@ -14,6 +14,7 @@ from tireroad.fem.errors import InputError
 from tireroad.runs.report.read import Absent, Results, digits, quantity
 
 _LOWEST = 6  # modes whose damping is checked
+_PEAK = 2.5  # largest contact pressure over the mean, with some room for coarse elements
 _DIFFERS = 0.05  # relative to the static load; above it the mean force while rolling is explained
 _OBSTACLES = ("step", "cleat", "iso8608")  # roads with heights of their own
 # why the load depends on the road: on a held axle, and on springs to the ground
@@ -50,19 +51,32 @@ def _outside(value: float, low: float, high: float) -> bool:
     return not low <= value <= high
 
 
+def _mean_pressure(results: Results) -> float:
+    """Load over the area of the footprint, Pa; 0 without a road."""
+    force = results.array("static.h5", "contact/force")[:, 2]
+    area = _number(results, "static.h5", "footprint_area")
+    return float(force.sum()) / area if area > 0 else 0.0
+
+
 def _pressure(results: Results) -> Iterator[str]:
     """Load over area: close to the inflation, higher for a stiff carcass and a light load."""
-    force = results.array("static.h5", "contact/force")[:, 2]
-    inflation, area = (
-        _number(results, "static.h5", key) for key in ("inflation", "footprint_area")
-    )
-    if inflation > 0 and area > 0:
-        mean = float(force.sum()) / area
-        if _outside(mean / inflation, 0.6, 2.0):
-            yield (
-                f"mean contact pressure {quantity(mean, 'Pa')}, {digits(mean / inflation)} times the inflation "
-                "(0.6 to 2 times)"
-            )
+    mean, inflation = _mean_pressure(results), _number(results, "static.h5", "inflation")
+    if inflation > 0 and mean > 0 and _outside(mean / inflation, 0.6, 2.0):
+        yield (
+            f"mean contact pressure {quantity(mean, 'Pa')}, {digits(mean / inflation)} times the inflation "
+            "(0.6 to 2 times)"
+        )
+
+
+def _peak(results: Results) -> Iterator[str]:
+    """The largest pressure: of passenger tires up to some 1.8 times the mean."""
+    mean = _mean_pressure(results)
+    largest = float(results.array("static.h5", "contact/pressure").max(initial=0.0))
+    if mean > 0 and largest > _PEAK * mean:
+        yield (
+            f"largest contact pressure {quantity(largest, 'Pa')}, {digits(largest / mean)} times the mean (at most "
+            f"{_PEAK:g} times)"
+        )
 
 
 def _footprint(results: Results) -> Iterator[str]:
@@ -141,7 +155,7 @@ def _road(results: Results) -> Iterator[str]:
         )
 
 
-_CHECKS = (_pressure, _footprint, _stiffness, _mass, _tread, _damping, _road)
+_CHECKS = (_pressure, _peak, _footprint, _stiffness, _mass, _tread, _damping, _road)
 
 
 def mean_load(results: Results) -> str | None:
