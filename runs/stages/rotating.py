@@ -165,7 +165,9 @@ class RotatingStage(Computed[RollingModes]):
         state = self.static.product
         around, along = state.shape
         field = (basis.shape[: 3 * around * along] @ wave).reshape(around, along, 3)
-        column = int((field**2).sum(axis=(0, 2)).argmax())
+        size = (field**2).sum(axis=(0, 2))
+        # Of both sides of a symmetric tire the positive one, whatever rounding says.
+        column = int(np.flatnonzero(size >= 0.999 * size.max())[-1])
         place = state.points.reshape(around, along, 3)[:, column]
         ring = np.arctan2(place[:, 0], -place[:, 2]) % (2 * np.pi)
         order = np.argsort(ring)
