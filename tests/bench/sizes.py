@@ -18,6 +18,8 @@ SIZES = (
     *("315/35 R20", "335/25 R22"),
 )
 ELEMENTS, ORDER, PRESSURE = 26, 2, 2.2e5  # the defaults; Pa
+WAVES = 10, 14, 20, 34  # around, of waves that stand on the road
+TURNING = 160.0  # rad/s, of the state that they stand in
 COLUMNS = [
     ("size", ""),
     ("mass", "kg"),
@@ -28,11 +30,13 @@ COLUMNS = [
     ("wind-up", "Hz"),
     ("yaw", "Hz"),
     ("vertical", "Hz"),
+    *((f"stands, n = {wave}", "rad/s") for wave in WAVES),
     ("", ""),
 ]
 NOTE = (
     "Inflated to 220 kPa and their first modes by Fourier series around (bench.series.inflated), rim held. "
-    "'moves': the largest displacement of inflation; width and radius are those of the inflated tire."
+    "'moves': the largest displacement of inflation; width and radius are those of the inflated tire. "
+    f"'stands': the lowest speed at which a wave of n around stands on the road, in the state at {TURNING:g} rad/s."
 )
 
 
@@ -46,10 +50,12 @@ def row(size: str) -> list:
     """A size with its figures, or with its error."""
     try:
         tire = InflatedRing(radial(size), ELEMENTS, ORDER, PRESSURE)
+        turning = InflatedRing(radial(size), ELEMENTS, ORDER, PRESSURE, TURNING)
     except (InputError, ConvergenceError) as error:
-        return [size, *[float("nan")] * 8, str(error)]
+        return [size, *[float("nan")] * (len(COLUMNS) - 2), str(error)]
     line = tire.section.chain(tire.section.outer)
     moved = 1e3 * (tire.section.nodes[line] + tire.displacement[line][:, [0, 2]])
     largest = 1e3 * float(np.abs(tire.displacement).max())
     shape = [tire.weight, largest, 2 * float(moved[:, 1].max()), float(moved[:, 0].max())]
-    return [size, *shape, *(float(value) for value in lowest(tire)), ""]
+    standing = [turning.standing(wave)[0] for wave in WAVES]
+    return [size, *shape, *(float(value) for value in lowest(tire)), *standing, ""]

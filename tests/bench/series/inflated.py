@@ -7,6 +7,13 @@ Re[v(r, y) e^{i n theta}], with stresses, pressure and cords of that state and t
 at its dynamic modulus. The integration is selective as in the program (full for the distortion, one
 point per direction less for dilatation and cords); everything else is independent: numpy, no
 dolfinx.
+
+A wheel that turns at a speed W has the load W^2 rho r on its wall besides. A wave v(r, y) e^{i n theta} that stands on
+the road while the tire turns through it at Omega has the accelerations Omega^2 d^2/dtheta^2 of its vectors:
+
+    K_n v = Omega^2 M C_n v,   C_n = [[n^2 + 1, 2 i n, 0], [-2 i n, n^2 + 1, 0], [0, 0, n^2]]  in (r, theta, y).
+
+The lowest Omega over all n is the critical speed.
 """
 
 from __future__ import annotations
@@ -28,14 +35,16 @@ _UNIT = np.eye(3)
 
 
 class InflatedRing:
-    """A construction with `elements` from bead to bead, inflated to a pressure (Pa).
+    """A construction with `elements` from bead to bead, inflated to a pressure (Pa), turning at a speed (rad/s).
 
     Fields have components (r, theta, y) per node.
     """
 
-    def __init__(self, tire: Construction, elements: int, order: int, pressure: float):
+    def __init__(
+        self, tire: Construction, elements: int, order: int, pressure: float, speed: float = 0.0
+    ):
         self.section = mesh = tire.section(elements, order)
-        self.pressure = pressure
+        self.pressure, self.speed = pressure, speed
         rubber = [tire.compounds[name] for name in mesh.regions]
         by_cell = {
             key: np.array([c[key] for c in rubber])[mesh.region]
@@ -56,10 +65,15 @@ class InflatedRing:
         self._inflate()
 
     def _inflate(self) -> None:
+        outwards = sparse.diags(np.tile([self.speed**2, 0.0, 0.0], len(self.section.nodes)))
+        turning = self.mass @ outwards
         for share in STEPS:
             for _ in range(30):
-                tangent = self._inside(self._tangent(0, share * self.pressure))
-                step = splu(tangent).solve(-self._residual(share * self.pressure)[self._free])
+                radius = self.displacement.copy()
+                radius[:, 0] += self.section.nodes[:, 0]
+                rest = self._residual(share * self.pressure) - share * (turning @ radius.ravel())
+                tangent = self._tangent(0, share * self.pressure) - share * turning
+                step = splu(self._inside(tangent)).solve(-rest[self._free])
                 self.displacement.ravel()[self._free] += step
                 if np.abs(step).max() < _SMALL:
                     break
@@ -68,11 +82,30 @@ class InflatedRing:
 
     def frequencies(self, wave: int, count: int) -> np.ndarray:
         """The `count` lowest frequencies (Hz) of a wave, rim held, dynamic moduli; pairs once."""
-        stiffness = self._inside(self._tangent(wave, self.pressure, dynamic=True))
-        stiffness = (stiffness + stiffness.getH()) / 2
-        given = {"M": self._inside(self.mass), "sigma": 0.0, "which": "LM"}
-        squares = eigsh(stiffness, count, **given, return_eigenvectors=False)
+        squares = self._lowest(wave, count, self.mass)[0]
         return np.sqrt(np.sort(squares)) / (2 * np.pi)
+
+    def standing(self, wave: int) -> tuple[float, float]:
+        """The lowest speed (rad/s) at which a wave stands on the road, and y (m) where it is largest."""
+        along = 2j * wave
+        turn = [[wave**2 + 1, along, 0], [-along, wave**2 + 1, 0], [0, 0, wave**2]]
+        carried = self.mass @ sparse.kron(sparse.eye(len(self.section.nodes)), np.array(turn))
+        squares, fields = self._lowest(wave, 1, carried)
+        whole = np.zeros(self._size, complex)
+        whole[self._free] = fields[:, 0]
+        largest = int(np.linalg.norm(whole.reshape(-1, 3), axis=1).argmax())
+        return float(np.sqrt(squares[0])), float(self.section.nodes[largest, 1])
+
+    def _lowest(
+        self, wave: int, count: int, mass: sparse.spmatrix
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Eigenvalues and fields nearest to zero of the dynamic stiffness of a wave and a Hermitian `mass`."""
+        stiffness, mass = (
+            self._inside(sparse.csr_matrix(matrix))
+            for matrix in (self._tangent(wave, self.pressure, dynamic=True), mass)
+        )
+        both = [(matrix + matrix.getH()) / 2 for matrix in (stiffness, mass)]
+        return eigsh(both[0], count, M=both[1], sigma=0.0, which="LM")
 
     @property
     def weight(self) -> float:
