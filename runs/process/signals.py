@@ -173,9 +173,12 @@ def _repeat(number: int) -> None:
 
 
 def _not_lost(unraisable: Any) -> None:
-    """Repeat a request that arrived where nothing can be raised (in a finaliser)."""
+    """Repeat a request that arrived where nothing can be raised (in a finaliser).
+
+    After a request, the finalisers of objects that it left half made fail: that is no news to the user.
+    """
     if isinstance(unraisable.exc_value, Stopped):
         _Heard.at = -1e9
         _repeat(signal.Signals[str(unraisable.exc_value)])
-    else:
+    elif not _Heard.raised:
         sys.__unraisablehook__(unraisable)

@@ -33,3 +33,25 @@ def test_a_request_during_a_compiled_import_is_raised_after_it(
             time.sleep(60)
     finally:
         signal.signal(signal.SIGTERM, before)
+
+
+class HalfMade:
+    """An object whose finaliser needs what its constructor did not reach."""
+
+    def __init__(self) -> None:
+        raise signals.Stopped("SIGHUP")
+
+    def __del__(self) -> None:
+        print(self.part)  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("raised, told", [("", True), ("SIGHUP", False)])
+def test_what_a_request_left_half_made_fails_in_silence(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], raised: str, told: bool
+) -> None:
+    """A finaliser's traceback came before the sentence that says how to continue."""
+    monkeypatch.setattr(signals._Heard, "raised", raised)
+    monkeypatch.setattr("sys.unraisablehook", signals._not_lost)
+    with pytest.raises(signals.Stopped):
+        HalfMade()
+    assert ("Traceback" in capfd.readouterr().err) == told
