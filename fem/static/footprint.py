@@ -23,6 +23,10 @@ class Footprint:
     width: float
     area: float
 
+    def pressure(self, load: float) -> float:
+        """Mean pressure (Pa) under a load (N); 0 without contact."""
+        return load / self.area if self.area else 0.0
+
 
 def nodal_area(lattice: Lattice, positions: np.ndarray) -> np.ndarray:
     """Horizontal area (s,) m2 associated with each node of the deformed outer face (s, 3).

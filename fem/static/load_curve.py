@@ -32,7 +32,7 @@ class CurvePoint:
     @property
     def pressure(self) -> float:
         """Mean contact pressure, Pa."""
-        return self.load / self.footprint.area if self.footprint.area else 0.0
+        return self.footprint.pressure(self.load)
 
 
 def load_curve(loader: Loader, deflections: Sequence[float]) -> list[CurvePoint]:

@@ -51,7 +51,7 @@ def _outside(value: float, low: float, high: float) -> bool:
     return not low <= value <= high
 
 
-def _mean_pressure(results: Results) -> float:
+def mean_pressure(results: Results) -> float:
     """Load over the area of the footprint, Pa; 0 without a road."""
     force = results.array("static.h5", "contact/force")[:, 2]
     area = _number(results, "static.h5", "footprint_area")
@@ -60,7 +60,7 @@ def _mean_pressure(results: Results) -> float:
 
 def _pressure(results: Results) -> Iterator[str]:
     """Load over area: close to the inflation, higher for a stiff carcass and a light load."""
-    mean, inflation = _mean_pressure(results), _number(results, "static.h5", "inflation")
+    mean, inflation = mean_pressure(results), _number(results, "static.h5", "inflation")
     if inflation > 0 and mean > 0 and _outside(mean / inflation, 0.6, 2.0):
         yield (
             f"mean contact pressure {quantity(mean, 'Pa')}, {digits(mean / inflation)} times the inflation "
@@ -70,7 +70,7 @@ def _pressure(results: Results) -> Iterator[str]:
 
 def _peak(results: Results) -> Iterator[str]:
     """The largest pressure: of passenger tires up to some 1.8 times the mean."""
-    mean = _mean_pressure(results)
+    mean = mean_pressure(results)
     largest = float(results.array("static.h5", "contact/pressure").max(initial=0.0))
     if mean > 0 and largest > _PEAK * mean:
         yield (

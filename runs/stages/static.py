@@ -372,7 +372,7 @@ def _describe(record: Record, state: StaticState, loader: Loader) -> None:
             "footprint width": (extent.width, "m"),
             "footprint area": (extent.area, "m2"),
             "contact points": (int((state.force > 0).sum()), "-"),
-            "mean contact pressure": (state.load / extent.area if extent.area else 0.0, "Pa"),
+            "mean contact pressure": (extent.pressure(state.load), "Pa"),
             "largest contact pressure": (float(state.pressure.max()), "Pa"),
         }
         record.indicators["least contact force"] = (float(state.force.min()), "N")

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from tireroad.runs.report import live, surface_figures
 from tireroad.runs.report.read import Results, Section, Table, attributes, quantity
+from tireroad.runs.report.realism import mean_pressure
 
 _MOSTLY = 0.3  # of a state's kinetic energy
 _LISTED = 6
@@ -139,8 +140,7 @@ def footprint(results: Results, section: Section) -> None:
     whole = results.attribute("static.h5", "footprint_area")
     if isinstance(whole, float) and whole > 0:
         section.facts.append(("contact area", f"{1e4 * whole:.4g} cm²"))
-        mean = float(force[active, 2].sum()) / whole
-        section.facts.append(("mean contact pressure", quantity(mean, "Pa")))
+        section.facts.append(("mean contact pressure", quantity(mean_pressure(results), "Pa")))
     if area is not None:
         caption = f"Contact pressure of {quantity(float(force[:, 2].sum()), 'N')}"
     picture = surface_figures.footprints(points, [values], ["footprint at rest"], unit)
