@@ -9,7 +9,9 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Limits, finite
 
 INERTIAS = ("full", "doppler")
+SHAPE_TOLERANCE = 2e-3  # -, of Turning
 _RATES = Limits(least=0.0)
+TOLERANCES = Limits(least=1e-6, most=1.0)  # -
 
 
 class Proportional(NamedTuple):
@@ -33,12 +35,14 @@ class Turning:
 
     `speed` rad/s, 0: standing; `damping` of the material, (gamma1 1/s, gamma2 s) or by strain
     energy, as in modal.damping; `inertia` "full", or "doppler": without Coriolis and centrifugal
-    forces. InputError for a value that is out of range.
+    forces; `shape_tolerance`: the relative shift of squared frequencies from which on a rotation shape
+    joins the modes (modal.rotation_shapes). InputError for a value that is out of range.
     """
 
     speed: float = 0.0
     damping: Damping = (0.0, 0.0)
     inertia: str = "full"
+    shape_tolerance: float = SHAPE_TOLERANCE
 
     def __post_init__(self) -> None:
         try:
@@ -47,6 +51,10 @@ class Turning:
             raise InputError(
                 f"speed = {self.speed!r} rad/s must be a number, 0 or more, and finite"
             ) from None
+        try:
+            TOLERANCES.check(finite(self.shape_tolerance), "-")
+        except (TypeError, ValueError) as error:
+            raise InputError(f"shape_tolerance = {self.shape_tolerance!r}: {error}") from None
         if self.inertia not in INERTIAS:
             raise InputError(f'inertia = "{self.inertia}" is unknown: take "full" or "doppler"')
         if not isinstance(self.damping, StrainEnergy):

@@ -68,6 +68,9 @@ Array = np.ndarray
 
 # Fraction of the largest squared length below which a direction is rounding.
 _ROUNDING = 1e-12
+# Share of a unit column, or its squared length afterwards, from which taking it off leaves rounding
+# of more than a hundred times the last digit.
+_CLEAN = 1e-4
 _ROWS = 4096  # of all fields at a time, when they are changed in place
 
 
@@ -83,12 +86,16 @@ def joined(modes: Modes, columns: Array, operators: Operators) -> Modes:
     extra *= root
     whole = summed(comm, np.einsum("ij,ij->j", extra, extra))
     extra /= np.sqrt(np.where(whole > 0, whole, 1.0))  # a load on the clamped rim moves nothing
-    for _ in range(2):  # the second pass removes the rounding of the first
-        take_off(extra, basis, gram(comm, basis, extra))
+    largest = 1.0
+    while largest > _CLEAN:  # a further pass removes the rounding of one that took off much
+        shares = gram(comm, basis, extra)
+        take_off(extra, basis, shares)
+        largest = np.abs(shares).max(initial=0.0)
     lengths, directions = np.linalg.eigh(gram(comm, extra, extra))
     kept = lengths > _ROUNDING
     extra = combined(extra, directions[:, kept] / np.sqrt(lengths[kept]), extra)
-    take_off(extra, basis, gram(comm, basis, extra))
+    if lengths[kept].min(initial=1.0) < _CLEAN:
+        take_off(extra, basis, gram(comm, basis, extra))
     del basis
     extra = combined(extra, np.linalg.inv(np.linalg.cholesky(gram(comm, extra, extra))).T, extra)
     extra /= root

@@ -8,7 +8,7 @@ respond with modes of some kHz, which a basis of the lowest modes lacks, hence s
 
 where omega_m is the circular frequency of the highest mode. x . K x is the relative shift that a
 shape causes in the squared frequencies near w. The leading directions of X in that measure, those
-of `TOLERANCE` and more, join the basis (modal.basis) and take part in the rotating problem. They
+of Turning.shape_tolerance and more, join the basis (modal.basis) and take part in the rotating problem. They
 are found in the block Krylov space of X X^T K, begun with random combinations of the columns of X
 (Musco and Musco, Advances in Neural Information Processing Systems 28 (2015) 1396): a few solutions
 per direction that counts instead of two per mode. Blocks are added until what counts has settled.
@@ -38,7 +38,6 @@ from tireroad.modal.solver.slicing import Modes
 
 Array = np.ndarray
 
-TOLERANCE = 2e-3
 BLOCK = 32  # solutions at a time
 _SPARE = 8  # directions found beyond those that count, as evidence that none is missing
 _SETTLED = 1e-3  # largest relative change of what counts by the last block
@@ -68,7 +67,7 @@ def with_rotation_shapes(
         return modes
     if rotation is None:
         raise InputError("rotation shapes: the matrices of the rotating frame are needed")
-    found = _Found(modes, operators, rotation, turning)
+    found = _Found(modes, projection, operators, rotation, turning)
     columns = found.foremost(_uncoupled(projection, turning.inertia))
     return joined(modes, columns, operators) if columns.shape[1] else modes
 
@@ -77,16 +76,24 @@ class _Found:
     """K-orthonormal directions (n, k), M-orthogonal to the modes, and X along them. Collective."""
 
     def __init__(
-        self, modes: Modes, operators: Operators, rotation: Rotation, turning: Turning
+        self,
+        modes: Modes,
+        projection: Projection,
+        operators: Operators,
+        rotation: Rotation,
+        turning: Turning,
     ) -> None:
         self._modes, self._operators, self._comm = modes, operators, operators.body.comm
         speed = up_to(turning.speed)
         middle = np.sqrt(max(float(modes.squares[-1]), speed**2)) / 2
-        # Factor, matrix, and the sign of its transpose: G is skew, S symmetric.
+        # Factor, matrix, its projection on the modes, and the sign of its transpose: G is skew, S
+        # symmetric.
+        projected = projection.rotating(turning.inertia)
         self._forces = (
-            (2 * speed, rotation.coriolis(turning.inertia), -1.0),
-            (speed**2 / middle, rotation.carrying(turning.inertia), 1.0),
+            (2 * speed, rotation.coriolis(turning.inertia), projected[0], -1.0),
+            (speed**2 / middle, rotation.carrying(turning.inertia), projected[1], 1.0),
         )
+        self._tolerance = turning.shape_tolerance
         self._fields = np.empty((len(modes.vectors), 0))
         self._of = np.empty((0, 2 * len(modes.squares)))
 
@@ -97,7 +104,7 @@ class _Found:
         for among in classes:
             self._search(shapes, random, np.tile(among, 2))
         shapes.destroy()
-        turn, counts = _counting(self._of)
+        turn, counts = self._counting(self._of)
         return combined(self._fields, turn[:, : len(counts)], self._fields)
 
     def _search(self, shapes: LoadedShapes, random: np.random.Generator, among: Array) -> None:
@@ -108,34 +115,53 @@ class _Found:
             spread = np.zeros((len(among), mix.shape[1]))
             spread[among] = mix
             last = len(self._of)
-            self._take(shapes.whole(self._load(spread)))
+            more = shapes.whole(self._load(spread))
+            take_off(more, self._modes.vectors, self._along_modes(spread))
+            self._take(more)
             of = self._of[known:, among]
-            counts = _counting(of)[1]
+            counts = self._counting(of)[1]
             if len(of) >= width or (len(of) >= len(counts) + _SPARE and _settled(counts, before)):
                 return
             mix, before = np.linalg.qr(self._of[last:, among].T)[0], counts
 
     def _load(self, mix: Array) -> Array:
-        """Own rows (n, b) of the forces [2 Omega G Phi, Omega^2 S Phi / w] mix."""
+        """Own rows (n, b) of the forces L mix, L = [2 Omega G Phi, Omega^2 S Phi / w]."""
         parts = zip(self._forces, np.split(mix, 2), strict=True)
         vectors = self._modes.vectors
-        return sum(f * multiply(matrix, vectors @ part) for (f, matrix, _), part in parts)
+        return sum(f * multiply(matrix, vectors @ part) for (f, matrix, _, _), part in parts)
+
+    def _along_modes(self, mix: Array) -> Array:
+        """Phi^T M K^-1 L mix = Lambda^-1 Phi^T L mix (m, b): no product of fields."""
+        parts = zip(self._forces, np.split(mix, 2), strict=True)
+        return sum(f * (small @ part) for (f, _, small, _), part in parts) / self._squares
+
+    @property
+    def _squares(self) -> Array:
+        return self._modes.squares[:, None]
 
     def _take(self, more: Array) -> None:
-        """Add to the directions what `more` shapes (n, b) contain beyond modes and directions."""
-        vectors, comm, ops = self._modes.vectors, self._comm, self._operators
+        """Add to the directions what `more` shapes (n, b), without modes, contain beyond them."""
+        ops, comm = self._operators, self._comm
         for _ in range(2):  # the second pass removes the rounding of the first
-            take_off(more, vectors, gram(comm, vectors, ops.mass[:, None] * more))
             stretched = multiply(ops.stiffness, more)
             take_off(more, self._fields, gram(comm, self._fields, stretched))
         # What was taken off last is K-orthogonal to `more`.
         sizes, turn = np.linalg.eigh(gram(comm, more, stretched))
-        kept = sizes > max(_NOTHING * TOLERANCE, _ROUNDING * sizes.max())
+        kept = sizes > max(_NOTHING * self._tolerance, _ROUNDING * sizes.max())
         new = more @ (turn[:, kept] / np.sqrt(sizes[kept]))
         # Q^T K X = Q^T L, with L the forces; for one matrix and one direction q it is G^T q . phi.
-        given = [sign * f * self._read(matrix, new) for f, matrix, sign in self._forces]
+        given = [sign * f * self._read(matrix, new) for f, matrix, _, sign in self._forces]
         self._fields = np.hstack([self._fields, new])
         self._of = np.vstack([self._of, np.hstack(given)])
+
+    def _counting(self, of: Array) -> tuple[Array, Array]:
+        """Left singular vectors of the components `of` X, and the squared values of those that count.
+
+        By `of` of^T, whose rounding of 1e-16 of the largest is far below the tolerance.
+        """
+        sizes, turn = np.linalg.eigh(of @ of.T)
+        sizes, turn = sizes[::-1], turn[:, ::-1]
+        return turn, sizes[sizes > self._tolerance]
 
     def _read(self, matrix: PETSc.Mat, fields: Array) -> Array:
         """(matrix fields)^T Phi (k, m)."""
@@ -153,12 +179,6 @@ def _uncoupled(projection: Projection, inertia: str) -> list[Array]:
         coupled += part / max(part.max(), np.finfo(float).tiny)
     count, label = connected_components(coupled > _COUPLED, directed=False)
     return [label == k for k in range(count)]
-
-
-def _counting(of: Array) -> tuple[Array, Array]:
-    """Left singular vectors of the components `of` X, and the squared values of those that count."""
-    turn, sizes, _ = np.linalg.svd(of, full_matrices=False)
-    return turn, sizes[sizes**2 > TOLERANCE] ** 2
 
 
 def _settled(now: Array, before: Array) -> bool:

@@ -27,17 +27,19 @@ DIRECTIONS = 16  # of waves, over a quarter turn
 
 @dataclass(frozen=True)
 class Wall:
-    """N = A/4π (k² + s² ω²) modes up to ω, k² averaged over the directions of waves.
+    """N = A/4π (k² + s² ω (ω - ω_s)) modes up to ω, k² averaged over the directions of waves.
 
     k is the wave number of bending waves in a shallow shell (Donnell), ρh (ω² - ω_c²) = B k⁴ + T k²,
-    and s² the sum of the squared slownesses of the two in-plane waves, which cords make too fast to
-    count. A wave across which the wall is curved stretches it, and there is none below its
+    and s² the sum of the squared slownesses of the two in-plane waves. Cords make one of them too fast
+    to count; the other shears the rubber of the walls, between whose edges it has to fit: from ω_s on,
+    one wave on the section's height (radial tire to 570, 800, 1000, 1400 Hz: 249, 583, 937, 1813 modes;
+    this gives 258, 538, 778, 1443). A wave across which the wall is curved stretches it, and there is none below its
     ω_c = c (cos²θ / r + sin²θ / R), where c is the speed of sound in a rod, r and R the radii of the
     section and of the crown, θ the direction from the circumference (318 Hz at θ = 0 in a torus of
     48 MPa and r = 0.1 m, whose 60th mode is at 313 Hz: 294 Hz by this, 210 Hz in a flat plate).
 
-    `area` A m², `mass` ρh kg/m², `bending` B N m, `tension` T N/m, `slowness2` s² (s/m)²,
-    `curved2` ω_c² (1/s²) by direction.
+    `area` A m², `mass` ρh kg/m², `bending` B N m, `tension` T N/m, `slowness2` s² (s/m)², `fitting` ω_s
+    1/s, `curved2` ω_c² (1/s²) by direction.
     """
 
     area: float
@@ -45,6 +47,7 @@ class Wall:
     bending: float
     tension: float
     slowness2: float
+    fitting: float
     curved2: np.ndarray
 
     def modes_below(self, frequency: float) -> float:
@@ -53,7 +56,9 @@ class Wall:
         driving = self.mass * np.maximum(omega2 - self.curved2, 0.0)
         root = np.sqrt(self.tension**2 + 4 * self.bending * driving)
         k2 = float(np.mean((root - self.tension) / (2 * self.bending)))
-        return self.area * (k2 + self.slowness2 * omega2) / (4 * math.pi)
+        omega = 2 * math.pi * frequency
+        inside = self.slowness2 * omega * max(omega - self.fitting, 0.0)
+        return self.area * (k2 + inside) / (4 * math.pi)
 
     def frequency_of(self, modes: float) -> float:
         """Frequency (Hz) below which there are that many modes, by bisection in its logarithm."""
@@ -67,12 +72,12 @@ class Wall:
 def wall_of(scene: Scene) -> Wall:
     """The wall, from the section's height and thickness; tension as in a circle of that radius.
 
-    With cords its waves are those of a flat plate: cords hinder the stretching of rubber, and give
-    way to waves that do not stretch them.
+    With cords its bending waves are those of a flat plate: cords hinder the stretching of rubber, and
+    give way to waves that do not stretch them.
     """
     tire, shape = scene.tire.proportions(), scene.tire.shape
     youngs, poisson, density = shape.rubber(scene.tire)
-    plane = density * (1 - poisson**2 + 2 * (1 + poisson)) / youngs
+    shear, stretch = (density * part / youngs for part in (2 * (1 + poisson), 1 - poisson**2))
     middle = tire.outer_radius - 0.5 * tire.height
     cords = bool(shape.angles(scene.tire))
     theta = (np.arange(DIRECTIONS) + 0.5) / DIRECTIONS * math.pi / 2
@@ -82,7 +87,8 @@ def wall_of(scene: Scene) -> Wall:
         mass=density * tire.thickness,
         bending=youngs * tire.thickness**3 / (12 * (1 - poisson**2)),
         tension=scene.static.inflation * tire.height,
-        slowness2=0.0 if cords else plane,
+        slowness2=shear if cords else shear + stretch,
+        fitting=math.pi / (math.sqrt(shear) * tire.height) if cords else 0.0,
         curved2=np.zeros(DIRECTIONS) if cords else youngs / density * curved**2,
     )
 

@@ -212,10 +212,10 @@ class ModesStage(Computed[ModalBasis]):
         }
 
     @property
-    def _shapes(self) -> tuple[float, str] | None:
-        """The speed (rad/s) up to which rotation shapes join the modes, and their inertia."""
+    def _shapes(self) -> tuple[float, str, float] | None:
+        """The speed (rad/s) up to which rotation shapes join the modes, their inertia and tolerance."""
         turning = shapes_of(self.job)
-        return (up_to(turning.speed), turning.inertia) if turning else None
+        return (up_to(turning.speed), turning.inertia, turning.shape_tolerance) if turning else None
 
     def compute(self, record: Record) -> ModalBasis:
         """Solve and project. Collective."""

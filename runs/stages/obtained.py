@@ -92,7 +92,6 @@ def _static(scene: Scene) -> str:
 
 
 def _modes(scene: Scene) -> str:
-    from tireroad.modal.rotation_shapes import TOLERANCE as shapes
     from tireroad.modal.solver.slicing import AUTO, BLOCK, TOLERANCE
     from tireroad.modal.solver.undamped import ORTHONORMALITY_TOLERANCE, RESIDUAL_TOLERANCE
 
@@ -101,10 +100,12 @@ def _modes(scene: Scene) -> str:
         "lanczos": f"block Lanczos, {BLOCK} vectors a block, on (A - sigma I)^-1 of each slice",
         "slepc": "SLEPc's spectrum slicing, Krylov-Schur, options -modes_…",
     }[solver]
+    rotation = scene.rotation
+    shapes = f"; rotation shapes of {rotation.shape_tolerance:g} and more" if rotation else ""
     return (
         f"{how} to {TOLERANCE:g}; counted by "
         f"the inertia of L D L^T, {_MUMPS}; residual at most {RESIDUAL_TOLERANCE:g}, orthonormal to "
-        f"{ORTHONORMALITY_TOLERANCE:g}; rotation shapes of {shapes:g} and more"
+        f"{ORTHONORMALITY_TOLERANCE:g}{shapes}"
     )
 
 

@@ -456,8 +456,15 @@ def friction_of(scene: Scene, rolling: Rolling) -> Friction | None:
 
 def turning_of(job: Job) -> Turning:
     """The scene's speed, damping and inertia."""
-    inertia = job.scene.rotation.inertia if job.speed else "full"
-    return Turning(speed=job.speed, damping=damping_of(job), inertia=inertia)
+    rotation = job.scene.rotation
+    if not job.speed or rotation is None:
+        return Turning(speed=job.speed, damping=damping_of(job))
+    return Turning(
+        speed=job.speed,
+        damping=damping_of(job),
+        inertia=rotation.inertia,
+        shape_tolerance=rotation.shape_tolerance,
+    )
 
 
 def shapes_of(job: Job) -> Turning | None:

@@ -24,7 +24,7 @@ from tireroad.greens.basis import Basis
 from tireroad.greens.coupling import wheel_of
 from tireroad.modal.basis import project
 from tireroad.modal.rolling import rolling_modes
-from tireroad.modal.rotation_shapes import TOLERANCE, up_to, with_rotation_shapes
+from tireroad.modal.rotation_shapes import up_to, with_rotation_shapes
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.fields import gram, multiply
 from tireroad.modal.standing import fewer, projected, solved, standing_modes
@@ -120,7 +120,7 @@ def test_all_that_count_are_found() -> None:
     comm, mass = operators.body.comm, operators.mass[:, None]
     X -= modes.vectors @ gram(comm, modes.vectors, mass * X)
     sizes = np.linalg.eigvalsh(gram(comm, X, multiply(operators.stiffness, X)))
-    wanted = int((sizes > TOLERANCE).sum())
+    wanted = int((sizes > ROLLING.shape_tolerance).sum())
     assert 10 < wanted < COUNT
     assert len(grown.squares) - COUNT == wanted
     assert grown.count == COUNT and grown.squares[COUNT] > modes.squares[-1]

@@ -573,6 +573,14 @@ class Rotation:
         "rotation shapes: static responses to the Coriolis and convective forces of the modes join these, as many as "
         "matter; for method projected, with a fixed rim",
     )
+    shape_tolerance: float = number(
+        0.002,
+        "-",
+        "relative shift of squared frequencies in the middle of the modes' band, at the speed rounded up to a power of "
+        "two, from which on a rotation shape matters",
+        least=1e-6,
+        most=1,
+    )
     count: int = integer(40, "number of pairs of method full", least=1, most=10000)
     window: tuple[float, float] = vector(
         (0.0, 0.0),
