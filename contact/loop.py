@@ -161,13 +161,6 @@ class Tire(Protocol):
 
 
 @runtime_checkable
-class AheadTire(Tire, Protocol):
-    """A tire that may look ahead; `ahead` is None if it does not."""
-
-    ahead: Ahead | None
-
-
-@runtime_checkable
 class NonlinearTire(Tire, Protocol):
     """A tire whose response is known approximately (fem.nonlinear_transient).
 
@@ -360,9 +353,10 @@ def roll(
         )
 
 
-def looking_ahead(tire: Tire) -> Ahead | None:
+def looking_ahead(tire: object) -> Ahead | None:
     """The tire's part that looks ahead, if it has one."""
-    return tire.ahead if isinstance(tire, AheadTire) else None
+    found: Ahead | None = getattr(tire, "ahead", None)
+    return found
 
 
 def _contact(

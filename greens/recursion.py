@@ -429,6 +429,7 @@ class Recursion:
         self._force = np.zeros(response.residual.shape[1])
         self._rate = np.zeros(3)
         # Outputs at the end of this step; this process's and all known parts of the next step's.
+        self._heard = False  # whether the processes have exchanged what they know of this step
         self._out = np.zeros(len(self._output))
         self._part = self._known = self._out
         self._unknown = self._force  # the force missing from `_known`
@@ -535,12 +536,16 @@ class Recursion:
     def exchange(self) -> None:
         """Broadcast the root's prediction and sum what was looked ahead; before `advance`.
         Collective."""
+        self._heard = True
         self._out = self._out if self._next is not None else np.empty_like(self._out)
         self.comm.Bcast(self._out)
         self._known = self._reduce(self._part)
 
     def advance(self, force: np.ndarray) -> None:
         """Set the force (k,) N at the end of the step; after `predict`. Local to each process."""
+        if self.ahead and not self._heard:
+            raise RuntimeError("a recursion that looks ahead needs `exchange` in every step")
+        self._heard = False
         self._move()
         self._force = self._unknown = force
         self._rate = self._rate + self._into_rate @ force

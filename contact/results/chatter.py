@@ -40,9 +40,6 @@ MOST = 1000
 # Largest accepted share of the touching points that alternate: that return to their state of two
 # steps before. (Measured: 0.11 to 1 where forces were wrong, 0.035 at most where they were right.)
 LIMIT = 0.05
-# Steps in the fastest oscillation from which twice that share is accepted: what then comes and goes from step
-# to step is a rough road that passes by a good part of the points' spacing in each.
-WELL = 6.0
 WINDOW = 200  # steps over which it is counted
 
 
@@ -101,8 +98,7 @@ def choose(steps: float) -> Chosen:
     if steps >= FEWEST:
         why = "resolve" if math.isfinite(steps) else "have none to resolve:"
         count = f" in {steps:.3g} steps" if math.isfinite(steps) else ""
-        limit = LIMIT if steps < WELL else 2 * LIMIT
-        return Chosen("linear", f"the steps {why} the contact's fastest oscillation{count}", limit)
+        return Chosen("linear", f"the steps {why} the contact's fastest oscillation{count}", LIMIT)
     return Chosen(
         "damped",
         f"the contact's fastest oscillation takes {steps:.3g} steps, fewer than {FEWEST:g}: forces linear over "

@@ -68,6 +68,7 @@ def test_looking_ahead_changes_nothing(scheme) -> None:
                 tire = made()
                 tire.restore(kept)
         tire.keep_samples()
+        Together(comm, len(new), tire.ahead)(tire.predict, partial(choose, solved), False)
         tire.advance(force[0])
         assert comm.size == 1 or comm.rank or all(len(state) == 0 for state, *_ in tire.samples())
     for values in (found, rates):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from tireroad.contact.loop import Drive, Solved, Together, roll
+from tireroad.contact.loop import Drive, Driven, Solved, Together, roll
 from tireroad.contact.solver.active_set import make_solver
 from tireroad.contact.solver.projected_cg import MatrixCompliance
 from tireroad.contact.solver.stick_slip import Friction
@@ -19,8 +19,8 @@ COUNT = len(PATCH.points)
 STEP, STEPS, SPEED = 2e-4, 40, 20.0
 
 
-def rolled(comm: MPI.Comm, solver: str, rubs: bool) -> np.ndarray:
-    """Forces, horizontal forces, motions and axle force of each step, (STEPS, n)."""
+def rolled(comm: MPI.Comm, solver: str, rubs: bool, driven: bool = False) -> np.ndarray:
+    """Forces, horizontal forces, motions and axle force of each step, (STEPS, n); `driven` as a run drives it."""
     strip = Strip(speed=SPEED)
     response = strip.response(PATCH.points, 6, 4, 4)
     if rubs:
@@ -33,6 +33,8 @@ def rolled(comm: MPI.Comm, solver: str, rubs: bool) -> np.ndarray:
         brush = Brush(BrushLaw(3e4, 0.6, (0.02, 0.01)), PATCH.points[:, 0], PATCH.line, SPEED, STEP)
         brush.begin(PATCH.force > 0)
         friction = Friction(brush, tire.same_step, None)
+    if driven:
+        tire = Driven(tire, np.zeros((STEPS + 1, 0)), np.zeros((0, 3)))
     drive = Drive(lambda x, y: 1e-4 * np.sin(80 * x + 10 * y), lambda t: 0.0, SPEED)
     steps = roll(tire, normal, PATCH, drive, STEP, STEPS, friction)
     parts = ([s.force, s.horizontal.ravel(), s.moved, s.gap, s.axle_force] for s in steps)
@@ -41,11 +43,19 @@ def rolled(comm: MPI.Comm, solver: str, rubs: bool) -> np.ndarray:
 
 @pytest.mark.mpi
 @pytest.mark.parametrize(
-    ("solver", "rubs"), [("active-set", False), ("active-set", True), ("projected-cg", False)]
+    ("solver", "rubs", "driven"),
+    [
+        ("active-set", False, False),
+        ("active-set", True, False),
+        ("projected-cg", False, False),
+        ("active-set", False, True),
+    ],
 )
-def test_processes_find_together_what_each_finds_alone(solver: str, rubs: bool) -> None:
+def test_processes_find_together_what_each_finds_alone(
+    solver: str, rubs: bool, driven: bool
+) -> None:
     comm = MPI.COMM_WORLD
-    alone, together = (rolled(c, solver, rubs) for c in (MPI.COMM_SELF, comm))
+    alone, together = (rolled(c, solver, rubs, driven) for c in (MPI.COMM_SELF, comm))
     # Conjugate gradients end at 1e-10 of the scale, the turns of friction at 1e-8.
     tolerance = 1e-10 if solver == "active-set" and not rubs else 1e-6
     forces = np.abs(alone[:, :COUNT]).max()
