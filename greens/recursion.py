@@ -44,6 +44,7 @@ and b1 = h phi1. Cost: one pass over output and input,
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -602,3 +603,40 @@ class Recursion:
     def inertia_force(self) -> np.ndarray:
         """Rate of the tire's momentum (3,), N, after `advance`: sum_k (int rho phi_k) eta_k''."""
         return self._rate
+
+
+def marched(
+    response: Response, step: float, scheme: str, begun: Array, blocks: Iterable[Array]
+) -> Iterator[Array]:
+    """Displacements (n, r) m at the ends of steps of `step` s under forces that are known, block by
+    block.
+
+    As `Recursion` finds them step by step, but by products of matrices: with known forces only the
+    decay of the states goes from one step to the next. `begun` (k,) N at t = 0, `blocks` (n, k) N.
+    """
+    decay = np.exp(response.eigenvalue * step)
+    old, new = weights(response.eigenvalue * step, step, scheme)
+    parts, late = EARLIER[scheme], late_answers(response, step, scheme)
+    into = np.ascontiguousarray(response.input.T).view(float)
+    output = np.ascontiguousarray(response.output.conj()).view(float).T
+    block = Block(response, step, scheme) if len(response.block) else None
+    if block:
+        block.start(begun)
+    force, state = begun, np.zeros(len(decay), complex)
+    last = np.repeat((begun @ into).view(complex)[None], 2, axis=0)
+    for forces in blocks:
+        pushes = np.concatenate([last, (forces @ into).view(complex)])
+        states = old * mixed(parts, pushes[1:-1], pushes[:-2]) + new * pushes[2:]
+        for each in states:
+            each += decay * state
+            state = each
+        out = states.view(float) @ output + forces @ response.residual.T
+        if block:
+            for row, each in zip(out, forces, strict=True):
+                block.move()
+                block.advance(each)
+                row += response.block_output @ block.state
+        if late is not None:
+            out += (late[:-3] @ np.vstack([force, forces[:-1]]).T - late[:-3] @ forces.T).T
+        yield out
+        force, last = forces[-1], pushes[-2:]

@@ -14,6 +14,7 @@ each other, or raises one InputError that lists all problems: the key, its place
 """
 
 import difflib
+import math
 import re
 import tomllib
 from collections.abc import Callable, Iterator, Sequence, Set
@@ -193,7 +194,7 @@ def with_band(scene: Scene, raw: dict[str, Any], say: Say) -> Scene:
         return scene
     top, chosen = BAND_EDGE * scene.accuracy.up_to, []
     if not {"count", "up_to"} & set(tables["modal"]):
-        highest = float(f"{top / USABLE:.3g}")
+        highest = 10.0 * math.ceil(top / USABLE / 10)
         scene = replace(scene, modal=replace(scene.modes, up_to=highest))
         chosen.append(f"modal.up_to = {highest:g} Hz, of which {USABLE:.0%} are an answer")
     rotation = scene.rotation

@@ -11,7 +11,6 @@ from typing import Any, ClassVar, TypeVar
 
 import h5py
 import numpy as np
-from mpi4py import MPI
 from scipy import signal, sparse
 
 from tireroad.contact.results.spectra import amplitudes
@@ -19,7 +18,7 @@ from tireroad.contact.setup import ContactSetup
 from tireroad.fem.errors import InputError
 from tireroad.fem.static.state import StaticState
 from tireroad.greens.basis import Basis
-from tireroad.greens.recursion import Recursion
+from tireroad.greens.recursion import marched
 from tireroad.greens.response import couple
 from tireroad.greens.responses import Wanted, band
 from tireroad.modal.rolling import RollingModes
@@ -31,7 +30,7 @@ from tireroad.runs.stages.setup import components, leaning, leaning_loads, probe
 from tireroad.runs.stages.spectra import Spectra
 from tireroad.runs.stages.stage import Computed, Done, Job, Part, Shared
 
-_ROWS = 4096  # steps read at a time
+_ROWS = 1024  # steps read at a time
 _AT_ONCE = 64  # coordinates transformed at a time, to save memory
 FADE = 0.05  # of a record at each end, where its motion over time fades in and out
 
@@ -213,17 +212,11 @@ def replayed(basis: Basis, forces: Forces, wanted: Collection[int]) -> np.ndarra
     """
     unit = np.eye(basis.coordinates)
     response = couple(basis.states, unit, unit, np.zeros((3, len(unit))))
-    scheme = recursive(forces.scheme)
-    tire = Recursion(response=response, step=forces.step, scheme=scheme, comm=MPI.COMM_SELF)
-    tire.start(forces.begun)
+    given = response, forces.step, recursive(forces.scheme), forces.begun, forces.pushes()
     found = np.empty((len(wanted), len(unit)))
     number = filled = 0
-    for block in forces.pushes():
-        for push in block:
-            free = tire.predict()
-            if number in wanted:
-                found[filled] = free + tire.same_step @ push
-                filled += 1
-            tire.advance(push)
-            number += 1
+    for moved in marched(*given):
+        some = [k for k in range(len(moved)) if number + k in wanted]
+        found[filled : filled + len(some)] = moved[some]
+        filled, number = filled + len(some), number + len(moved)
     return found

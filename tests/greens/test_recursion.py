@@ -10,7 +10,7 @@ from systems import make
 
 from tireroad.fem.errors import InputError
 from tireroad.greens.convolution import Convolution
-from tireroad.greens.recursion import Recursion
+from tireroad.greens.recursion import Recursion, marched
 
 STEPS = 60
 
@@ -204,3 +204,25 @@ def test_dirac_residual_answers_with_a_pulse_of_one_step() -> None:
         for r in (at_once, pulse)
     ]
     assert np.array_equal(*held)
+
+
+@pytest.mark.parametrize("scheme", ["linear", "damped", "constant"])
+@pytest.mark.parametrize("pulse", [0, 4])
+def test_known_forces_are_marched_through_by_blocks(scheme, pulse) -> None:
+    """As from step to step: states, nearly defective ones, residual, and what answers a step late."""
+    random, system = np.random.default_rng(5), make(m=7, speed=60.0)
+    response = replace(
+        system.response(compliance=np.eye(4) * 1e-3),
+        block=np.array([[0.0, 1.0], [-1600.0, -80.0]]),
+        block_output=random.normal(size=(4, 2)),
+        block_input=random.normal(size=(2, 4)),
+        block_momentum=random.normal(size=(3, 2)),
+        slope=1e-6 * random.normal(size=(7, 4)),
+        pulse=pulse,
+    )
+    force = some_force(4)
+    tire = Recursion(response=response, step=1e-3, scheme=scheme, comm=MPI.COMM_SELF)
+    blocks = np.split(force[1:], [1, 2, 7])
+    found = np.vstack(list(marched(response, 1e-3, scheme, force[0], blocks)))
+    expected = march(tire, force)
+    assert np.abs(found - expected).max() < 1e-12 * np.abs(expected).max()
