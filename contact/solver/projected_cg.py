@@ -7,18 +7,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
 from tireroad.contact.solver.conditions import (
+    TOLERANCE,
     check_residual,
     complementarity_residual,
     penetration,
 )
-from tireroad.contact.tread.kernel import KernelTread
+from tireroad.contact.tread.kernel import Box, KernelTread
 from tireroad.fem.errors import ConvergenceError
 from tireroad.greens.recursion import LoadedColumns
 
@@ -56,6 +57,20 @@ class Compliance(Protocol):
     def precondition(self, approach: Array) -> Array: ...
 
 
+@runtime_checkable
+class Boxed(Compliance, Protocol):
+    """A compliance on a grid, which costs less between the points of a box of it.
+
+    `cells`: row and column (c,) of each point; `inside` a box the same between its points, and which
+    those are (a,).
+    """
+
+    @property
+    def cells(self) -> tuple[Index, Index]: ...
+
+    def inside(self, box: Box) -> tuple[Compliance, Index]: ...
+
+
 @dataclass(frozen=True)
 class _ProductAround:
     """For a compliance that is a product, which costs the same for few forces as for many."""
@@ -85,6 +100,18 @@ class SpreadCompliance:
     def around(self, index: Index) -> Around:
         """A restricted to the points of `index` (a,)."""
         return _ProductAround(lambda: self.block(index, index), self.apply)
+
+    @property
+    def cells(self) -> tuple[Index, Index]:
+        """Row and column (c,) of each point in the grid."""
+        return self._tread.cells
+
+    def inside(self, box: Box) -> tuple[SpreadCompliance, Index]:
+        """The same between the points in a box of the grid, and which those are (a,)."""
+        tread, index = self._tread.inside(box)
+        rows = self._weights[index]
+        nodes = np.unique(rows.indices)
+        return SpreadCompliance(self._tire[np.ix_(nodes, nodes)], rows[:, nodes], tread), index
 
     def apply(self, force: Array) -> Array:
         """Displacement (c,) m under forces (c,) N."""
@@ -123,6 +150,9 @@ Mask = NDArray[np.bool_]
 # A tenth of the tolerance, since the residual is evaluated again for the record.
 TARGET = 1e-10
 MAX_ITERATIONS = 1000
+# Rows and columns of points around those that touch, among which a step looks for others: a footprint is half of
+# the points within reach of the road.
+_AROUND = 3
 
 
 class ProjectedCG:
@@ -134,12 +164,17 @@ class ProjectedCG:
     convergence, but the gap is always that of A itself. Warm start by linear extrapolation of the
     last forces. Sources: Polonsky and Keer, Wear 231 (1999) 206; Vollebregt, J. Comput. Phys. 257
     (2014) 333.
+
+    On a grid only the points of a box around those that touch take part. The gaps of all others are
+    found afterwards; where one is negative the box grows and the step is solved again.
     """
 
     def __init__(self, compliance: Compliance) -> None:
         self._compliance = compliance
         self._diagonal = compliance.diagonal
         n = len(self._diagonal)
+        self._box: Box | None = None
+        self._inner, self._index = compliance, np.arange(n)
         self._last: Array | None = None
         self._before: Array | None = None
         self.active: Mask = np.zeros(n, dtype=bool)
@@ -157,28 +192,76 @@ class ProjectedCG:
             check_residual("projected-cg", np.nan)
         base = np.zeros(len(q)) if reference is None else reference
         force = self._begin(base, guess_active)
-        gap = self._gap(force, base, q)
-        touching = (force > 0.0) | (gap < 0.0)
-        direction, old, old_product = None, None, 0.0
-        for self.iterations in range(MAX_ITERATIONS):
+        near = (base != 0.0) | (force > 0.0)
+        self._cover(near if guess_active is None else near | guess_active)
+        self.iterations = 0
+        while True:
+            index = self._index
+            found, gap = self._iterate(q[index], base[index], force[index], np.abs(q).max())
+            if len(index) < len(q):
+                force = np.zeros(len(q))
+                force[index] = found
+                gap = self._gap(force, base, q)
+            else:
+                force = found
             scale = float(np.abs(q).max() + (self._diagonal * force).max())
             self.residual = complementarity_residual(force, gap, self._diagonal, scale)
-            if self.residual <= TARGET:
+            if self.residual <= TOLERANCE or not self._cover(gap < -TARGET * scale):
                 return self._finish(force, gap)
+
+    def _cover(self, points: Mask) -> bool:
+        """Let the box contain these points; whether it grew."""
+        if not isinstance(self._compliance, Boxed) or not points.any():
+            return False
+        rows, columns = self._compliance.cells
+        box: list[int] = []
+        for which, (cells, few) in enumerate(((rows, rows[points]), (columns, columns[points]))):
+            low, high = int(few.min()), int(few.max()) + 1
+            if self._box is not None:
+                first, last = self._box[2 * which : 2 * which + 2]
+                low = first if low >= first else low - _AROUND
+                high = last if high <= last else high + _AROUND
+            else:
+                low, high = low - _AROUND, high + _AROUND
+            box += [max(low, 0), min(high, int(cells.max()) + 1)]
+        return self._take_box((box[0], box[1], box[2], box[3]))
+
+    def _take_box(self, box: Box) -> bool:
+        """Solve between the points of this box from now on; whether it is another."""
+        assert isinstance(self._compliance, Boxed)
+        if box == self._box:
+            return False
+        self._box = box
+        self._inner, self._index = self._compliance.inside(box)
+        return True
+
+    def _iterate(self, q: Array, base: Array, force: Array, largest: float) -> tuple[Array, Array]:
+        """Forces and gaps of the points of the box; `largest` gap of all."""
+        inner = self._inner
+        diagonal = self._diagonal[self._index]
+        gap = q + inner.apply(force - base)
+        touching = (force > 0.0) | (gap < 0.0)
+        direction, old, old_product = None, None, 0.0
+        for _ in range(MAX_ITERATIONS):
+            scale = float(largest + (diagonal * force).max())
+            self.residual = complementarity_residual(force, gap, diagonal, scale)
+            if self.residual <= TARGET:
+                return force, gap
+            self.iterations += 1
             defect = np.where(touching, -gap, 0.0)
-            raised = np.where(touching, self._compliance.precondition(defect), 0.0)
+            raised = np.where(touching, inner.precondition(defect), 0.0)
             product = float(raised @ defect)
             if direction is None:
                 direction = raised
             else:
                 share = max((product - float(raised @ old)) / old_product, 0.0)
                 direction = raised + share * direction
-            moved = self._compliance.apply(direction)
+            moved = inner.apply(direction)
             length = self._length(float(direction @ defect), float(direction @ moved))
             force = force + length * direction
             if force.min() < 0.0:
                 force = np.maximum(force, 0.0)
-                gap = self._gap(force, base, q)
+                gap = q + inner.apply(force - base)
             else:
                 gap = gap + length * moved
             now = (force > 0.0) | (gap < 0.0)
@@ -194,12 +277,16 @@ class ProjectedCG:
 
     def state(self) -> dict[str, Array]:
         """The state from which the next solve starts."""
-        kept = {"last": self._last, "before": self._before}
+        box = None if self._box is None else np.array(self._box, dtype=float)
+        kept = {"last": self._last, "before": self._before, "box": box}
         return {name: value for name, value in kept.items() if value is not None}
 
     def set_state(self, kept: dict[str, Array]) -> None:
         """Continue from `state`."""
         self._last, self._before = kept.get("last"), kept.get("before")
+        if "box" in kept:
+            top, bottom, left, right = (int(value) for value in kept["box"])
+            self._take_box((top, bottom, left, right))
 
     def block(self, index: NDArray[np.intp]) -> Array:
         """A between the points `index`, (a, a) m/N."""

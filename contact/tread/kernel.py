@@ -1,5 +1,7 @@
 """A tread compliance on a regular grid of points as a convolution, without its matrix."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +12,7 @@ from tireroad.contact.tread.compliance import Influence
 
 Array = NDArray[np.float64]
 MARGIN = 4  # points
+Box = tuple[int, int, int, int]  # first row, one past the last, first column, one past the last
 
 
 @dataclass(frozen=True)
@@ -30,7 +33,7 @@ class KernelTread:
     """
 
     def __init__(self, grid: GridPlaces, influence: Influence) -> None:
-        self._grid = grid
+        self._grid, self._influence = grid, influence
         self._size, x, y = doubled(grid)
         a, b = (np.full(x.shape, d / 2) for d in grid.spacing)
         kernel = influence(x, y, a, b)
@@ -48,6 +51,22 @@ class KernelTread:
         around = np.ix_(*(np.fft.ifftshift(np.arange(n) - n // 2) for n in self._period))
         least = 1e-3 * self.diagonal
         self._inverse = 1.0 / np.maximum(fft.rfft2(kernel[around]).real, least)
+
+    @property
+    def cells(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Row and column (c,) of each point in the grid."""
+        rows, columns = np.divmod(self._grid.place, self._grid.shape[1])
+        return rows, columns
+
+    def inside(self, box: Box) -> tuple[KernelTread, NDArray[np.intp]]:
+        """The same for the points in a box of the grid, and which those are (a,)."""
+        (top, bottom, left, right), (rows, columns) = box, self.cells
+        index = np.flatnonzero(
+            (rows >= top) & (rows < bottom) & (columns >= left) & (columns < right)
+        )
+        shape = bottom - top, right - left
+        place = (rows[index] - top) * shape[1] + columns[index] - left
+        return KernelTread(GridPlaces(shape, self._grid.spacing, place), self._influence), index
 
     def block(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Array:
         """The matrix between the points `rows` (a,) and `columns` (b,), (a, b) m/N."""

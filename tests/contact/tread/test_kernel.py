@@ -169,3 +169,23 @@ def test_layer_under_a_rectangle(sides, place) -> None:
 def test_an_incompressible_layer_much_thinner_than_its_points_is_refused() -> None:
     with pytest.raises(InputError, match="closer contact.points, or a smaller contact.poisson"):
         LayerInfluence(5e6, 0.5, 1e-4)(*(np.array([v]) for v in (0.0, 0.0, 0.01, 0.01)))
+
+
+def test_the_box_of_projected_cg_grows_with_the_contact() -> None:
+    """It begins around a few points, then meets a stone far from them; and is the same after a restart."""
+    product, matrix, gap = patch_compliance(1e-4)
+    exact, solver = ActiveSet(matrix), ProjectedCG(product)
+    static = exact.solve(gap - 5e-5)
+    q = np.where(static > 0, 0.0, exact.gap)
+    solver.solve(q, static > 0, reference=static)
+    begun = len(solver._index)
+    assert 0 < np.count_nonzero(static) <= begun < len(gap)
+    stone = q - 3e-3 * (np.arange(len(gap)) < 3)
+    force = solver.solve(stone, reference=static)
+    expected = ActiveSet(matrix).solve(stone, reference=static)
+    assert np.abs(force - expected).max() < 1e-6 * expected.max()
+    assert force[:3].all() and begun < len(solver._index)
+    assert np.array_equal(solver.gap == 0, force > 0)
+    again = ProjectedCG(product)
+    again.set_state(solver.state())
+    assert np.array_equal(again.solve(q, reference=static), solver.solve(q, reference=static))
