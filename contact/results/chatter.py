@@ -43,9 +43,6 @@ LIMIT = 0.05
 WINDOW = 200  # steps over which it is counted
 
 
-ROAD = (
-    "points open and close from step to step with damped forces too: that is the road, not chatter"
-)
 ANY = 1e9  # a limit that no share reaches: another scheme is tried only if the motion grows
 
 
@@ -76,9 +73,9 @@ class Chosen:
     def instead(self, chatter: Chatter) -> Chosen:
         """The choice after this one exceeded its limit; raises the error if none is left.
 
-        On a rough road points open and close because it passes by more than their spacing in a
-        step. They do so with damped forces too, which cannot chatter: if more than half as many
-        do, linear forces are kept.
+        On a rough road points open and close, too, because it passes by a good part of their
+        spacing in a step. They do so with damped forces, which cannot chatter: these stay, unless
+        the motion grows.
         """
         if self.limit == math.inf:
             raise chatter
@@ -86,11 +83,9 @@ class Chosen:
             return Chosen(
                 "damped",
                 "forces linear over the step made points open and close from step to step",
-                min(max(chatter.share / 2, LIMIT), ANY),
+                ANY,
             )
-        if chatter.share == math.inf:
-            return Chosen("constant", "with damped forces too the motion grew without bound")
-        return Chosen("linear", ROAD)
+        return Chosen("constant", "with damped forces too the motion grew without bound")
 
 
 def choose(steps: float) -> Chosen:

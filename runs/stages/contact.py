@@ -21,7 +21,7 @@ from threadpoolctl import threadpool_limits
 from tireroad.contact.loop import Driven, Loop, roll
 from tireroad.contact.model import solver_name
 from tireroad.contact.patch import Patch
-from tireroad.contact.results.chatter import LIMIT, ROAD, Chatter, Chosen, warning
+from tireroad.contact.results.chatter import LIMIT, Chatter, Chosen, warning
 from tireroad.contact.results.energy import (
     Circulation,
     Motion,
@@ -97,8 +97,8 @@ def describe(record: Record, counted: Totals, solver, chosen: Integration, taken
 
 
 def alternation(record: Record, worst: float, scheme: Chosen) -> None:
-    """Warn if points open and close from step to step, unless the road is the known cause."""
-    if worst > LIMIT and scheme.reason != ROAD:
+    """Warn if points open and close from step to step; with damped forces that is the road."""
+    if worst > LIMIT and scheme.scheme != "damped":
         record.warnings.append(warning(worst))
 
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from tireroad.contact.results.chatter import Alternation, Chatter
+from tireroad.contact.results.chatter import ANY, LIMIT, Alternation, Chatter
 from tireroad.runs.files.cache import Cache
 from tireroad.runs.process import observe
 from tireroad.runs.process.signals import Stopped
@@ -100,13 +100,13 @@ def attempts(monkeypatch):
 
 @pytest.mark.parametrize(
     ("ended", "limits", "scheme"),
-    [(1, [0.05], "damped"), (2, [0.05, 0.1], "linear")],
-    ids=["chatter", "a rough road"],
+    [(1, [LIMIT], "damped"), (2, [LIMIT, ANY], "constant")],
+    ids=["chatter", "growth"],
 )
 def test_the_other_scheme_is_tried_and_a_stop_after_it_goes_on_as_begun(
     run, tmp_path, attempts, ended: int, limits: list[float], scheme: str
 ) -> None:
-    """With damped forces where linear ones alternate, and with linear ones again where both do."""
+    """With damped forces where linear ones alternate, and with constant ones where these do not hold."""
     run("whole", f"time.scheme={scheme}")
     tried = attempts(ended)
     with pytest.raises(Stopped):
