@@ -181,6 +181,7 @@ LOOSER = 0.01  # rotation.shape_tolerance where errors count in dB: docs/verific
 # times as far apart in every third octave from 79 Hz to 1 kHz, where those at half the nodes' distance (3.8 mm) are
 # 0.6 to 3.7 dB too loud (205/60 R15 at 80 km/h on two-slope; docs/verification/band.md).
 ON_A_WAVE, CLOSE = 8.0, 4e-3  # -, m
+UNHEARD = 1.2  # times the band's upper edge: the rolling radius is not known yet
 COARSE_UP_TO = 450.0  # Hz: to there 24 segments of 16 elements carry the waves of a radial tire
 
 
@@ -251,13 +252,36 @@ def with_points(scene: Scene, raw: dict[str, Any], say: Say) -> Scene:
     ):
         return scene
     speed = rotation.speed * scene.tire.proportions().outer_radius
-    wanted = speed / scene.accuracy.up_to / ON_A_WAVE
-    if wanted >= CLOSE:
+    wave = speed / scene.accuracy.up_to
+    if wave / ON_A_WAVE >= CLOSE:
         return scene
-    digit = 10.0 ** (math.floor(math.log10(wanted)) - 1)
-    pitch = round(math.floor(wanted / digit) * digit, 9)
-    say(f"accuracy.up_to chooses contact.points = {pitch:g} m, {ON_A_WAVE:g} to the shortest wave")
+    pitch = _unheard(wave / ON_A_WAVE, speed, scene)
+    say(
+        f"accuracy.up_to chooses contact.points = {pitch:g} m, {wave / pitch:.2g} to the shortest wave"
+    )
     return replace(scene, contact=replace(contact, points=Pitch(pitch, pitch)))
+
+
+def _unheard(wanted: float, speed: float, scene: Scene) -> float:
+    """The pitch (m), two digits of it, nearest to the `wanted` one whose passing is not heard.
+
+    Points pass at speed / pitch; that and its harmonics, sampled by the steps, must not return inside
+    the band, neither in the run nor in its companions with twice the step and twice the pitch.
+    """
+    digit = 10.0 ** (math.floor(math.log10(wanted)) - 1)
+    first, top = math.floor(wanted / digit), UNHEARD * BAND_EDGE * scene.accuracy.up_to
+    steps = scene.time.step if scene.time else "auto"
+    if isinstance(steps, str):
+        return round(first * digit, 9)
+    rates = 1 / steps, 0.5 / steps
+
+    def heard(pitch: float) -> bool:
+        passing = (k * speed / pitch for k in (0.5, 1.0, 1.5, 2.0, 3.0))
+        return any(abs(f - rate * round(f / rate)) < top for f in passing for rate in rates)
+
+    tried = sorted(range(max(first // 2, 1), 2 * first), key=lambda count: abs(count - first))
+    count = next((count for count in tried if not heard(count * digit)), first)
+    return round(count * digit, 9)
 
 
 def with_speed(scene: Scene) -> Scene:

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import numpy as np
+
 from tireroad.runs.scene.load import load
 
 NOISE = Path(__file__).parents[3] / "runs/scenes/noise.toml"
@@ -14,7 +16,17 @@ def test_the_band_chooses_what_a_scene_leaves_open() -> None:
     assert scene.rotation.shape_tolerance == 0.01
     assert 15.5 < 1 / (edge * scene.time.step) < 16.5
     assert scene.time.scheme == "damped"
-    assert scene.contact.points.dx == scene.contact.points.dy == 0.0028  # m: 22.5 m/s / 1 kHz / 8
+    assert scene.contact.points.dx == scene.contact.points.dy == 0.003  # m: 22.5 m/s / 1 kHz / 8
+
+
+def test_the_passing_of_the_points_is_not_heard() -> None:
+    """2.8 mm, eight to the wave, pass at 7.9 kHz, which steps of 112 us of a companion take for 1.06 kHz."""
+    scene = load(NOISE)
+    speed = 71.9 * 0.3066  # m/s, of the rolling radius
+    for step in (scene.time.step, 2 * scene.time.step):
+        for passing in (speed / scene.contact.points.dx, speed / 2 / scene.contact.points.dx):
+            for f in passing * np.arange(1, 4):
+                assert abs(f - round(f * step) / step) > 1122, (step, f)
 
 
 def test_what_the_scene_says_stays() -> None:
