@@ -190,7 +190,7 @@ def with_band(scene: Scene, raw: dict[str, Any], say: Say) -> Scene:
 
     A search chooses for itself. Points follow later (with_points).
     """
-    tables = {name: _given(raw, name) for name in ("modal", "rotation", "time", "tire")}
+    tables = {name: _keys_in(raw, name) for name in ("modal", "rotation", "time", "tire")}
     if not _by_band(scene, raw):
         return scene
     top, chosen = BAND_EDGE * scene.accuracy.up_to, []
@@ -222,7 +222,7 @@ def with_band(scene: Scene, raw: dict[str, Any], say: Say) -> Scene:
     return scene
 
 
-def _given(raw: dict[str, Any], name: str) -> dict[str, Any]:
+def _keys_in(raw: dict[str, Any], name: str) -> dict[str, Any]:
     """The keys of a table that the scene gives."""
     return found if isinstance(found := raw.get(name), dict) else {}
 
@@ -230,7 +230,7 @@ def _given(raw: dict[str, Any], name: str) -> dict[str, Any]:
 def _by_band(scene: Scene, raw: dict[str, Any]) -> bool:
     """Whether accuracy.up_to chooses what the scene leaves open."""
     method = scene.rotation.method if scene.rotation else "projected"
-    given = "up_to" in _given(raw, "accuracy") and method == "projected"
+    given = "up_to" in _keys_in(raw, "accuracy") and method == "projected"
     return scene.in_contact and given and not scene.accuracy.searches
 
 
@@ -241,7 +241,7 @@ def with_points(scene: Scene, raw: dict[str, Any], say: Say) -> Scene:
     else (contact.patch).
     """
     contact, rotation = scene.contact, scene.rotation
-    if not _by_band(scene, raw) or "points" in _given(raw, "contact"):
+    if not _by_band(scene, raw) or "points" in _keys_in(raw, "contact"):
         return scene
     if (
         contact is None
