@@ -637,6 +637,6 @@ def marched(
                 block.advance(each)
                 row += response.block_output @ block.state
         if late is not None:
-            out += (late[:-3] @ np.vstack([force, forces[:-1]]).T - late[:-3] @ forces.T).T
+            out += (late[:-3] @ (np.vstack([force, forces[:-1]]) - forces).T).T
         yield out
         force, last = forces[-1], pushes[-2:]

@@ -133,11 +133,10 @@ class _Found:
     def _along_modes(self, mix: Array) -> Array:
         """Phi^T M K^-1 L mix = Lambda^-1 Phi^T L mix (m, b): no product of fields."""
         parts = zip(self._forces, np.split(mix, 2), strict=True)
-        return sum(f * (small @ part) for (f, _, small, _), part in parts) / self._squares
-
-    @property
-    def _squares(self) -> Array:
-        return self._modes.squares[:, None]
+        return (
+            sum(f * (small @ part) for (f, _, small, _), part in parts)
+            / self._modes.squares[:, None]
+        )
 
     def _take(self, more: Array) -> None:
         """Add to the directions what `more` shapes (n, b), without modes, contain beyond them."""

@@ -49,13 +49,8 @@ ANY = 1e9  # a limit that no share reaches: another scheme is tried only if the 
 class Chatter(ConvergenceError):
     """The steps are too long for the contact.
 
-    `share` of the touching points open and close from step to step; inf if the motion grows without
-    bound.
+    Points open and close from step to step, or the motion grows without bound.
     """
-
-    def __init__(self, text: str, share: float = math.inf) -> None:
-        super().__init__(text)
-        self.share = share
 
 
 @dataclass(frozen=True)
@@ -227,7 +222,7 @@ class Alternation:
     def check(self, limit: float) -> None:
         """Raise Chatter if more than this share of the points change back."""
         if self.worst > limit:
-            raise Chatter(warning(self.worst), self.worst)
+            raise Chatter(warning(self.worst))
 
     def state(self) -> dict[str, np.ndarray]:
         """The state that a checkpoint keeps."""

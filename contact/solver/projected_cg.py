@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,20 +55,6 @@ class Compliance(Protocol):
     def apply(self, force: Array) -> Array: ...
 
     def precondition(self, approach: Array) -> Array: ...
-
-
-@runtime_checkable
-class Boxed(Compliance, Protocol):
-    """A compliance on a grid, which costs less between the points of a box of it.
-
-    `cells`: row and column (c,) of each point; `inside` a box the same between its points, and which
-    those are (a,).
-    """
-
-    @property
-    def cells(self) -> tuple[Index, Index]: ...
-
-    def inside(self, box: Box) -> tuple[Compliance, Index]: ...
 
 
 @dataclass(frozen=True)
@@ -155,6 +141,23 @@ MAX_ITERATIONS = 1000
 _AROUND = 3
 
 
+_EMPTY: Box = (2**31, 0, 2**31, 0)
+
+
+def _widened(cells: Index, points: Mask, first: int, last: int) -> tuple[int, int]:
+    """The range from `first` to before `last` of `cells` (n,), grown where `points` lie beyond it."""
+    few = cells[points]
+    low, high = int(few.min()), int(few.max()) + 1
+    return (
+        first if low >= first else max(low - _AROUND, 0),
+        last if high <= last else min(high + _AROUND, int(cells.max()) + 1),
+    )
+
+
+def _gap(compliance: Compliance, force: Array, base: Array, q: Array) -> Array:
+    return q + compliance.apply(force - base)
+
+
 class ProjectedCG:
     """f >= 0, g = A (f - f_ref) + q >= 0, f . g = 0 for A a product with a preconditioner.
 
@@ -173,7 +176,9 @@ class ProjectedCG:
         self._compliance = compliance
         self._diagonal = compliance.diagonal
         n = len(self._diagonal)
-        self._box: Box | None = None
+        self._grid = compliance if isinstance(compliance, SpreadCompliance) else None
+        self._cells = self._grid.cells if self._grid else ()
+        self._box = _EMPTY
         self._inner, self._index = compliance, np.arange(n)
         self._last: Array | None = None
         self._before: Array | None = None
@@ -194,52 +199,42 @@ class ProjectedCG:
         force = self._begin(base, guess_active)
         near = (base != 0.0) | (force > 0.0)
         self._cover(near if guess_active is None else near | guess_active)
-        self.iterations = 0
+        self.iterations, largest = 0, float(np.abs(q).max())
         while True:
             index = self._index
-            found, gap = self._iterate(q[index], base[index], force[index], np.abs(q).max())
+            found, gap = self._iterate(q[index], base[index], force[index], largest)
             if len(index) < len(q):
                 force = np.zeros(len(q))
                 force[index] = found
-                gap = self._gap(force, base, q)
+                gap = _gap(self._compliance, force, base, q)
             else:
                 force = found
-            scale = float(np.abs(q).max() + (self._diagonal * force).max())
+            scale = largest + float((self._diagonal * force).max())
             self.residual = complementarity_residual(force, gap, self._diagonal, scale)
             if self.residual <= TOLERANCE or not self._cover(gap < -TARGET * scale):
                 return self._finish(force, gap)
 
     def _cover(self, points: Mask) -> bool:
         """Let the box contain these points; whether it grew."""
-        if not isinstance(self._compliance, Boxed) or not points.any():
+        if not self._cells or not points.any():
             return False
-        rows, columns = self._compliance.cells
-        box: list[int] = []
-        for which, (cells, few) in enumerate(((rows, rows[points]), (columns, columns[points]))):
-            low, high = int(few.min()), int(few.max()) + 1
-            if self._box is not None:
-                first, last = self._box[2 * which : 2 * which + 2]
-                low = first if low >= first else low - _AROUND
-                high = last if high <= last else high + _AROUND
-            else:
-                low, high = low - _AROUND, high + _AROUND
-            box += [max(low, 0), min(high, int(cells.max()) + 1)]
-        return self._take_box((box[0], box[1], box[2], box[3]))
+        top, bottom, left, right = self._box
+        rows = _widened(self._cells[0], points, top, bottom)
+        return self._take_box((*rows, *_widened(self._cells[1], points, left, right)))
 
     def _take_box(self, box: Box) -> bool:
         """Solve between the points of this box from now on; whether it is another."""
-        assert isinstance(self._compliance, Boxed)
-        if box == self._box:
+        if box == self._box or self._grid is None:
             return False
         self._box = box
-        self._inner, self._index = self._compliance.inside(box)
+        self._inner, self._index = self._grid.inside(box)
         return True
 
     def _iterate(self, q: Array, base: Array, force: Array, largest: float) -> tuple[Array, Array]:
         """Forces and gaps of the points of the box; `largest` gap of all."""
         inner = self._inner
         diagonal = self._diagonal[self._index]
-        gap = q + inner.apply(force - base)
+        gap = _gap(inner, force, base, q)
         touching = (force > 0.0) | (gap < 0.0)
         direction, old, old_product = None, None, 0.0
         for _ in range(MAX_ITERATIONS):
@@ -261,7 +256,7 @@ class ProjectedCG:
             force = force + length * direction
             if force.min() < 0.0:
                 force = np.maximum(force, 0.0)
-                gap = q + inner.apply(force - base)
+                gap = _gap(inner, force, base, q)
             else:
                 gap = gap + length * moved
             now = (force > 0.0) | (gap < 0.0)
@@ -277,8 +272,7 @@ class ProjectedCG:
 
     def state(self) -> dict[str, Array]:
         """The state from which the next solve starts."""
-        box = None if self._box is None else np.array(self._box, dtype=float)
-        kept = {"last": self._last, "before": self._before, "box": box}
+        kept = {"last": self._last, "before": self._before, "box": np.array(self._box, dtype=float)}
         return {name: value for name, value in kept.items() if value is not None}
 
     def set_state(self, kept: dict[str, Array]) -> None:
@@ -299,9 +293,6 @@ class ProjectedCG:
             return self._last.copy()
         ahead: Array = np.maximum(2.0 * self._last - self._before, 0.0)
         return np.where(self._last > 0.0, ahead, 0.0)
-
-    def _gap(self, force: Array, base: Array, q: Array) -> Array:
-        return q + self._compliance.apply(force - base)
 
     def _length(self, along: float, curvature: float) -> float:
         if not curvature > 0.0:

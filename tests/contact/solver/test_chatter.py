@@ -202,7 +202,7 @@ def test_damped_forces_stay_however_many_points_come_and_go() -> None:
     """On a rough road points open and close by what passes under them, which no other scheme changes."""
     linear = choose(3.17)
     assert (linear.scheme, linear.limit) == ("linear", LIMIT)
-    damped = linear.instead(Chatter("", 0.14))
+    damped = linear.instead(Chatter(""))
     assert damped.scheme == "damped" and 1.0 < damped.limit < np.inf
 
 

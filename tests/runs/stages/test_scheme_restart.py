@@ -76,7 +76,7 @@ def attempts(monkeypatch):
         def check(self, limit: float) -> None:
             if len(ended) < count:
                 ended.append(limit)
-                raise Chatter("points open and close from step to step", 0.2)
+                raise Chatter("points open and close from step to step")
 
         class StopsAt60:
             asked = False
