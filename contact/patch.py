@@ -22,6 +22,7 @@ from scipy import sparse
 
 from tireroad.contact.tread.kernel import GridPlaces
 from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.parameters import second_digit
 
 if TYPE_CHECKING:
     from tireroad.fem.static.footprint import Footprint
@@ -45,7 +46,7 @@ def spacing(footprint: Footprint, nodes: Patch, speed: float, highest: float) ->
     if speed > 0:
         wanted = min(wanted, speed / highest / ON_A_WAVE)
     wanted = max(wanted, between / ON_A_NODE)
-    digit = 10.0 ** (math.floor(math.log10(wanted)) - 1)
+    digit = second_digit(wanted)
     return round(math.floor(wanted / digit * (1 + 1e-9)) * digit, 9)
 
 

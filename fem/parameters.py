@@ -402,3 +402,8 @@ class Registry(Generic[T]):
     def owners(self, parameter: str) -> list[str]:
         """The variants that have a parameter of this name."""
         return [name for name in self if parameter in {one.name for one in fields(self[name])}]
+
+
+def second_digit(value: float) -> float:
+    """The unit of the second digit of a positive number: 1e-4 for 0.0028."""
+    return float(10.0 ** (math.floor(math.log10(value)) - 1))

@@ -24,7 +24,7 @@ from typing import Any
 
 from tireroad.contact.results.band import USABLE
 from tireroad.fem.errors import InputError
-from tireroad.fem.parameters import Key, ParameterError, described
+from tireroad.fem.parameters import Key, ParameterError, described, second_digit
 from tireroad.runs.scene import rules
 from tireroad.runs.scene.plan import meets_road, skipped
 from tireroad.runs.scene.resolved import literal
@@ -268,7 +268,7 @@ def _unheard(wanted: float, speed: float, scene: Scene) -> float:
     Points pass at speed / pitch; that and its harmonics, sampled by the steps, must not return inside
     the band, neither in the run nor in its companions with twice the step and twice the pitch.
     """
-    digit = 10.0 ** (math.floor(math.log10(wanted)) - 1)
+    digit = second_digit(wanted)
     first, top = math.floor(wanted / digit), UNHEARD * BAND_EDGE * scene.accuracy.up_to
     steps = scene.time.step if scene.time else "auto"
     if isinstance(steps, str):

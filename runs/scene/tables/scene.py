@@ -28,6 +28,7 @@ from tireroad.contact.roads.under_tire import Motion
 from tireroad.fem.axle import DIRECTIONS, Axle
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Key, Limits, OnlyFor, described, finite, parameter, text
+from tireroad.fem.turning import SHAPE_TOLERANCE
 from tireroad.runs.scene.outputs import OUTPUTS
 from tireroad.runs.scene.outputs import Output as PointOutput
 from tireroad.runs.scene.schema import (
@@ -574,7 +575,7 @@ class Rotation:
         "matter; for method projected, with a fixed rim",
     )
     shape_tolerance: float = number(
-        0.002,
+        SHAPE_TOLERANCE,
         "-",
         "relative shift of squared frequencies in the middle of the modes' band, at the speed rounded up to a power of "
         "two, from which on a rotation shape matters",
