@@ -8,6 +8,7 @@ from __future__ import annotations
 import difflib
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +17,10 @@ from tireroad.fem.decks.abaqus_generation import (
     Generator,
     KnownElements,
     KnownNodes,
+    Placement,
     SetReader,
     data_lines,
+    turned,
 )
 from tireroad.fem.decks.deck import (
     LABEL,
@@ -35,6 +38,7 @@ from tireroad.fem.decks.deck import (
     Solid,
     cards,
     kind,
+    missing,
     number,
     records,
     rows,
@@ -55,7 +59,8 @@ SUBOPTIONS = (
 class SectionReader:
     """Collects what the elements consist of, as written in the deck."""
 
-    def __init__(self) -> None:
+    def __init__(self, sets: SetReader) -> None:
+        self._sets = sets
         self.solids: list[Solid] = []
         self.layers: list[Layer] = []
         self.embedded: list[Embedded] = []
@@ -80,16 +85,16 @@ class SectionReader:
             **{name: self._suboption for name in SUBOPTIONS},
         }
 
-    def _solid(self, card: Card, lines: list[Data], _: int) -> None:
+    def _solid(self, card: Card, lines: list[Data], scope: int) -> None:
         elements, material = (card.options.get(key) for key in ("ELSET", "MATERIAL"))
         if not elements or not material:
             raise card.place.error("*SOLID SECTION needs ELSET= and MATERIAL=")
-        self.solids.append(Solid(elements.upper(), material.upper(), card.place))
+        self.solids.append(Solid(self._sets.name(elements, scope), material.upper(), card.place))
 
-    def _membrane(self, card: Card, lines: list[Data], _: int) -> None:
-        self._membranes = card.options.get("ELSET", "").upper()
-        if not self._membranes:
+    def _membrane(self, card: Card, lines: list[Data], scope: int) -> None:
+        if not card.options.get("ELSET"):
             raise card.place.error(f"*{card.keyword} needs ELSET=")
+        self._membranes = self._sets.name(card.options["ELSET"], scope)
         density = card.options.get("DENSITY", "")
         self._mass = number(density, card.place) if density else 0.0
         self._covering = None
@@ -108,7 +113,7 @@ class SectionReader:
         self._membranes = None
         self.unused.append(f"*SHELL SECTION: not used ({card.place})")
 
-    def _layer(self, card: Card, lines: list[Data], _: int) -> None:
+    def _layer(self, card: Card, lines: list[Data], scope: int) -> None:
         """Data: name, area, spacing, position, material, angle, direction, extension, radius."""
         if self._membranes is None:
             raise card.place.error(
@@ -137,7 +142,7 @@ class SectionReader:
                     geometry=geometry,
                     extension=numbers.get(7, 0.0),
                     radius=numbers.get(8, 0.0),
-                    orientation=card.options.get("ORIENTATION", "").upper(),
+                    orientation=self._orientation_name(card, "ORIENTATION", scope),
                     mass=self._mass,
                     covering=self._covering,
                     place=place,
@@ -145,16 +150,24 @@ class SectionReader:
             )
             self._mass, self._covering = 0.0, None
 
-    def _embed(self, card: Card, lines: list[Data], _: int) -> None:
-        host = card.options.get("HOST ELSET", card.options.get("HOST"))
-        names = tuple(p.upper() for _, parts in data_lines(lines) for p in parts if p)
-        self.embedded.append(Embedded(names, host.upper() if host else None, card.place))
+    def _orientation_name(self, card: Card, key: str, scope: int) -> str:
+        """Orientations belong to their part as sets do."""
+        name = card.options.get(key, "")
+        return self._sets.name(name, scope) if name else ""
 
-    def _orientation(self, card: Card, lines: list[Data], _: int) -> None:
+    def _embed(self, card: Card, lines: list[Data], scope: int) -> None:
+        host = card.options.get("HOST ELSET", card.options.get("HOST"))
+        names = tuple(
+            self._sets.name(p, scope) for _, parts in data_lines(lines) for p in parts if p
+        )
+        host = self._sets.name(host, scope) if host else None
+        self.embedded.append(Embedded(names, host, card.place))
+
+    def _orientation(self, card: Card, lines: list[Data], scope: int) -> None:
         table = [[number(part, place) for part in parts] for place, parts in data_lines(lines)]
         points, turn = (*table, [], [])[:2]
         turn = (turn + [1.0, 0.0])[:2] if not turn else (turn + [0.0])[:2]
-        self.orientations[card.options.get("NAME", "").upper()] = Orientation(
+        self.orientations[self._orientation_name(card, "NAME", scope)] = Orientation(
             card.options.get("SYSTEM", "RECTANGULAR").upper(),
             tuple((points + [0.0] * 6)[:6]),
             int(turn[0]),
@@ -162,10 +175,20 @@ class SectionReader:
             card.place,
         )
 
-    def _rigid(self, card: Card, lines: list[Data], _: int) -> None:
+    def place(self, of: dict[str, Orientation], placement: Placement) -> None:
+        """Bring the orientations `of` an instance to where it is placed."""
+        for name, one in of.items():
+            points = np.array(one.points).reshape(2, 3)
+            if one.system in ("RECTANGULAR", "R"):  # two directions
+                points = turned(points, placement.axis, placement.angle)
+            else:
+                points = placement.of(points)
+            self.orientations[name] = replace(one, points=tuple(points.ravel().tolist()))
+
+    def _rigid(self, card: Card, lines: list[Data], scope: int) -> None:
         for key in ("TIE NSET", "PIN NSET"):
             if card.options.get(key):
-                self.held.append((card.options[key].upper(), card.place))
+                self.held.append((self._sets.name(card.options[key], scope), card.place))
 
     def _begin_material(self, card: Card, lines: list[Data], _: int) -> None:
         name = card.options.get("NAME", "").upper()
@@ -227,7 +250,6 @@ CONTACT DAMPING|FASTENER|CONNECTOR SECTION|CONNECTOR BEHAVIOR|BEAM SECTION|RELEA
 _REFUSED = {
     "NMAP": "nodes are read as they are given, moved by no map: write their places out",
     "REBAR": "cords are read from *REBAR LAYER in *SURFACE SECTION or *MEMBRANE SECTION",
-    "SYSTEM": "nodes are read in the global system alone",
 }
 
 
@@ -242,6 +264,27 @@ def read(path: Path) -> Deck:
     return reader.finish()
 
 
+@dataclass
+class _Part:
+    """What a *PART holds, read once for each of its instances, and their scopes."""
+
+    name: str
+    place: Place
+    cards: list[tuple[Card, list[Data]]] = field(default_factory=list)
+    instances: list[int] = field(default_factory=list)
+    orientations: dict[str, Orientation] = field(default_factory=dict)
+
+
+@dataclass
+class _Instance:
+    """The *INSTANCE that is being read."""
+
+    name: str
+    part: _Part
+    place: Place
+    placement: Placement | None = None
+
+
 class _Reader:
     """Collects the data of a used keyword until the next keyword begins, then interprets it."""
 
@@ -250,17 +293,21 @@ class _Reader:
         self.card: Card | None = None
         self.lines: list[Data] = []
         self.scope = 0
-        self.parts: dict[str, int] = {}
+        self.parts: dict[str, _Part] = {}
         self.step: Place | None = None
-        self.part: Place | None = None
+        self.part: _Part | None = None
+        self.instance: _Instance | None = None
+        self.system: Placement | None = None
         self.nodes, self.elements = KnownNodes(), KnownElements()
         self.sets = SetReader()
-        self.sections = SectionReader()
+        self.sections = SectionReader(self.sets)
         self.unused: dict[str, list] = {}
         self.handlers = {
             "NODE": self._node,
             "ELEMENT": self._element,
             "NSET": self._node_set,
+            "SYSTEM": self._system,
+            "INSTANCE": self._placed,
             "ELSET": self.sets.elements_of,
             "SURFACE": self.sets.surface,
             "DSLOAD": self.sets.pressure,
@@ -279,6 +326,7 @@ class _Reader:
             "PART": self._part,
             "END PART": self._end_part,
             "INSTANCE": self._instance,
+            "END INSTANCE": self._end_instance,
         }.get(card.keyword)
         if structure:
             structure(card)
@@ -291,14 +339,15 @@ class _Reader:
     def data(self, data: Data) -> None:
         if self.card is None:
             raise data.place.error("data before the first keyword: this is not an Abaqus deck")
-        if self.used or self.card.keyword == "INSTANCE":
+        if self.used:
             self.lines.append(data)
 
     def _end(self) -> None:
         if self.card is not None and self.used:
-            self.handlers[self.card.keyword](self.card, self.lines, self.scope)
-        elif self.card is not None and self.card.keyword == "INSTANCE" and self.lines:
-            self.unused.setdefault("INSTANCE, place of", []).append(self.card.place)
+            if self.part is not None:  # read by its instances
+                self.part.cards.append((self.card, self.lines))
+            else:
+                self.handlers[self.card.keyword](self.card, self.lines, self.scope)
         self.lines = []
 
     def _step(self, card: Card) -> None:
@@ -309,17 +358,88 @@ class _Reader:
         self.step = None
 
     def _part(self, card: Card) -> None:
-        self.part = card.place
+        if self.part is not None:
+            raise card.place.error("*PART inside a *PART: is an *END PART missing?")
         name = card.options.get("NAME", f"part {len(self.parts) + 1}").upper()
-        self.scope = self.parts[name] = len(self.parts) + 1
+        if name in self.parts:
+            raise card.place.error(f"part {name} is defined twice")
+        self.part = self.parts[name] = _Part(name, card.place)
 
     def _end_part(self, _: Card) -> None:
-        self.part, self.scope = None, 0
+        self.part = None
 
     def _instance(self, card: Card) -> None:
+        """An instance begins: what its part holds, read in a scope of its own."""
+        if self.instance is not None:
+            raise card.place.error("*INSTANCE inside an *INSTANCE: is an *END INSTANCE missing?")
         part = card.options.get("PART", "").upper()
-        if part in self.parts:
-            self.sets.scopes[card.options.get("NAME", part).upper()] = self.parts[part]
+        if part not in self.parts:
+            raise card.place.error(
+                "an *INSTANCE of an earlier analysis is not read: write its mesh out"
+                if not part
+                else missing("part", part, self.parts)
+            )
+        name = card.options.get("NAME", part).upper()
+        if name in self.sets.scopes:
+            raise card.place.error(f"instance {name} is defined twice")
+        self.instance = _Instance(name, self.parts[part], card.place)
+        self._read(self.parts[part], name)
+
+    def _read(self, part: _Part, instance: str) -> None:
+        """Read a part as an instance; sections of a part are there once for all its instances."""
+        self.scope = self.sets.scopes[instance] = len(self.sets.scopes) + 1
+        self.sets.parts[self.scope] = part.name
+        before = set(self.sections.orientations)
+        for card, lines in part.cards:
+            if not part.instances or card.keyword not in self.sections.handlers:
+                self.handlers[card.keyword](card, lines, self.scope)
+        part.instances.append(self.scope)
+        part.orientations |= {
+            name: one for name, one in self.sections.orientations.items() if name not in before
+        }
+        self.system = None
+
+    def _placed(self, card: Card, lines: list[Data], _: int) -> None:
+        assert self.instance is not None
+        self.instance.placement = Placement.read(lines)
+
+    def _end_instance(self, card: Card) -> None:
+        if self.instance is None:
+            raise card.place.error("*END INSTANCE without *INSTANCE")
+        part, placement = self.instance.part, self.instance.placement
+        if part.orientations and len(part.instances) > 1:
+            raise self.instance.place.error(
+                f"part {part.name} has cords with an *ORIENTATION and is placed twice: not read; write its "
+                "instances as parts of their own"
+            )
+        if placement is not None:
+            self.nodes.move(self.scope, placement, self.path.name)
+            self.sections.place(part.orientations, placement)
+            if placement.turns_over:
+                self.sets.turned_over |= self.elements.turn_over(self.scope)
+        labels = self.nodes.labels(self.path.name), self.elements.labels()
+        self.sets.qualify(self.instance.name, *labels)
+        self.instance, self.scope = None, 0
+
+    def _system(self, card: Card, lines: list[Data], _: int) -> None:
+        """A local system for the nodes that follow: origin, a point on its x axis, one in xy."""
+        table = [number(part, place) for place, parts in data_lines(lines) for part in parts]
+        if not table:
+            self.system = None
+            return
+        origin, first, second = np.array((table + [0.0] * 9)[:9]).reshape(3, 3)
+        if len(table) <= 3:
+            self.system = Placement(origin, np.zeros(3), np.array([1.0, 0, 0]), 0.0)
+            return
+        if len(table) <= 6:  # x and y stay in the plane z = 0
+            second = origin + np.cross([0.0, 0.0, 1.0], first - origin)
+        x = first - origin
+        z = np.cross(x, second - origin)
+        if not np.linalg.norm(x) > 0 or not np.linalg.norm(z) > 0:
+            raise card.place.error("*SYSTEM: its points give no axes")
+        x, z = x / np.linalg.norm(x), z / np.linalg.norm(z)
+        turn = np.column_stack([x, np.cross(z, x), z])
+        self.system = Placement.turned_to(origin, turn)
 
     def _node(self, card: Card, lines: list[Data], scope: int) -> None:
         system = card.options.get("SYSTEM", "R").upper()
@@ -334,9 +454,11 @@ class _Reader:
         if system == "C":
             radius, angle = points[:, 0].copy(), np.radians(points[:, 1])
             points[:, 0], points[:, 1] = radius * np.cos(angle), radius * np.sin(angle)
+        if self.system is not None:
+            points = self.system.of(points)
         labels = labels.astype(np.int64) + scope * SCOPE
         self.nodes.add(labels, points)
-        self.sets.add_nodes(card, labels)
+        self.sets.add_nodes(card, labels, scope)
 
     def _element(self, card: Card, lines: list[Data], scope: int) -> None:
         name = card.options.get("TYPE", "").upper()
@@ -345,7 +467,7 @@ class _Reader:
         shape = kind(name)
         if shape is None:
             self.unused.setdefault(f"ELEMENT, TYPE={name}", []).append(card.place)
-            self.sets.add_elements(card, np.empty(0, np.int64))
+            self.sets.add_elements(card, np.empty(0, np.int64), scope)
             self.elements.others = True
             return
         table = records(lines, shape.nodes + 1)
@@ -353,30 +475,38 @@ class _Reader:
             raise card.place.error(f"*ELEMENT, TYPE={name}: no elements follow")
         table = table + scope * SCOPE
         self.elements.add(Block(name, shape, table[:, 0], table[:, 1:], card.place))
-        self.sets.add_elements(card, table[:, 0])
+        self.sets.add_elements(card, table[:, 0], scope)
 
     def _node_set(self, card: Card, lines: list[Data], scope: int) -> None:
         self.sets.nodes_of(card, lines, scope)
         name = card.options.get("ELSET")
         if name:
             sets = Sets("element set", self.sets.element_sets, self.elements.labels())
-            parts = self.elements.within(sets.labels(name, card.place))
+            parts = self.elements.within(sets.labels(self.sets.name(name, scope), card.place))
             nodes = [np.empty(0, np.int64), *(block.nodes.ravel() for block in parts)]
-            self.sets.add_nodes(card, np.unique(np.concatenate(nodes)))
+            self.sets.add_nodes(card, np.unique(np.concatenate(nodes)), scope)
 
     def _refuse(self, card: Card, lines: list[Data], _: int) -> None:
-        if card.keyword != "SYSTEM" or lines:  # *SYSTEM without data restores the global system
-            raise card.place.error(f"*{card.keyword} is not read: {_REFUSED[card.keyword]}")
+        raise card.place.error(f"*{card.keyword} is not read: {_REFUSED[card.keyword]}")
 
     def finish(self) -> Deck:
         """The deck, once the file has ended. Raises InputError if it is incomplete."""
         self._end()
-        open_ = self.step or self.part
-        if open_:
-            what = "STEP" if self.step else "PART"
-            raise open_.error(f"*{what} has no *END {what}: is the deck cut short?")
+        for what, begun in (("INSTANCE", self.instance), ("PART", self.part)):
+            if begun:
+                raise begun.place.error(f"*{what} has no *END {what}: is the deck cut short?")
+        if self.step:
+            raise self.step.error("*STEP has no *END STEP: is the deck cut short?")
         if self.card is None:
             raise InputError(f"{self.path}: no keyword in it: this is not an Abaqus deck")
+        placed = bool(self.sets.scopes)
+        for name, part in self.parts.items():
+            if not placed:
+                self._read(part, name)
+            elif not part.instances and part.cards:
+                self.unused.setdefault(f"PART, NAME={name}, which has no instance", []).append(
+                    part.place
+                )
         labels, points = self.nodes.table(self.path.name)
         self.elements.check_once()
         elements = self.elements.labels()
@@ -410,7 +540,7 @@ class _Reader:
         """One line for each keyword not used, with its first place."""
         for name, places in self.unused.items():
             keyword = name.split(",")[0]
-            known = keyword in _ANALYSIS or keyword in self.handlers or keyword == "INSTANCE"
+            known = keyword in _ANALYSIS or keyword in self.handlers or keyword == "PART"
             near = [] if known else difflib.get_close_matches(keyword, self.handlers, 1, 0.75)
             hint = f"; did you mean *{near[0]}?" if near else ""
             times = f", {len(places)} times" if len(places) > 1 else ""

@@ -15,6 +15,8 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -32,6 +34,7 @@ from tireroad.fem.decks.deck import (
     fields,
     label,
     labels,
+    missing,
     number,
     rows,
     shown,
@@ -39,6 +42,20 @@ from tireroad.fem.decks.deck import (
 from tireroad.fem.errors import InputError
 
 _FACE = re.compile(r"S([1-6])")
+
+
+def _among(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Which rows (k, 2) of `first` are rows of `second`."""
+    return np.array(
+        [row in set(map(tuple, second.tolist())) for row in map(tuple, first.tolist())], bool
+    )
+
+
+_COMBINED = {
+    "UNION": lambda first, second: np.concatenate([first, second]),
+    "INTERSECTION": lambda first, second: first[_among(first, second)],
+    "DIFFERENCE": lambda first, second: first[~_among(first, second)],
+}
 _NAME = re.compile(r"[^\d\s+.-]")  # marks a field as the name of a set, not a number
 
 
@@ -54,7 +71,9 @@ def data_lines(lines: list[Data]) -> Iterator[tuple[Place, list[str]]]:
 class SetReader:
     """Collects sets as written; names are resolved once the deck is complete.
 
-    `scopes`: part number of each instance, since sets of an assembly name their instance.
+    Names belong to the part or assembly in which they stand: `name` gives what a set is called in
+    the deck as a whole, which is its own name unless another part has one of that name. `scopes`:
+    scope of each instance, since sets of an assembly name their instance.
     """
 
     def __init__(self) -> None:
@@ -63,23 +82,63 @@ class SetReader:
         self.surfaces: dict[str, list] = {}
         self.pressed: list[str] = []
         self.scopes: dict[str, int] = {}
+        self.parts: dict[int, str] = {0: "ASSEMBLY"}  # name of the part of each scope
         self.unused: list[str] = []
         self.reflected: list[
             np.ndarray
         ] = []  # elements whose faces are numbered differently from their originals'
+        self.turned_over: dict[int, int] = {}  # elements of turned sections: number of faces
+        self._owner: dict[str, str] = {}
 
-    def add_nodes(self, card: Card, labels: np.ndarray) -> None:
+    def name(self, text: str, scope: int) -> str:
+        """A set's or surface's name in capitals, told apart from another part's of that name."""
+        name = text.upper().strip("\"'")
+        if name.partition(".")[0] in self.scopes:
+            return name
+        part = self.parts[scope]
+        return name if self._owner.setdefault(name, part) == part else f"{name} ({part})"
+
+    def add_nodes(self, card: Card, labels: np.ndarray, scope: int) -> None:
         """The NSET of a *NODE."""
-        self.into(self.node_sets, card.options.get("NSET"), labels)
+        self.into(self.node_sets, card.options.get("NSET"), labels, scope)
 
-    def add_elements(self, card: Card, labels: np.ndarray) -> None:
+    def add_elements(self, card: Card, labels: np.ndarray, scope: int) -> None:
         """The ELSET of an *ELEMENT."""
-        self.into(self.element_sets, card.options.get("ELSET"), labels)
+        self.into(self.element_sets, card.options.get("ELSET"), labels, scope)
 
-    def into(self, sets: dict[str, Members], name: str | None, labels: np.ndarray) -> None:
+    def into(
+        self, sets: dict[str, Members], name: str | None, labels: np.ndarray, scope: int
+    ) -> None:
         """Add labels to the set of this name, if one is given."""
         if name:
-            self._members(sets, name).labels.append(labels)
+            self._members(sets, self.name(name, scope)).labels.append(labels)
+
+    def qualify(self, instance: str, nodes: np.ndarray, elements: np.ndarray) -> None:
+        """Name the sets and surfaces of an instance INSTANCE.NAME, too.
+
+        `nodes`, `elements`: all labels so far, ascending.
+        """
+        scope = self.scopes[instance]
+        part = self.parts[scope]
+        mine = [name for name, owner in self._owner.items() if owner == part]
+        mine += [name for name in self._all_names() if name.endswith(f" ({part})")]
+        for sort, sets, known in (
+            ("node set", self.node_sets, nodes),
+            ("element set", self.element_sets, elements),
+        ):
+            by_name = Sets(sort, sets, known)
+            for name in mine:
+                if name in sets:
+                    labels = by_name.labels(name)
+                    plain = name.removesuffix(f" ({part})")
+                    sets[f"{instance}.{plain}"] = Members([labels[labels // SCOPE == scope]])
+        for name in mine:
+            if name in self.surfaces:
+                plain = name.removesuffix(f" ({part})")
+                self.surfaces[f"{instance}.{plain}"] = [(scope, name)]
+
+    def _all_names(self) -> list[str]:
+        return [*self.node_sets, *self.element_sets, *self.surfaces]
 
     def nodes_of(self, card: Card, lines: list[Data], scope: int) -> None:
         """A *NSET."""
@@ -90,7 +149,7 @@ class SetReader:
         self._set(self.element_sets, "ELSET", card, lines, scope)
 
     def _members(self, sets: dict[str, Members], name: str) -> Members:
-        return sets.setdefault(name.upper(), Members())
+        return sets.setdefault(name, Members())
 
     def _scope(self, card: Card, scope: int) -> int:
         return self.scopes.get(card.options.get("INSTANCE", "").upper(), scope)
@@ -98,7 +157,7 @@ class SetReader:
     def _set(self, sets: dict, key: str, card: Card, lines: list[Data], scope: int) -> None:
         if not card.options.get(key):
             raise card.place.error(f"*{key} without {key}=name")
-        members = self._members(sets, card.options[key])
+        members = self._members(sets, self.name(card.options[key], scope))
         members.unsorted |= "UNSORTED" in card.options
         offset = SCOPE * self._scope(card, scope)
         if "GENERATE" in card.options:
@@ -109,9 +168,16 @@ class SetReader:
         rest = [part for part, found in zip(lines, plain, strict=True) if found is None]
         for place, parts in data_lines(rest):
             numbers = [part for part in parts if part and not _NAME.search(part)]
-            members.names += [(p.upper().strip("\"'"), place) for p in parts if _NAME.search(p)]
+            names = [part for part in parts if _NAME.search(part)]
+            members.names += [(self._asked(card, name, scope), place) for name in names]
             found = np.array([label(part, place) for part in numbers], np.int64)
             members.labels.append(found + offset)
+
+    def _asked(self, card: Card, name: str, scope: int) -> str:
+        """What a data line names; INSTANCE= looks for it in that instance."""
+        instance = card.options.get("INSTANCE", "").upper()
+        plain = name.strip("\"'")
+        return self.name(f"{instance}.{plain}" if instance in self.scopes else plain, scope)
 
     def _ranges(self, members: Members, card: Card, lines: list[Data], offset: int) -> None:
         for first, last, step in rows(lines, 3, least=2):
@@ -128,25 +194,49 @@ class SetReader:
 
     def surface(self, card: Card, lines: list[Data], scope: int) -> None:
         """A *SURFACE: one (set or element, face) per line."""
-        name = card.options.get("NAME", "").upper()
-        sort = card.options.get("TYPE", "ELEMENT").upper()
-        if not name:
+        if not card.options.get("NAME"):
             raise card.place.error("*SURFACE without NAME=")
+        name = self.name(card.options["NAME"], scope)
+        sort = card.options.get("TYPE", "ELEMENT").upper()
+        offset = SCOPE * self._scope(card, scope)
+        if "CROP" in card.options:
+            raise card.place.error("*SURFACE with CROP is not read: name its elements")
+        if "COMBINE" in card.options:
+            self.surfaces[name] = [self._combined(card, lines, scope)]
+            return
         if sort == "NODE":
             members = self._members(self.node_sets, name)
-            members.names += [(p[0].upper(), place) for place, p in data_lines(lines) if p[0]]
+            for place, (first, *_) in data_lines(lines):
+                if _NAME.search(first):
+                    members.names.append((self._asked(card, first, scope), place))
+                elif first:
+                    members.labels.append(np.array([label(first, place) + offset]))
             return
-        if "COMBINE" in card.options or "CROP" in card.options:
-            raise card.place.error("*SURFACE with COMBINE or CROP is not read: name its elements")
         if sort != "ELEMENT":
             self.unused.append(f"*SURFACE, TYPE={sort}: not used ({card.place})")
             return
         of = self.surfaces.setdefault(name, [])
         for place, parts in data_lines(lines):
             face = self._face(parts[1] if len(parts) > 1 else "", place)
+            named = _NAME.search(parts[0])
             of.append(
-                (parts[0].upper().strip("\"'"), face, self._scope(card, scope) * SCOPE, place)
+                (self._asked(card, parts[0], scope) if named else parts[0], face, offset, place)
             )
+
+    def _combined(self, card: Card, lines: list[Data], scope: int) -> tuple[str, list[str]]:
+        """How a *SURFACE, COMBINE is made of surfaces that stand before it."""
+        how = card.options["COMBINE"].upper()
+        if how not in _COMBINED:
+            raise card.place.error(f"*SURFACE, COMBINE={how}: {', '.join(_COMBINED)} are read")
+        names = []
+        for place, parts in data_lines(lines):
+            for part in filter(None, parts):
+                names.append(self._asked(card, part, scope))
+                if names[-1] not in self.surfaces:
+                    raise place.error(missing("surface", part, self.surfaces))
+        if not names:
+            raise card.place.error("*SURFACE, COMBINE names no surface: is the deck cut short?")
+        return how, names
 
     def _face(self, text: str, place: Place) -> int:
         if not text:
@@ -158,33 +248,106 @@ class SetReader:
             raise place.error(f"{shown(text)} is not a face of an element: S1 to S6, SPOS, SNEG")
         return int(match[1]) - 1
 
-    def pressure(self, card: Card, lines: list[Data], _: int) -> None:
+    def pressure(self, card: Card, lines: list[Data], scope: int) -> None:
         """Record surfaces under pressure in a step: most likely the inner face."""
         for _place, parts in data_lines(lines):
             if len(parts) > 1 and parts[1].upper() == "P":
-                self.pressed.append(parts[0].upper())
+                self.pressed.append(self.name(parts[0], scope))
 
     def resolved_surfaces(self, elements: np.ndarray) -> dict[str, np.ndarray]:
         """name -> (k, 2) of (element, face). Raises InputError for an unknown set."""
         sets = Sets("element set", self.element_sets, elements)
-        return {name: self._resolved(parts, sets) for name, parts in self.surfaces.items()}
+        found: dict[str, np.ndarray] = {}
+        for name, parts in self.surfaces.items():
+            rows = [self._rows(*part, sets, found) for part in parts]
+            found[name] = np.unique(np.concatenate([np.empty((0, 2), np.int64), *rows]), axis=0)
+        return found
 
-    def _resolved(self, parts: list, sets: Sets) -> np.ndarray:
-        found = [np.empty((0, 2), np.int64)]
-        for of, face, offset, place in parts:
-            given = (
-                sets.labels(of, place)
-                if _NAME.search(of) or of in sets
-                else np.array([label(of, place) + offset])
+    def _rows(self, *of: Any) -> np.ndarray:
+        """(element, face) of one part of a surface: a set's or element's, or of other surfaces."""
+        *part, sets, found = of
+        if len(part) == 2 and isinstance(part[0], int):  # what of a surface is in a scope
+            every = found[part[1]]
+            return every[every[:, 0] // SCOPE == part[0]]
+        if len(part) == 2:
+            first, *others = (found[name] for name in part[1])
+            for rows in others:
+                first = _COMBINED[part[0]](first, rows)
+            return first
+        name, face, offset, place = part
+        given = (
+            sets.labels(name, place)
+            if _NAME.search(name) or name in sets
+            else np.array([label(name, place) + offset])
+        )
+        given = given[np.isin(given, sets.known)]
+        if face >= 0 and any(np.isin(given, turned).any() for turned in self.reflected):
+            raise place.error(
+                "the faces of elements copied with REFLECT have no known numbers: "
+                "name the surface by a node set, or leave the face out"
             )
-            given = given[np.isin(given, sets.known)]
-            if face >= 0 and any(np.isin(given, turned).any() for turned in self.reflected):
-                raise place.error(
-                    "the faces of elements copied with REFLECT have no known numbers: "
-                    "name the surface by a node set, or leave the face out"
-                )
-            found.append(np.column_stack([given, np.full(len(given), face)]))
-        return np.unique(np.concatenate(found), axis=0)
+        faces = np.full(len(given), face)
+        over = np.array([self.turned_over.get(one, 0) for one in given.tolist()], np.int64)
+        faces = np.where((over > 0) & (faces >= 0), over - 1 - faces, faces)
+        return np.column_stack([given, faces])
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Where an instance is: moved by `shift` (3,), then turned by `angle` rad about a line.
+
+    The line goes through `start` (3,) along the unit vector `axis` (3,).
+    """
+
+    shift: np.ndarray
+    start: np.ndarray
+    axis: np.ndarray
+    angle: float
+
+    @classmethod
+    def read(cls, lines: list[Data]) -> Placement | None:
+        """Of the data lines of *INSTANCE: a shift, then two points of a line and degrees."""
+        table = [
+            (place, [number(part, place) for part in parts]) for place, parts in data_lines(lines)
+        ]
+        if not table:
+            return None
+        (place, shift), (there, turn) = (*table, (table[0][0], []))[:2]
+        if len(table) > 2 or len(shift) > 3 or len(turn) not in (0, 7):
+            raise place.error(
+                "an instance is placed by a line of three numbers (shift) and, if it is turned, one of seven "
+                "(two points of the line, degrees)"
+            )
+        moved = np.array((shift + [0.0] * 3)[:3])
+        if not turn:
+            return cls(moved, np.zeros(3), np.array([1.0, 0.0, 0.0]), 0.0)
+        start, line = np.array(turn[:3]), np.array(turn[3:6]) - np.array(turn[:3])
+        length = np.linalg.norm(line)
+        if not length > 0:
+            raise there.error(
+                "the two points of the line about which an instance is turned are one"
+            )
+        return cls(moved, start, line / length, math.radians(turn[6]))
+
+    @classmethod
+    def turned_to(cls, origin: np.ndarray, axes: np.ndarray) -> Placement:
+        """With the columns of `axes` (3, 3) as axes and an origin (3,)."""
+        from scipy.spatial.transform import Rotation
+
+        turn = Rotation.from_matrix(axes).as_rotvec()
+        angle = float(np.linalg.norm(turn))
+        axis = turn / angle if angle else np.array([1.0, 0.0, 0.0])
+        return cls(origin, origin, axis, angle)
+
+    def of(self, points: np.ndarray) -> np.ndarray:
+        """Points (k, 3) in the assembly."""
+        return self.start + turned(points + self.shift - self.start, self.axis, self.angle)
+
+    @property
+    def turns_over(self) -> bool:
+        """Whether a section in the plane z = 0 is seen from behind afterwards."""
+        x, y = turned(np.eye(3)[:2], self.axis, self.angle)
+        return bool(x[0] * y[1] - x[1] * y[0] < 0)
 
 
 _FEW = 64  # blocks searched one by one; more are merged first
@@ -220,6 +383,13 @@ class KnownNodes:
         if missing.any():
             raise asked.error(f"node {labels[missing][0] % SCOPE} is not defined before this line")
         return found
+
+    def move(self, scope: int, placement: Placement, file: str) -> None:
+        """Bring the nodes of a scope to where their instance is placed."""
+        labels, points = self.table(file)
+        mine = labels // SCOPE == scope
+        self._points = points.copy()
+        self._points[mine] = placement.of(points[mine])
 
     def table(self, file: str) -> tuple[np.ndarray, np.ndarray]:
         """Labels, ascending, and points. InputError for a node defined at two places."""
@@ -287,6 +457,28 @@ class KnownElements:
         """The parts of the blocks whose labels are among `labels`."""
         at = [np.flatnonzero(np.isin(block.labels, labels)) for block in self.blocks]
         return [block.rows(rows) for block, rows in zip(self.blocks, at, strict=True) if len(rows)]
+
+    def turn_over(self, scope: int) -> dict[int, int]:
+        """Reverse sections and their lines that a placement turned over: label -> number of faces.
+
+        A section seen from behind runs clockwise; face k becomes face n - 1 - k.
+        """
+        found: dict[int, int] = {}
+        for k, block in enumerate(self.blocks):
+            mine = block.labels // SCOPE == scope
+            if block.kind.dimension != 2 or not mine.any():
+                continue
+            order = (
+                block.kind.reflected(block.place)
+                if block.kind.role == "solid"
+                else slice(None, None, -1)
+            )
+            nodes = block.nodes.copy()
+            nodes[mine] = nodes[mine][:, order]
+            self.blocks[k] = Block(block.type, block.kind, block.labels, nodes, block.place)
+            if block.kind.role == "solid":
+                found |= dict.fromkeys(block.labels[mine].tolist(), block.kind.corners)
+        return found
 
     def check_once(self) -> None:
         """Raise InputError for an element defined twice."""
@@ -405,7 +597,7 @@ class Generator:
             else:
                 points = along_line(ends[:1], ends[1:], share)
             self._nodes.add(labels[1:-1], points)
-            self._sets.add_nodes(card, labels)
+            self._sets.add_nodes(card, labels, scope)
 
     def _range(self, parts: list[str], place: Place, scope: int) -> np.ndarray:
         """The labels from one end to the other."""
@@ -442,7 +634,7 @@ class Generator:
                 raise place.error("*NFILL needs two node sets and a number of intervals")
             intervals = label(parts[2], place)
             step = label(parts[3], place) if len(parts) > 3 and parts[3] else 1
-            ends = [self._ordered(part, place) for part in parts[:2]]
+            ends = [self._ordered(part, place, scope) for part in parts[:2]]
             lines_ = min(map(len, ends))
             self._count(intervals * lines_, place)
             first, last = (end[:lines_] for end in ends)
@@ -452,17 +644,17 @@ class Generator:
             points = along_line(start, end, share)
             self._nodes.add(labels.ravel(), points.reshape(-1, 3))
             for made in (first, labels.ravel(), last):
-                self._sets.add_nodes(card, made)
+                self._sets.add_nodes(card, made, scope)
 
     def _ncopy(self, card: Card, lines: list[Data], scope: int) -> None:
         """Copy the nodes of a set, shifted, rotated or reflected; labels grow by a number."""
         change = self._whole(card, "CHANGE NUMBER")
-        old = self._ordered(card.options.get("OLD SET", ""), card.place)
+        old = self._ordered(card.options.get("OLD SET", ""), card.place, scope)
         self._count(len(old), card.place)
         table = [[number(part, place) for part in parts] for place, parts in data_lines(lines)]
         points = copied(self._nodes.points(old, card.place), card, table)
         self._nodes.add(old + change, points)
-        self._sets.into(self._sets.node_sets, card.options.get("NEW SET"), old + change)
+        self._sets.into(self._sets.node_sets, card.options.get("NEW SET"), old + change, scope)
 
     def _elgen(self, card: Card, lines: list[Data], scope: int) -> None:
         """Copies of an element in rows and layers; data: element, then counts and increments."""
@@ -478,26 +670,33 @@ class Generator:
             steps = np.array([numbers[k : k + 2] for k in (2, 5, 8)])
             times = np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), -1).reshape(-1, 3)
             nodes, elements = (times @ steps)[np.argsort((times @ steps)[:, 1], kind="stable")].T
-            self._more(card, numbers[0] + scope * SCOPE, nodes, elements, place)
+            self._more(card, numbers[0], nodes, elements, place, scope)
 
     def _more(
-        self, card: Card, master: int, nodes: np.ndarray, elements: np.ndarray, place: Place
+        self,
+        card: Card,
+        master: int,
+        nodes: np.ndarray,
+        elements: np.ndarray,
+        place: Place,
+        scope: int,
     ) -> None:
         """Copies of a master element, which is the first of them."""
+        master += scope * SCOPE
         one = self._elements.one(master, place)
         if one is None:
-            self._sets.add_elements(card, np.empty(0, np.int64))
+            self._sets.add_elements(card, np.empty(0, np.int64), scope)
             return
         made = master + elements[1:], one.nodes + nodes[1:, None]
         self._elements.add(Block(one.type, one.kind, *made, place))
-        self._sets.add_elements(card, master + elements)
+        self._sets.add_elements(card, master + elements, scope)
 
     def _elcopy(self, card: Card, lines: list[Data], scope: int) -> None:
         """Copy the elements of a set, with element and node labels increased by two numbers."""
         shift, nodes = self._whole(card, "ELEMENT SHIFT"), self._whole(card, "SHIFT NODES")
         name = card.options.get("OLD SET", card.options.get("OLDSET", ""))
         sets = Sets("element set", self._sets.element_sets, self._elements.labels())
-        old = sets.labels(name, card.place)
+        old = sets.labels(self._sets.name(name, scope), card.place)
         self._count(len(old), card.place)
         for block in self._elements.within(old):
             turned = block.nodes
@@ -508,12 +707,12 @@ class Generator:
             )
         if "REFLECT" in card.options:
             self._sets.reflected.append(old + shift)
-        self._sets.into(self._sets.element_sets, card.options.get("NEW SET"), old + shift)
+        self._sets.into(self._sets.element_sets, card.options.get("NEW SET"), old + shift, scope)
 
-    def _ordered(self, name: str, place: Place) -> np.ndarray:
+    def _ordered(self, name: str, place: Place, scope: int) -> np.ndarray:
         """The nodes of a set known so far: ascending, or in the order of an UNSORTED set."""
         sets = Sets("node set", self._sets.node_sets, self._nodes.labels(place.file))
-        return sets.ordered(name.strip("\"'"), place)
+        return sets.ordered(self._sets.name(name, scope), place)
 
     def _whole(self, card: Card, key: str) -> int:
         value = number(card.options.get(key, ""), card.place)

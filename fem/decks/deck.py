@@ -562,7 +562,9 @@ def _error(asked: Place | None, message: str) -> InputError:
 
 def missing(sort: str, name: str, names: Iterable[str]) -> str:
     """Message that a set does not exist, with the nearest name and the existing ones."""
-    known = list(names)
+    every = list(names)
+    # An instance's own, INSTANCE.NAME, is there for every NAME of a part.
+    known = [one for one in every if one.partition(".")[2] not in every or "." in name]
     near = difflib.get_close_matches(name.upper(), [k.upper() for k in known], 1, 0.6)
     hint = f"did you mean {near[0]}? " if near else ""
     shown = ", ".join(known[:30]) + (", …" if len(known) > 30 else "")
@@ -685,23 +687,32 @@ class Deck:
             raise _error(place, f"node {wrong % SCOPE} is used by an element and not defined")
         return at if self.same is None else self.same[at]
 
+    def _near(self, nodes: list[np.ndarray], tolerance: float) -> np.ndarray:
+        """Pairs (k, 2) of rows that are nearer to each other than `tolerance`, among `nodes`."""
+        from scipy.spatial import cKDTree
+
+        used = np.unique(np.concatenate([np.empty(0, np.int64), *(one.ravel() for one in nodes)]))
+        tree = cKDTree(self.points[used])
+        return used[tree.query_pairs(tolerance, p=np.inf, output_type="ndarray")].reshape(-1, 2)
+
     def merged(self, tolerance: float) -> tuple[Deck, int]:
         """The deck with nodes of its solids nearer to each other than `tolerance` as one, and their number.
 
-        In the file's unit of length. Nodes of one element stay apart.
+        In the file's unit of length. Nodes of one element stay apart. Membranes of two instances
+        that meet are one line.
         """
         from scipy.sparse import coo_matrix
         from scipy.sparse.csgraph import connected_components
-        from scipy.spatial import cKDTree
 
         solids = [block for block in self.blocks if block.kind.role == "solid"]
         if not solids or tolerance <= 0:
             return self, 0
         nodes = [self.rows(block.nodes, block.place) for block in solids]
-        used = np.unique(np.concatenate([one.ravel() for one in nodes]))
-        pairs = used[
-            cKDTree(self.points[used]).query_pairs(tolerance, p=np.inf, output_type="ndarray")
-        ]
+        lines = [b for b in self.blocks if b.kind.role == "membrane"]
+        pairs = self._near(nodes, tolerance)
+        laid = self._near([self.rows(b.nodes, b.place) for b in lines], tolerance)
+        scope = self.labels[laid] // SCOPE
+        pairs = np.concatenate([pairs, laid[scope[:, 0] != scope[:, 1]]])
         if not len(pairs):
             return self, 0
         n = len(self.labels)

@@ -59,8 +59,12 @@ from tireroad.fem.sections.mesh2d import SectionMesh
 def named_edges(deck: Deck, edges: DeckEdges, name: str, key: str) -> np.ndarray:
     """Edge numbers of a surface, node set or membrane set. InputError for other names.
 
-    `key` is the scene's key, for the message."""
+    `key` is the scene's key, for the message. Where a part and the assembly both have that name, it
+    is the assembly's."""
     surfaces = {surface.upper(): surface for surface in deck.surfaces}
+    whole = f"{name} (ASSEMBLY)"
+    if whole.upper() in surfaces or whole in deck.node_sets or whole in deck.element_sets:
+        name = whole
     if name.upper() in surfaces:
         return _of_surface(deck, edges, deck.surfaces[surfaces[name.upper()]])
     if name in deck.node_sets:

@@ -180,10 +180,11 @@ BAD = {
     "*ELGEN\n1, 3, 1, 1\n*ELEMENT, TYPE=CAX4\n3, 1, 5, 7, 8\n": r"line 8: element 3 is defined twice",
     "*ELCOPY, OLD SET=E, SHIFT NODES=1\n": r"line 6: .*ELEMENT SHIFT=",
     "*NMAP, NSET=A, TYPE=CYLINDRICAL\n0., 0., 0.\n": r"line 6: \*NMAP is not read",
-    "*SYSTEM\n1., 0., 0.\n": r"line 6: \*SYSTEM is not read",
+    "*SYSTEM\n1., 0., 0., 1., 0., 0.\n": r"line 6: \*SYSTEM: its points give no axes",
     "*REBAR, ELEMENT=CONTINUUM, MATERIAL=M, NAME=N\nE, 1., 1.\n": r"line 6: \*REBAR is not read",
     "*SHELL SECTION, ELSET=E\n*REBAR LAYER\nA, 1., 1., 0., M, 1.\n": r"line 7: .*cords in shells",
-    "*SURFACE, NAME=S, COMBINE=UNION\nA, B\n": r"line 6: .*COMBINE or CROP is not read",
+    "*SURFACE, NAME=S, COMBINE=UNION\nA, B\n": r"line 7: there is no surface A",
+    "*SURFACE, NAME=S, CROP\nA\n": r"line 6: .*CROP is not read",
     "*ELCOPY, ELEMENT SHIFT=1, OLD SET=E, SHIFT NODES=1, REFLECT\n*SURFACE, NAME=S\n2, S1\n": (
         r"line 8: the faces of elements copied with REFLECT"
     ),
@@ -206,4 +207,5 @@ def test_no_deck_makes_more_than_memory_holds(deck, monkeypatch):
 
 
 def test_system_alone_is_the_global_one(deck):
-    assert deck(TWO + "*SYSTEM\n*NODE\n9, 1., 1.\n").labels.tolist() == [1, 5, 9]
+    text = TWO + "*SYSTEM\n1., 2., 0.\n*NODE\n9, 1., 1.\n*SYSTEM\n*NODE\n10, 1., 1.\n"
+    assert deck(text).points[-2:].tolist() == [[2, 3, 0], [1, 1, 0]]
