@@ -411,13 +411,17 @@ def _check(args: argparse.Namespace) -> None:
 def _check_file(path: Path) -> None:
     """Say what a file that is no scene holds."""
     from tireroad.runs.report.road_figure import KINDS, describe_road, is_road_file
+    from tireroad.runs.report.tire_file import describe_tire, is_tire_file
 
-    if not is_road_file(path):
+    out = Path("results") / path.stem
+    if is_tire_file(path):
+        print(describe_tire(path, out))
+    elif is_road_file(path):
+        print(describe_road(path, out))
+    else:
         raise InputError(
-            f"{path}: check takes a scene (.toml) or a road file ({', '.join(KINDS)}); a tire's file is checked through "
-            f'a scene: [tire] section = "file", file = "{path.name}"'
+            f"{path}: check takes a scene (.toml), a tire's deck or mesh (.inp, .msh), or a road file ({', '.join(KINDS)})"
         )
-    print(describe_road(path, Path("results") / path.stem))
 
 
 def _report(args: argparse.Namespace) -> None:

@@ -34,7 +34,10 @@ from tireroad.fem.parameters import Parameters, choice, number
 
 Array = NDArray[np.float64]
 BASE = 0.1  # m, of a piece
-SHORTEST = 2.5e-3  # m, shortest waves that count for the mean profile depth
+SAMPLING = 5e-4  # m, between the samples from which the mean profile depth is taken
+CUT_OFF = (
+    2.4e-3  # m, of its low-pass filter, which runs there and back: half is left of 3 mm in power
+)
 REFERENCE = 1e-6  # m
 _CYCLES = 5  # waves in a piece at a band's centre, at least
 
@@ -63,7 +66,15 @@ def texture_of(profile: Array, pitch: float, shortest: float = 0.0) -> Texture:
 
 
 def mean_profile_depth(profile: Array, pitch: float) -> float | None:
-    """Mean profile depth, m; None for less than 100 mm, or fewer than 8 points per 100 mm."""
+    """Mean profile depth, m; None for less than 100 mm, or fewer than 8 points per 100 mm.
+
+    ISO 13473-1:2019: means over 0.5 mm, a Butterworth low-pass of second order run there and back,
+    each piece of 100 mm less its straight line, the mean of the peaks of its halves.
+    """
+    together = round(SAMPLING / pitch)
+    if together > 1:
+        profile = profile[: len(profile) // together * together].reshape(-1, together).mean(axis=1)
+        pitch *= together
     count = round(BASE / pitch)
     if count < 8 or len(profile) < count:
         return None
@@ -111,13 +122,12 @@ def _level(pieces: Array) -> Array:
 
 
 def _without_short(profile: Array, pitch: float) -> Array:
-    """The profile without waves shorter than 2.5 mm, by the Gaussian filter of ISO 16610-21.
+    """The profile by the low-pass filter of ISO 13473-1; as it is, where it has no shorter waves."""
+    from scipy.signal import butter, sosfiltfilt  # not needed to read a scene
 
-    The filter passes half of a wave of that length.
-    """
-    from scipy.ndimage import gaussian_filter1d  # not needed to read a scene
-
-    return gaussian_filter1d(profile, DEVIATION * SHORTEST / pitch, mode="nearest")
+    if 2 * pitch >= CUT_OFF:
+        return profile
+    return sosfiltfilt(butter(2, 2 * pitch / CUT_OFF, output="sos"), profile)
 
 
 _SEAM = 0.1  # of the length, and at most this many metres, are blended

@@ -43,6 +43,7 @@ from tireroad.fem.decks.deck import (
     records,
     rows,
 )
+from tireroad.fem.decks.rubber_tests import TESTS
 from tireroad.fem.errors import InputError
 
 # Suboptions of *MATERIAL that are read; the reader lists all others as not used.
@@ -52,7 +53,8 @@ SUBOPTIONS = (
     "DENSITY",
     "VISCOELASTIC",
     "NO COMPRESSION",
-    "UNIAXIAL TEST DATA",
+    *TESTS,
+    "VOLUMETRIC TEST DATA",
 )
 
 

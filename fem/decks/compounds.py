@@ -8,14 +8,17 @@ Materials of decks as laws of the program, in SI units.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field, fields, replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 
-from tireroad.fem.decks.deck import Compound, Place
+from tireroad.fem.decks.deck import Compound, Place, number
+from tireroad.fem.decks.rubber_tests import TESTS, Fit, fitted
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections.construction import RADII
+from tireroad.fem.tire.material import MATERIALS
 
 _SMALLEST, _LARGEST = RADII
 
@@ -56,18 +59,31 @@ def check_size(radius: float, unit: str, file: str) -> None:
 PRONY_FREQUENCY = 100.0  # Hz at which a series is evaluated
 
 
-def prony(parts: dict, options: Mapping[str, str], notes: list[str]) -> tuple[float, float, float]:
-    """(long-term fraction of the given moduli, dynamic over long-term modulus, loss factor)."""
+@dataclass(frozen=True)
+class Series:
+    """A Prony series: what is left of instantaneous moduli of shear and bulk after long times, the
+    dynamic over the long-term modulus of shear, and the loss factor.
+    """
+
+    shear: float = 1.0
+    bulk: float = 1.0
+    dynamic: float = 1.0
+    loss: float = 0.0
+
+
+def prony(parts: dict, notes: list[str]) -> Series:
+    """Of a *VISCOELASTIC, TIME=PRONY at 100 Hz; without one nothing is lost."""
     if "VISCOELASTIC" not in parts:
-        return 1.0, 1.0, 0.0
+        return Series()
     given, table, place = parts["VISCOELASTIC"]
     if given.get("TIME", "").upper() != "PRONY":
         notes.append(f"*VISCOELASTIC other than TIME=PRONY: not used ({place})")
-        return 1.0, 1.0, 0.0
+        return Series()
     terms = np.array([(*row, 0.0, 0.0, 0.0)[:3] for row in table]).reshape(-1, 3)
-    share, times = terms[:, 0], terms[:, 2]
-    if (share < 0).any() or share.sum() >= 1 or (times <= 0).any():
-        raise place.error("a Prony series needs g ≥ 0 with a sum below 1, and times > 0")
+    share, of_bulk, times = terms.T
+    for one in (share, of_bulk):
+        if (one < 0).any() or one.sum() >= 1 or (times <= 0).any():
+            raise place.error("a Prony series needs g and k ≥ 0 with sums below 1, and times > 0")
     long_term = 1 - share.sum()
     turn = 2 * np.pi * PRONY_FREQUENCY * times
     storage = long_term + (share * turn**2 / (1 + turn**2)).sum()
@@ -76,10 +92,10 @@ def prony(parts: dict, options: Mapping[str, str], notes: list[str]) -> tuple[fl
         f"Prony series read at {PRONY_FREQUENCY:g} Hz: dynamic modulus {storage / long_term:.3g} times the "
         f"long-term one, loss factor {loss / storage:.3g} ({place})"
     )
-    instant = options.get("MODULI", "LONG TERM").upper() == "INSTANTANEOUS"
-    return (long_term if instant else 1.0), storage / long_term, loss / storage
+    return Series(long_term, 1 - of_bulk.sum(), storage / long_term, loss / storage)
 
 
+_STIFF = 0.4999  # Poisson's ratio from which on a neo-Hookean law is taken for incompressible
 INCOMPRESSIBLE = 0.49  # Poisson's ratio in place of 1/2: changes modes by under 0.3 %
 _MODULUS = (1e4, 1e12)  # Pa; range of any material in a tire
 _DENSITY = (100.0, 2e4)  # kg/m3
@@ -90,16 +106,18 @@ class Rubber:
     """A compound: law of the long-term state and its coefficients by scene key, in SI units.
 
     `density` is None if the deck has none; `dynamic` and `loss_factor` are those of a Prony series
-    at 100 Hz. `notes` list what was interpreted differently from what is written.
+    at 100 Hz. `notes` list what was interpreted differently from what is written; `fit` is how
+    the law follows test data.
     """
 
     name: str
     model: str
-    coefficients: Mapping[str, float]
+    coefficients: Mapping[str, Any]
     density: float | None = None
     dynamic: float = 1.0
     loss_factor: float = 0.0
     notes: tuple[str, ...] = ()
+    fit: Fit | None = field(default=None, repr=False)
 
 
 @dataclass(frozen=True)
@@ -111,34 +129,101 @@ class CordMaterial:
     compression: float = 1.0
 
 
+@dataclass(frozen=True)
+class _Law:
+    """A law of the deck: coefficients by scene key in the deck's unit without those of the volume.
+
+    `bulk` is 0 for an incompressible one. A neo-Hookean law has `shear` alone.
+    """
+
+    model: str
+    values: dict[str, Any]
+    bulk: float
+    fit: Fit | None = None
+
+    @property
+    def shear(self) -> float:
+        """Modulus of shear at zero strain."""
+        if self.model == "neo-hookean":
+            return self.values["shear"]
+        law = MATERIALS[self.model]
+        known = {one.name: self.values.get(one.name, 0.0) for one in fields(law)}
+        modulus = cast("property", law.shear).fget
+        assert modulus is not None
+        return modulus(SimpleNamespace(**known))  # the law itself has limits in SI
+
+    def si(self, series: Series, stress: float) -> tuple[dict[str, Any], bool]:
+        """Coefficients in SI of the long-term law, and whether its volume was held before.
+
+        A series lowers what makes shape and, by its own terms, what makes volume.
+        """
+        shear, bulk = (
+            self.shear * series.shear * stress,
+            self.bulk * series.bulk * stress,
+        )
+        held = not bulk or (3 * bulk - 2 * shear) / (6 * bulk + 2 * shear) > _STIFF
+        if held and (not bulk or self.model == "neo-hookean"):
+            bulk = shear * 2 * (1 + INCOMPRESSIBLE) / (3 * (1 - 2 * INCOMPRESSIBLE))
+        else:
+            held = False
+        if self.model == "neo-hookean":
+            poisson = (3 * bulk - 2 * shear) / (6 * bulk + 2 * shear)
+            return {"youngs_modulus": 2 * shear * (1 + poisson), "poisson_ratio": poisson}, held
+        plain = "locking_stretch", "powers"
+        times = series.shear * stress
+        scaled = {
+            key: value
+            if key in plain
+            else tuple(times * one for one in value)
+            if isinstance(value, tuple)
+            else times * value
+            for key, value in self.values.items()
+        }
+        return scaled | {"bulk_modulus": bulk}, held
+
+
 def rubber(compound: Compound, units: Units) -> Rubber:
     """The compound of a solid section. Raises InputError for laws the program does not have."""
     parts = _parts(compound)
     notes: list[str] = []
     if "HYPERELASTIC" in parts:
-        part = parts["HYPERELASTIC"]
-        options, numbers, place = _numbers(part, compound, notes, _lines(part[0]))
-        model, values = _hyperelastic(options, numbers, place, compound.name)
+        options, _, place = parts["HYPERELASTIC"]
+        law = _hyperelastic(parts, compound, notes)
     elif "ELASTIC" in parts:
         options, numbers, place = _numbers(parts["ELASTIC"], compound, notes)
-        model, values = _elastic(options, numbers, place, compound.name)
+        law = _elastic(options, numbers, place, compound.name)
     else:
+        other = next((name for name in parts if name.startswith("HYPER")), "")
         raise compound.place.error(
             f"material {compound.name} has no *HYPERELASTIC and no *ELASTIC that is read"
+            + (f": *{other} is not among the laws" if other else "")
         )
-    share, dynamic, loss = prony(parts, options, notes)
-    poisson = _incompressible(model, values, notes, compound.name)
-    modular = {k: v * share * units.stress for k, v in values.items() if k != "poisson_ratio"}
-    values = modular | ({"poisson_ratio": poisson} if model == "neo-hookean" else {})
-    _check_modulus(_youngs(values), units, place, compound.name)
+    series = prony(parts, notes)
+    instant = options.get("MODULI", "LONG TERM").upper() == "INSTANTANEOUS"
+    kept = series if instant else replace(series, shear=1.0, bulk=1.0)
+    if not law.shear > 0:
+        raise place.error(
+            f"material {compound.name}: its modulus of shear at zero strain, {law.shear:.4g}, must be > 0"
+        )
+    values, held = law.si(kept, units.stress)
+    if held:
+        notes.append(
+            f"{compound.name}: incompressible in the deck, taken with ν = {INCOMPRESSIBLE}"
+        )
+    _check_modulus(3 * law.shear * kept.shear * units.stress, units, place, compound.name)
+    try:
+        MATERIALS.make(law.model, **values)
+    except InputError as error:
+        raise place.error(f"material {compound.name}: {error}") from None
     return Rubber(
         name=compound.name,
-        model=model,
+        model=law.model,
         coefficients=values,
         density=_density(parts, units, compound),
-        dynamic=dynamic,
-        loss_factor=loss,
+        dynamic=series.dynamic,
+        loss_factor=series.loss,
         notes=tuple(notes),
+        fit=law.fit,
     )
 
 
@@ -148,14 +233,13 @@ def cord(compound: Compound, units: Units) -> CordMaterial:
     for name in ("ELASTIC", "HYPERELASTIC"):
         if name not in parts:
             continue
-        options, numbers, place = _numbers(parts[name], compound, [], _lines(parts[name][0]))
+        options, numbers, place = _numbers(parts[name], compound, [])
         if name == "ELASTIC":
             modulus = numbers[0] if numbers else 0.0
         elif "MARLOW" in options or "TEST DATA INPUT" in options:
             modulus = _slope(parts, compound)
         else:
-            _, values = _hyperelastic(options, numbers, place, compound.name)
-            modulus = _youngs(values)
+            modulus = 3 * _hyperelastic(parts, compound, []).shear
         _check_modulus(modulus * units.stress, units, place, compound.name)
         slack = 0.01 if "NO COMPRESSION" in parts else 1.0
         return CordMaterial(modulus * units.stress, _density(parts, units, compound) or 0.0, slack)
@@ -183,80 +267,121 @@ def _numbers(
     return options, [value for row in table[:lines] for value in row], place
 
 
-def _hyperelastic(
-    options: Mapping[str, str], numbers: list[float], place: Place, name: str
-) -> tuple[str, dict]:
-    """(law, coefficients in the deck's units) from the forms of *HYPERELASTIC."""
-    order, reduced = _form(options, place, name)
-    names, count = _names(order, reduced)
-    padded = numbers + [0.0] * (len(names) + count - len(numbers))
+def _hyperelastic(parts: dict, compound: Compound, notes: list[str]) -> _Law:
+    """The law of a *HYPERELASTIC: by its coefficients, or fitted to its test data."""
+    options, _, place = parts["HYPERELASTIC"]
+    form, order = _form(options, place, compound.name)
+    if form == "marlow" or "TEST DATA INPUT" in options:
+        return _tested(form, order, parts, compound, notes)
+    names, bulks = _names(form, order)
+    # Eight numbers to a line; the temperature comes last.
+    lines = -(-(len(names) + bulks + 1) // 8)
+    _, numbers, _ = _numbers(parts["HYPERELASTIC"], compound, notes, lines)
+    padded = numbers + [0.0] * (len(names) + bulks - len(numbers))
     values = dict(zip(names, padded, strict=False))
     first = padded[len(names)]
-    if values["c10"] + values.get("c01", 0.0) <= 0:
-        raise place.error(f"material {name}: C10 + C01 must be > 0")
     if first < 0:
-        raise place.error(f"material {name}: D1 must be ≥ 0, not {first:g}")
+        raise place.error(f"material {compound.name}: D1 must be ≥ 0, not {first:g}")
     bulk = 2 / first if first > 0 else 0.0
-    cross = [k for k, v in values.items() if v and k not in ("c10", "c01", "c20", "c30")]
-    if cross or (values.get("c01") and (values.get("c20") or values.get("c30"))):
+    if form == "ogden":
+        moduli = tuple(values[f"mu{i}"] for i in range(1, order + 1))
+        powers = tuple(values[f"alpha{i}"] for i in range(1, order + 1))
+        return _Law("ogden", {"moduli": moduli, "powers": powers}, bulk)
+    if form == "arruda-boyce":
+        return _Law("arruda-boyce", values, bulk)
+    return _simplest({key: value for key, value in values.items() if value}, bulk, place, compound)
+
+
+def _simplest(values: dict[str, float], bulk: float, place: Place, compound: Compound) -> _Law:
+    """The simplest law that has these coefficients cij, none of them 0."""
+    used = set(values)
+    if values.get("c10", 0.0) + values.get("c01", 0.0) <= 0:
+        raise place.error(f"material {compound.name}: C10 + C01 must be > 0")
+    if used <= {"c10"}:
+        return _Law("neo-hookean", {"shear": 2 * values["c10"]}, bulk)
+    for model in ("mooney-rivlin", "yeoh", "polynomial", "reduced-polynomial"):
+        names = {one.name for one in fields(MATERIALS[model])} - {"bulk_modulus"}
+        if used <= names and not (model == "mooney-rivlin" and values.get("c01", 0.0) < 0):
+            return _Law(model, {name: values.get(name, 0.0) for name in sorted(names)}, bulk)
+    raise place.error(
+        f"material {compound.name}: polynomials in both invariants are read to N=2, in I1 alone to N=6; give "
+        f'[[tire.region]] name = "{compound.name}" a material of one of these'
+    )
+
+
+_TESTED = {"polynomial": {1: "mooney-rivlin", 2: "polynomial"}}
+
+
+def _tested(form: str, order: int, parts: dict, compound: Compound, notes: list[str]) -> _Law:
+    """The law that follows the material's test data."""
+    options, _, place = parts["HYPERELASTIC"]
+    tests = {
+        name: np.array([(*row, 0.0)[:2] for row in parts[name][1]]).reshape(-1, 2)
+        for name in TESTS
+        if name in parts
+    }
+    model = _TESTED.get(form, {}).get(order, form.replace(" ", "-"))
+    if form == "polynomial" and order > 2:
         raise place.error(
-            f"material {name}: its polynomial is neither Mooney-Rivlin (C10, C01) nor Yeoh (C10, C20, "
-            f'C30); give [[tire.region]] name = "{name}" a material of one of these'
+            f"material {compound.name}: N={order} is not fitted to test data, 1 and 2 are"
         )
-    return _law(values, bulk)
+    fit = fitted(model, order, tests, lambda why: place.error(f"material {compound.name}: {why}"))
+    notes.append(
+        f"{compound.name}: fitted to {', '.join(name.split()[0].lower() for name in tests)} test data by least "
+        f"squares in stress, {100 * fit.error:.2g} % of it off ({place})"
+    )
+    law = _Law(fit.model, dict(fit.coefficients), 0.0, fit)
+    if fit.model == "reduced-polynomial" and len(fit.coefficients) <= 3:
+        known = {"c10": 0.0, "c20": 0.0, "c30": 0.0} | dict(fit.coefficients)
+        law = replace(law, model="yeoh", values=known)
+    poisson = number(options.get("POISSON", "0"), place)
+    if "VOLUMETRIC TEST DATA" in parts:  # pressure over volume ratio
+        table = np.array([(*row, 1.0)[:2] for row in parts["VOLUMETRIC TEST DATA"][1]])
+        less = 1 - table.reshape(-1, 2)[:, 1]
+        law = replace(law, bulk=float(table.reshape(-1, 2)[:, 0] @ less / max(less @ less, 1e-300)))
+    elif 0 < poisson < _STIFF:
+        law = replace(law, bulk=2 * law.shear * (1 + poisson) / (3 * (1 - 2 * poisson)))
+    return law
 
 
-def _law(values: dict, bulk: float) -> tuple[str, dict]:
-    if values.get("c20") or values.get("c30"):
-        kept = {key: values.get(key, 0.0) for key in ("c10", "c20", "c30")}
-        return "yeoh", kept | {"bulk_modulus": bulk}
-    if values.get("c01"):
-        return "mooney-rivlin", {"c10": values["c10"], "c01": values["c01"], "bulk_modulus": bulk}
-    shear = 2 * values["c10"]
-    if not bulk:
-        return "neo-hookean", {"youngs_modulus": 3 * shear, "poisson_ratio": 0.5}
-    poisson = (3 * bulk - 2 * shear) / (6 * bulk + 2 * shear)
-    return "neo-hookean", {"youngs_modulus": 2 * shear * (1 + poisson), "poisson_ratio": poisson}
-
-
-def _form(options: Mapping[str, str], place: Place, name: str) -> tuple[int, bool]:
-    """(order N, of I1 only) of a polynomial form. The Abaqus default is POLYNOMIAL, N=1."""
-    for fixed, form in {
-        "NEO HOOKE": (1, True),
-        "MOONEY-RIVLIN": (1, False),
-        "YEOH": (3, True),
+def _form(options: Mapping[str, str], place: Place, name: str) -> tuple[str, int]:
+    """(form, order N) of a *HYPERELASTIC. The Abaqus default is POLYNOMIAL, N=1."""
+    for fixed, found in {
+        "NEO HOOKE": ("reduced polynomial", 1),
+        "MOONEY-RIVLIN": ("polynomial", 1),
+        "YEOH": ("reduced polynomial", 3),
+        "ARRUDA-BOYCE": ("arruda-boyce", 1),
+        "MARLOW": ("marlow", 1),
     }.items():
         if fixed in options:
-            return form
-    other = set(options) - {"POLYNOMIAL", "REDUCED POLYNOMIAL", "N", "MODULI", "TYPE"}
+            return found
+    known = {"POLYNOMIAL": 3, "REDUCED POLYNOMIAL": 6, "OGDEN": 6}
+    other = set(options) - {*known, "N", "MODULI", "TYPE", "TEST DATA INPUT", "POISSON"}
     if other:
         raise place.error(
-            f"material {name}: *HYPERELASTIC, {sorted(other)[0]} is not among neo-Hooke, Mooney-Rivlin, "
-            f'Yeoh and polynomials; give [[tire.region]] name = "{name}" a material of one of these'
+            f"material {name}: *HYPERELASTIC, {sorted(other)[0]} is not among neo-Hooke, Mooney-Rivlin, Yeoh, "
+            f'polynomials, Ogden, Arruda-Boyce and Marlow; give [[tire.region]] name = "{name}" a material'
         )
+    form = next((one for one in known if one in options), "POLYNOMIAL")
     order = options.get("N", "1")
-    if order not in ("1", "2", "3"):
-        raise place.error(f"material {name}: N={order}; 1, 2 and 3 are read")
-    return int(order), "REDUCED POLYNOMIAL" in options
+    if not (order.isascii() and order.isdigit() and 1 <= int(order) <= known[form]):
+        raise place.error(f"material {name}: {form}, N={order}; 1 to {known[form]} are read")
+    return form.lower(), int(order)
 
 
-def _lines(options: Mapping[str, str]) -> int:
-    """Number of lines with the coefficients of one temperature: 9 C and 3 D do not fit in one."""
-    full = not {"NEO HOOKE", "MOONEY-RIVLIN", "YEOH", "REDUCED POLYNOMIAL"} & set(options)
-    return 2 if full and options.get("N") == "3" else 1
-
-
-def _names(order: int, reduced: bool) -> tuple[list[str], int]:
-    """Names of the coefficients Cij in the manual's order, and the number of Di that follow."""
-    if reduced:
+def _names(form: str, order: int) -> tuple[list[str], int]:
+    """Names of the coefficients in the manual's order, and the number of Di that follow."""
+    if form == "arruda-boyce":
+        return ["mu", "locking_stretch"], 1
+    if form == "ogden":
+        return [f"{what}{i}" for i in range(1, order + 1) for what in ("mu", "alpha")], order
+    if form == "reduced polynomial":
         return [f"c{i}0" for i in range(1, order + 1)], order
     names = [f"c{total - j}{j}" for total in range(1, order + 1) for j in range(total + 1)]
     return names, order
 
 
-def _elastic(
-    options: Mapping[str, str], numbers: list[float], place: Place, name: str
-) -> tuple[str, dict]:
+def _elastic(options: Mapping[str, str], numbers: list[float], place: Place, name: str) -> _Law:
     if options.get("TYPE", "ISOTROPIC").upper() not in ("ISOTROPIC", "ISO"):
         raise place.error(
             f"material {name}: *ELASTIC with TYPE={options['TYPE']}: isotropic is read"
@@ -264,31 +389,8 @@ def _elastic(
     modulus, poisson = (numbers + [0.0, 0.0])[:2]
     if modulus <= 0 or not -1 < poisson <= 0.5:
         raise place.error(f"material {name}: E must be > 0 and ν above -1 and at most 0.5")
-    return "neo-hookean", {"youngs_modulus": modulus, "poisson_ratio": poisson}
-
-
-def _incompressible(model: str, values: dict, notes: list[str], name: str) -> float:
-    """Poisson's ratio, 0.49 if above 0.4999; sets a bulk modulus of 0 in `values` likewise."""
-    said = f"{name}: incompressible in the deck, taken with ν = {INCOMPRESSIBLE}"
-    if model == "neo-hookean":
-        if values["poisson_ratio"] <= 0.4999:
-            return values["poisson_ratio"]
-        shear = values["youngs_modulus"] / (2 * (1 + values["poisson_ratio"]))
-        values["youngs_modulus"] = 2 * shear * (1 + INCOMPRESSIBLE)
-        notes.append(said)
-        return INCOMPRESSIBLE
-    if not values["bulk_modulus"]:
-        shear = 2 * (values["c10"] + values.get("c01", 0.0))
-        values["bulk_modulus"] = shear * 2 * (1 + INCOMPRESSIBLE) / (3 * (1 - 2 * INCOMPRESSIBLE))
-        notes.append(said)
-    return INCOMPRESSIBLE
-
-
-def _youngs(values: Mapping[str, float]) -> float:
-    """Young's modulus at small strain; if not given, that of the nearly incompressible law."""
-    if "youngs_modulus" in values:
-        return values["youngs_modulus"]
-    return 6 * (values["c10"] + values.get("c01", 0.0))
+    bulk = modulus / (3 * (1 - 2 * poisson)) if poisson <= _STIFF else 0.0
+    return _Law("neo-hookean", {"shear": modulus / (2 * (1 + poisson))}, bulk)
 
 
 def _slope(parts: dict, compound: Compound) -> float:

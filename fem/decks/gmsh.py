@@ -193,6 +193,8 @@ def read(path: Path) -> Deck:
         raise InputError(f"{path} cannot be read: {error.strerror or error}") from None
     version, binary = _format(found, path)
     needed = ("Nodes", "Elements") + (("Entities",) if version == "4.1" else ())
+    if "ParametricNodes" in found and "Nodes" not in found:
+        found["Nodes"] = _plain_nodes(found["ParametricNodes"], binary)
     for name in needed:
         if name not in found:
             raise InputError(f"{path.name}: no ${name} in it: is the file cut short?")
@@ -291,6 +293,16 @@ def _nodes_of(sort: int, numbers: Numbers) -> int:
     return TYPES[sort][1]
 
 
+def _plain_nodes(part: Part, binary: bool) -> Part:
+    """Nodes that Gmsh 2.2 wrote with Mesh.SaveParametric: of each line the label and the place."""
+    if binary:
+        raise part.place.error(
+            "binary nodes with parameters (Mesh.SaveParametric = 1) are not read: save with 0, or as text"
+        )
+    lines = [line.split(None, 4)[:4] for line in part.text.splitlines() if line.strip()]
+    return Part(b"\n".join(b" ".join(words) for words in lines), part.place)
+
+
 def _nodes_2(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
     (count,) = numbers.ints(1)
     numbers.fits(count, 4)
@@ -342,6 +354,11 @@ def _deck(
         raise InputError(f"{path.name}: a coordinate is not a number")
     if dimension == 2 and np.abs(points[:, 2]).max() > 1e-9 * max(np.ptp(points), 1e-300):
         raise InputError(f"{path.name}: a section must lie in z = 0, x from the axle, y along it")
+    if names and not any(group for _, group, *_ in elements):
+        raise part.place.error(
+            "the file names physical groups and none of its elements is in one: it was saved with Mesh.SaveAll = 1, "
+            "which in format 2.2 loses them. Save with Mesh.SaveAll = 0, or in format 4.1 (gmsh -format msh41)"
+        )
     blocks, sets, surfaces = _groups(elements, dimension, names, part)
     known = np.unique([e[2] for e in elements])
     deck = Deck(

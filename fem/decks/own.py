@@ -208,6 +208,7 @@ def _ply(line: CordLine, mesh: SectionMesh) -> Ply:
 
 
 MERGE = 1e-6  # m
+MESHES = {".inp": abaqus.read, ".msh": gmsh.read}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -256,12 +257,11 @@ def read(path: Path | str, wishes: Wishes | None = None) -> OwnSection:
         return OwnSection(
             mesh=mesh, rubbers=rubbers, plies=plies, used=read_all, unused=(), notes=()
         )
-    readers = {".inp": abaqus.read, ".msh": gmsh.read}
-    if path.suffix.lower() not in readers:
+    if path.suffix.lower() not in MESHES:
         raise InputError(
             f"{path}: a section is read from .inp (Abaqus), .msh (Gmsh) or .toml (section file)"
         )
-    deck = readers[path.suffix.lower()](path)
+    deck = MESHES[path.suffix.lower()](path)
     try:
         return _section(*revolved.reduced(deck), wishes)
     except InputError as error:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Parameters, Registry
@@ -85,7 +85,7 @@ def compound(
     *,
     dynamic: float = 1.0,
     loss_factor: float = 0.0,
-    **parameters: float,
+    **parameters: Any,
 ) -> Material:
     """Material of law `model` (fem.tire.laws); `parameters` (Pa, -) not given at their defaults.
 

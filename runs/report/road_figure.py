@@ -37,7 +37,7 @@ def describe_road(path: Path, out: Path) -> str:
     """What a road file holds, and a [road] to paste; draws out/road.png. InputError where it is none."""
     if not path.is_file():
         raise InputError(f"{path}: no such file")
-    kind, road = _read(path)
+    kind, road, more = _read(path)
     x, z = _middle(road)
     texture = texture_of(z, float(x[1] - x[0]), 2 * road.steps[0])
     (length, width), (along, across) = road.extent_of_file, road.steps
@@ -48,7 +48,7 @@ def describe_road(path: Path, out: Path) -> str:
         f"  along its middle: heights from {1e3 * z.min():.4g} to {1e3 * z.max():.4g} mm, standard deviation {1e3 * z.std():.3g} mm",
     ]
     if texture.depth is not None:
-        lines.append(f"  mean profile depth {1e3 * texture.depth:.3g} mm (ISO 13473-1)")
+        lines.append(f"  mean profile depth {1e3 * texture.depth:.3g} mm (ISO 13473-1:2019)")
     found = iso_class(texture)
     if found is not None:
         lines.append(
@@ -64,20 +64,32 @@ def describe_road(path: Path, out: Path) -> str:
         lines.append(f"  drawn: {out / 'road.png'}")
     except OSError as error:
         lines.append(f"  not drawn: {out / 'road.png'}: {error.strerror}")
-    return "\n".join([*lines, "", "[road]", f'kind = "{kind}"', f'file = "{path.name}"'])
+    table = ["[road]", f'kind = "{kind}"', f'file = "{path.name}"', *more]
+    return "\n".join([*lines, "", *table])
 
 
-def _read(path: Path) -> tuple[str, Any]:
+def _read(path: Path) -> tuple[str, Any, list[str]]:
+    """Kind and road of a file, and further lines of its table: the unit of x that fits a road."""
     refused: list[str] = []
     kinds = KINDS[path.suffix.lower()]
     if len(kinds) > 1 and _is_line(path):
         kinds = ("laser",)
     for kind in kinds:
-        try:
-            more = {"across": "ruts"} if kind == "laser" else {}
-            return kind, ROADS.make(kind, file=str(path), **more).make()
-        except InputError as error:
-            refused.append(f"as {kind}: {error}")
+        units = ("mm", "m") if kind == "laser" else (None,)
+        for unit in units:
+            try:
+                more = {"across": "ruts", "length_unit": unit} if unit else {}
+                road = ROADS.make(kind, file=str(path), **more).make()
+            except InputError as error:
+                if unit != "m":
+                    refused.append(f"as {kind}: {error}")
+                continue
+            table = (
+                ['length_unit = "m"           # of x; guessed, mm make no road']
+                if unit == "m"
+                else []
+            )
+            return kind, road, table
     raise InputError(
         "\n  ".join([f"{path} is no road that can be used", *refused])
         if len(refused) > 1

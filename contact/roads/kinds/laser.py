@@ -12,6 +12,7 @@ from tireroad.contact.roads.grid_file import UNITS
 from tireroad.contact.roads.profile_file import check_relief, read_profile
 from tireroad.contact.roads.random_texture import cleaned, memory, widened
 from tireroad.contact.roads.road import Levelled, road_kind
+from tireroad.contact.roads.under_tire import DEVIATION, mean_profile_depth
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import (
     Limits,
@@ -99,6 +100,7 @@ class LaserFile(Levelled):
         line, notes = self._read(self.reads, source)
         sound = cleaned(line.profile, line.pitch, self.outlier, self.longest_gap, source)
         profile, pitch = self._resampled(sound.profile, line.pitch, source)
+        depth = mean_profile_depth(sound.profile, line.pitch)
         if self.across == "ruts":
             y = np.array([-0.5, 0.5]) * self.width
             z, how = np.repeat(profile[:, None], 2, axis=1), "the same all across (ruts)"
@@ -109,7 +111,8 @@ class LaserFile(Levelled):
         x: Array = np.float64(line.first) + np.float64(pitch) * np.arange(len(profile))
         road = Grid(x, y, z, end=self.end, source=source)
         road.making = 0.0 if self.across == "ruts" else memory(len(profile), pitch, self.width)
-        road.notes = (*notes, sound.summary, f"extended to {self.width:g} m: {how}")
+        said = [] if depth is None else [f"mean profile depth as measured {1e3 * depth:.3g} mm"]
+        road.notes = (*notes, sound.summary, f"extended to {self.width:g} m: {how}", *said)
         return road
 
     def _read(self, path: Path, source: str) -> tuple[_Line, list[str]]:
@@ -146,8 +149,6 @@ class LaserFile(Levelled):
     def _resampled(self, profile: Array, pitch: float, source: str) -> tuple[Array, float]:
         """Without waves shorter than `shortest_wave` (ISO 16610-21), sampled at a quarter of it."""
         from scipy.ndimage import gaussian_filter1d  # not needed to read a scene
-
-        from tireroad.contact.roads.under_tire import DEVIATION
 
         step = max(math.floor(self.shortest_wave / 4 / pitch), 1)
         if step > 1:

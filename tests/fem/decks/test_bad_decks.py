@@ -137,10 +137,10 @@ CASES = {
         {},
         r"node 1 is defined twice",
     ),
-    "Ogden": (
-        GOOD.replace("*ELASTIC\n6.0E6, 0.45", "*HYPERELASTIC, OGDEN\n1., 2., 0."),
+    "van der Waals": (
+        GOOD.replace("*ELASTIC\n6.0E6, 0.45", "*HYPERELASTIC, VAN DER WAALS\n1., 2., 0."),
         {},
-        r"line \d+: material RUBBER: .*OGDEN.*tire\.region",
+        r"line \d+: material RUBBER: .*VAN DER WAALS.*tire\.region",
     ),
     "outside file": (
         GOOD + "*INCLUDE, INPUT=../secret\n",

@@ -95,6 +95,31 @@ def test_gmsh(file):
     assert radius[::2] == pytest.approx(MINOR - WALL / 2, abs=1e-12)
 
 
+def test_gmsh_with_parameters_of_nodes(tmp_path):
+    """Mesh.SaveParametric = 1: the place in the entity stands behind each node."""
+    plain = (MESHES[0].parent / "lin_2.2_0.msh").read_text()
+    before, nodes = plain.split("$Nodes\n", 1)
+    nodes, after = nodes.split("$EndNodes", 1)
+    count, *lines = nodes.splitlines()
+    lines = [f"{line} 1 3 0.25" if k % 2 else f"{line} 0 7" for k, line in enumerate(lines)]
+    with_more = "\n".join(["$ParametricNodes", count, *lines, "$EndParametricNodes"])
+    (tmp_path / "tire.msh").write_text(before + with_more + after)
+    found, expected = read(tmp_path / "tire.msh"), read(MESHES[0].parent / "lin_2.2_0.msh")
+    np.testing.assert_array_equal(found.mesh.nodes, expected.mesh.nodes)
+
+
+def test_gmsh_saved_without_its_groups(tmp_path):
+    """Mesh.SaveAll = 1 in format 2.2 gives every element the physical group 0."""
+    text = (MESHES[0].parent / "lin_2.2_0.msh").read_text()
+    before, elements = text.split("$Elements\n", 1)
+    count, *lines = elements.splitlines()
+    rows = [line.split() for line in lines]
+    lines = [" ".join([*row[:3], "0", *row[4:]]) if len(row) > 4 else " ".join(row) for row in rows]
+    (tmp_path / "tire.msh").write_text(before + "$Elements\n" + "\n".join([count, *lines]) + "\n")
+    with pytest.raises(InputError, match=r"Mesh\.SaveAll = 1.*SaveAll = 0"):
+        read(tmp_path / "tire.msh")
+
+
 def test_there_are_gmsh_files():
     assert len(MESHES) == 6
 

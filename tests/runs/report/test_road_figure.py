@@ -54,4 +54,7 @@ def test_refusals(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
         describe_road(tmp_path / "words.csv", tmp_path)
     (tmp_path / "tire.inp").write_text("*NODE\n")
     assert main(["check", str(tmp_path / "tire.inp")]) == 2
-    assert 'section = "file"' in capsys.readouterr().err
+    assert "no solid elements" in capsys.readouterr().err
+    (tmp_path / "notes.pdf").write_text("%PDF")
+    assert main(["check", str(tmp_path / "notes.pdf")]) == 2
+    assert "a tire's deck or mesh (.inp, .msh), or a road file" in capsys.readouterr().err

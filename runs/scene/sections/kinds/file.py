@@ -201,13 +201,17 @@ def described(tire: Tire) -> list[str]:
     return lines + ["not used of the file", *(f"  {line}" for line in own.unused or ("nothing",))]
 
 
+def _shown(value: float | tuple[float, ...]) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else " ".join(f"{one:.4g}" for one in value)
+
+
 def _in_words(tire: Tire, name: str, rubber: Rubber | None) -> str:
     region = region_of(tire, name)
     if region is not None and region.material is not None:
         return "material of the scene's [[tire.region]]"
     if rubber is None:
         return "no material in the file: that of [tire.material]"
-    values = ", ".join(f"{key} {value:.4g}" for key, value in rubber.coefficients.items())
+    values = ", ".join(f"{key} {_shown(value)}" for key, value in rubber.coefficients.items())
     density = (
         f"density {rubber.density:.4g} kg/m³"
         if rubber.density is not None

@@ -1,0 +1,255 @@
+"""A deck or mesh alone: what it is, the figures its steps give, pictures, and a scene to start from."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from tireroad.fem.decks.compounds import SYSTEMS, Rubber
+from tireroad.fem.decks.deck import Deck
+from tireroad.fem.decks.history import History, history
+from tireroad.fem.decks.own import MESHES, OwnSection, Wishes, read
+from tireroad.fem.errors import InputError
+from tireroad.fem.sections.construction import RADII
+from tireroad.runs.report.figures import COLOURS, WIDE, canvas, styled
+from tireroad.runs.report.section_figure import NAME, save_section
+
+_RIM = re.compile(r"RIM|BEAD|FLANGE|WHEEL")
+_INNER = re.compile(r"INNER|INSIDE|LINER|CAVITY|INFLAT|PRESS|_IN\b|^IN\b")
+_TREAD = re.compile(r"TREAD|OUTSIDE|OUTER|GROUND|ROAD|CONTACT|_OUT\b|^OUT\b")
+_ORDINARY = 2.2e5  # Pa, where a file gives no pressure
+
+
+def is_tire_file(path: Path) -> bool:
+    """Whether a file's ending is that of a deck or mesh."""
+    return path.suffix.lower() in MESHES
+
+
+def describe_tire(path: Path, out: Path) -> str:
+    """What a deck or mesh holds, with a scene to start from, which is out/scene.toml, too.
+
+    Draws out/section.png and, of rubbers fitted to test data, out/test_data.png. Raises InputError
+    where no section can be made of the file, after writing the scene as far as it is known.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    steps = history(path) if path.suffix.lower() == ".inp" else History(has_mesh=True)
+    if not steps.has_mesh:
+        return "\n".join(
+            [
+                f"{path}: steps of an analysis without a mesh of its own; what a scene can take from them:",
+                "",
+                *_run(steps, "m"),
+            ]
+        )
+    deck = MESHES[path.suffix.lower()](path)
+    wishes, guessed = _guess(deck)
+    scene = "\n".join([*_table(path, wishes, guessed), "", *_run(steps, wishes.length_unit)]) + "\n"
+    out.mkdir(parents=True, exist_ok=True)
+    (out / "scene.toml").write_text(scene)
+    lines = [f"{path}: a tire's section" if deck.dimension == 2 else f"{path}: a tire's body"]
+    lines += [f"  {line}" for line in deck.used]
+    try:
+        own, wishes = _readable(path, wishes, deck)
+    except InputError as error:
+        raise InputError(
+            f"{error}\n  a scene to complete: {out / 'scene.toml'}\n  sets and surfaces: "
+            + (", ".join(deck.face_names) or "none")
+        ) from None
+    scene = "\n".join([*_table(path, wishes, guessed), "", *_run(steps, wishes.length_unit)]) + "\n"
+    (out / "scene.toml").write_text(scene)
+    radius, width = own.mesh.nodes[:, 0].max(), np.ptp(own.mesh.nodes[:, 1])
+    lines.append(f"  outer radius {1e3 * radius:.4g} mm, width {1e3 * width:.4g} mm")
+    lines += [f"  {note}" for note in own.notes]
+    lines += [f"  {line}" for line in _compounds(own)]
+    lines += ["not used of the file", *(f"  {line}" for line in own.unused or ("nothing",))]
+    angles = {ply.name: float(np.degrees(ply.angle)) for ply in own.plies}
+    save_section(own.mesh, out / NAME, angles)
+    lines.append(f"drawn: {out / NAME}")
+    fits = [rubber for rubber in own.rubbers if rubber is not None and rubber.fit]
+    if fits:
+        draw_fits(fits).savefig(out / "test_data.png", dpi=150, bbox_inches="tight")
+        lines.append(f"drawn: {out / 'test_data.png'}, laws fitted to test data")
+    return "\n".join([*lines, f"a scene to start from: {out / 'scene.toml'}", "", scene])
+
+
+def _compounds(own: OwnSection) -> list[str]:
+    lines = []
+    for name, rubber in zip(own.mesh.regions, own.rubbers, strict=True):
+        if rubber is None:
+            lines.append(f"region {name}: no material in the file")
+            continue
+        density = "no density" if rubber.density is None else f"{rubber.density:.4g} kg/m³"
+        lines.append(f"region {name}: {rubber.name}, {rubber.model}, {density}")
+    lines += [
+        f"cords {ply.name}: {np.degrees(ply.angle):+.4g} deg, E {ply.youngs_modulus:.4g} Pa"
+        for ply in own.plies
+    ]
+    return lines
+
+
+def _guess(deck: Deck) -> tuple[Wishes, dict[str, str]]:
+    """Unit, faces and half section that the file suggests, and why, by key."""
+    guessed: dict[str, str] = {}
+    solids = [block for block in deck.blocks if block.kind.role == "solid"]
+    if not solids:
+        raise InputError(f"{deck.file}: no solid elements in it that are read: no tire")
+    points = deck.points[
+        np.unique(np.concatenate([deck.rows(b.nodes, b.place).ravel() for b in solids]))
+    ]
+    flat = deck.dimension == 2
+    radius = float(points[:, 0].max() if flat else np.abs(points).max())
+    fitting = [unit for unit, of in SYSTEMS.items() if RADII[0] <= radius * of.length <= RADII[1]]
+    unit = "mm" if "mm" in fitting else fitting[0] if fitting else "m"
+    guessed["length_unit"] = f"guessed: the largest radius is {radius:.5g} in the file's unit"
+    names = deck.face_names
+    plain = [name for name in names if "." not in name]
+    rim = tuple(dict.fromkeys(name for name, _ in deck.held))
+    if rim:
+        guessed["rim"] = "held by *RIGID BODY"
+    else:
+        rim = tuple(name for name in plain if _RIM.search(name.upper()))
+        guessed["rim"] = (
+            "guessed by name"
+            if rim
+            else "name what the wheel holds, of the sets and surfaces: " + ", ".join(plain[:12])
+        )
+    pressed = [name for name in dict.fromkeys(deck.pressed) if name in deck.surfaces]
+    inner = pressed[0] if pressed else _first(_INNER, plain)
+    guessed["inner"] = "under pressure in a step" if pressed else "guessed by name"
+    tread = _first(_TREAD, [name for name in plain if name != inner])
+    guessed["tread"] = "guessed by name"
+    y = points[:, 1] if flat else points[:, 2]
+    size = max(float(np.ptp(y)), 1e-300)
+    half = flat and (abs(y.min()) < 1e-6 * size or abs(y.max()) < 1e-6 * size)
+    if half:
+        guessed["mirror"] = "guessed: the section ends on z = 0"
+    wishes = Wishes(inner=inner, tread=tread, rim=rim, length_unit=unit, mirror=half)
+    return wishes, guessed
+
+
+def _first(pattern: re.Pattern[str], names: list[str]) -> str | None:
+    return next((name for name in names if pattern.search(name.upper())), None)
+
+
+def _readable(path: Path, wishes: Wishes, deck: Deck) -> tuple[OwnSection, Wishes]:
+    """The section, without the guessed names that are on no face of it."""
+    first = None
+    try:
+        own = read(path, wishes)
+        if len(wishes.rim) < 2:
+            return own, wishes
+    except InputError as error:
+        first = error
+    good = []
+    for name in wishes.rim:
+        try:
+            read(path, replace(wishes, rim=(name,), inner=None, tread=None))
+            good.append(name)
+        except InputError:
+            continue
+    if first is None:
+        return own, replace(wishes, rim=tuple(good))
+    faces: dict[str, str | None] = {}
+    for key, name in (("inner", wishes.inner), ("tread", wishes.tread)):
+        try:
+            alone = replace(wishes, rim=tuple(good), inner=None, tread=None)
+            inner = key == "inner"
+            read(path, replace(alone, inner=name) if inner else replace(alone, tread=name))
+            faces[key] = name
+        except InputError:
+            faces[key] = None
+    wishes = replace(wishes, rim=tuple(good), inner=faces["inner"], tread=faces["tread"])
+    if not good:
+        raise first
+    return read(path, wishes), wishes
+
+
+def _table(path: Path, wishes: Wishes, guessed: dict[str, str]) -> list[str]:
+    """The [tire] of a scene, with why each key has its value."""
+
+    def line(key: str, value: str) -> str:
+        reason = guessed.get(key, "")
+        return f"{key} = {value}".ljust(40) + (f" # {reason}" if reason else "")
+
+    rows = [
+        f'name = "{re.sub(r"[^A-Za-z0-9_-]", "-", path.stem) or "tire"}"',
+        "",
+        "[tire]",
+        'section = "file"',
+        f'file = "{path.resolve()}"',
+        line("length_unit", f'"{wishes.length_unit}"'),
+        line("rim", "[" + ", ".join(f'"{name}"' for name in wishes.rim) + "]"),
+    ]
+    for key in ("inner", "tread"):
+        name = getattr(wishes, key)
+        rows.append(
+            line(key, f'"{name}"') if name else f"# {key}: absent, found from the section's shape"
+        )
+    if wishes.mirror:
+        rows.append(line("mirror", "true"))
+    return rows
+
+
+def _run(steps: History, unit: str) -> list[str]:
+    """The other tables, as far as the deck's steps give figures for them."""
+    of = SYSTEMS[unit]
+    force = of.stress * of.length**2
+    rows = []
+    if steps.segments:
+        rows += [
+            f"# segments = {steps.segments}   # [tire]: of *SYMMETRIC MODEL GENERATION, which revolves by {steps.angle:g} degrees; "
+            "absent: as many as the program takes"
+        ]
+    given = steps.pressure is not None
+    pressure = steps.pressure * of.stress if steps.pressure is not None else _ORDINARY
+    rows += [
+        "[static]",
+        f"inflation = {pressure:.6g}".ljust(40)
+        + (" # Pa, of *DSLOAD" if given else " # Pa, not in the file"),
+    ]
+    if steps.load is not None:
+        rows.append(
+            f"load = {steps.load * force:.6g}".ljust(40)
+            + " # N, of *CLOAD (twice that, if the model is a half)"
+        )
+    if steps.speed is not None:
+        rows += [
+            "",
+            "[rotation]",
+            f"speed = {steps.speed:.6g}".ljust(40) + " # rad/s, of *TRANSPORT VELOCITY",
+        ]
+    rows += [
+        "",
+        "[modal]",
+        f"count = {steps.modes or 20}".ljust(40) + (" # of *FREQUENCY" if steps.modes else ""),
+    ]
+    if steps.friction is not None:
+        rows += [
+            "",
+            f"# *FRICTION of the deck: [static] friction or [contact] friction = {steps.friction:.4g}",
+        ]
+    return rows
+
+
+@styled
+def draw_fits(rubbers: list[Rubber]) -> Figure:
+    """Nominal stress over stretch: test data as points, the fitted laws as lines."""
+    figure, axes = canvas(WIDE, 3.0 * len(rubbers), rows=len(rubbers))
+    for (here,), rubber in zip(axes, rubbers, strict=True):
+        assert rubber.fit is not None
+        for colour, curve in zip(COLOURS, rubber.fit.curves, strict=False):
+            name = curve.test.split()[0].lower()
+            here.plot(curve.stretch, curve.stress, "o", ms=4, color=colour, label=f"{name}, data")
+            here.plot(curve.along, curve.fitted, color=colour, label=f"{name}, law")
+        here.set_xlabel("stretch")
+        here.set_ylabel("nominal stress, unit of the file")
+        here.set_title(
+            f"{rubber.name}: {rubber.fit.model}, {100 * rubber.fit.error:.2g} % off in stress"
+        )
+        here.legend(fontsize=8)
+    return figure
