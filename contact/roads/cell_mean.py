@@ -34,8 +34,10 @@ class CellMean:
 
     Along, the road is sampled every `spacing` at fixed positions, so that the result does not
     depend on how a run is divided; each sample counts by the part of its length within the
-    rectangle, and the result is linear between the positions of samples. Across, samples are means
-    of equal strips.
+    rectangle. Between the positions of samples the result is a cubic through four of them, with a
+    continuous slope (Catmull and Rom 1974): straight lines have steps in their slope, which all
+    points pass together and the time steps fold into the band (12 dB of the longitudinal force at
+    800 Hz). Across, samples are means of equal strips.
     """
 
     def __init__(self, road: Strip, y: Array, half: Array) -> None:
@@ -63,23 +65,22 @@ class CellMean:
     def height(self, x: Array, _: Array) -> Array:
         """Heights (n, c) m with the points at x (n, c) m; y is known."""
         share, (mean, _across), here = self._at(x)
-        near, far = mean[self._row, here], mean[self._row, here + 1]
-        return near + share * (far - near)
+        return sum(w * mean[self._row, here + k] for k, w in enumerate(_cubic(share), -1))
 
     def slope(self, x: Array, _: Array) -> Array:
         """Slopes (n, c, 2) along and across; that along is the derivative of `height`."""
         share, (mean, across), here = self._at(x)
-        along = (mean[self._row, here + 1] - mean[self._row, here]) / self._step
+        along = sum(w * mean[self._row, here + k] for k, w in enumerate(_steepness(share), -1))
         near, far = across[self._row, here], across[self._row, here + 1]
-        return np.stack([along, near + share * (far - near)], axis=-1)
+        return np.stack([along / self._step, near + share * (far - near)], axis=-1)
 
     def _at(self, x: Array) -> tuple[Array, Array, NDArray[np.intp]]:
         """For x (n, c) m: the part of the way between two positions, means and slopes across
         (2, r, ...) at the positions, and the first one's index (n, c)."""
         place = np.asarray(x) / self._step
         first = np.floor(place).astype(int)
-        begin = int(first.min(initial=0))
-        known = self._known(begin, int(first.max(initial=0)) + 2)
+        begin = int(first.min(initial=0)) - 1
+        known = self._known(begin, int(first.max(initial=0)) + 3)
         return place - first, known, first - self._begin
 
     def _known(self, begin: int, end: int) -> Array:
@@ -118,6 +119,26 @@ class CellMean:
             part = sample[:, :, :, k : k + end - begin]
             found += (self._weight[:, None, :, k, None] * part).sum(axis=0)
         return found
+
+
+def _cubic(t: Array) -> tuple[Array, ...]:
+    """Weights of the positions before, at, after and beyond, at a part t of the way from one to the next."""
+    return (
+        t * (t * (2 - t) - 1) / 2,
+        (t * t * (3 * t - 5) + 2) / 2,
+        t * (t * (4 - 3 * t) + 1) / 2,
+        t * t * (t - 1) / 2,
+    )
+
+
+def _steepness(t: Array) -> tuple[Array, ...]:
+    """Derivatives of those weights by t."""
+    return (
+        (t * (4 - 3 * t) - 1) / 2,
+        t * (9 * t - 10) / 2,
+        (t * (8 - 9 * t) + 1) / 2,
+        t * (3 * t - 2) / 2,
+    )
 
 
 def _parts(offset: Array, step: float, half: Array) -> Array:
