@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.fem.sections.inflated import InflatedRing, lowest
 from tireroad.fem.sections.radial import radial
 from tireroad.runs.validation.tables import Table
-from tireroad.tests.bench.series.inflated import InflatedRing, lowest
 
 ABOUT = "the built-in radial tire in many sizes: mass, inflated shape, first modes"
 SIZES = (
@@ -34,7 +34,7 @@ COLUMNS = [
     ("", ""),
 ]
 NOTE = (
-    "Inflated to 220 kPa and their first modes by Fourier series around (bench.series.inflated), rim held. "
+    "Inflated to 220 kPa and their first modes by Fourier series around (fem.sections.inflated), rim held. "
     "'moves': the largest displacement of inflation; width and radius are those of the inflated tire. "
     f"'stands': the lowest speed at which a wave of n around stands on the road, in the state at {TURNING:g} rad/s."
 )

@@ -38,7 +38,7 @@ REFERENCE = np.array([13.43, 21.40, 21.40, 35.22, 42.28, 42.28, 45.11, 45.11, 52
 def test_frequencies_of_the_belted_torus(tmp_path):
     """All within 0.6 % on the default elements (order 3, 14 along the arc, one a ply); 8 segments are as good as 30
     for n = 0, 1, 2, by wave number though no plane is a mirror. Fourier series around on refined sections find
-    13.434, 35.215; 21.390, 42.257; 45.049, 52.410 Hz (bench.series.harmonics), the reference but for 0.14 %."""
+    13.434, 35.215; 21.390, 42.257; 45.049, 52.410 Hz (bench.parts.harmonics), the reference but for 0.14 %."""
     path = tmp_path / "belted.toml"
     path.write_text(SCENE)
     tire = load(path, ["tire.segments=8", "tire.order=3"]).tire

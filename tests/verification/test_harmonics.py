@@ -5,7 +5,7 @@ import pytest
 
 from tireroad.fem.sections.grid import PlyLine
 from tireroad.runs.validation.cases import thesis_torus
-from tireroad.tests.bench.series.harmonics import Membrane, Rubber, frequencies
+from tireroad.tests.bench.parts.harmonics import Membrane, Rubber, frequencies
 
 HALF = np.radians(120)
 

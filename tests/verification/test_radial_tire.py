@@ -6,6 +6,7 @@ from mpi4py import MPI
 
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.matrices.road_stiffness import road_stiffness
+from tireroad.fem.sections.inflated import InflatedRing, lowest
 from tireroad.fem.sections.radial import radial
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.load_steps import Loader
@@ -13,7 +14,6 @@ from tireroad.modal.solver import undamped
 from tireroad.modal.solver.symmetry import Sites
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.stage import make_body
-from tireroad.tests.bench.series.inflated import InflatedRing, lowest
 
 PRESSURE = 2.2e5
 

@@ -12,7 +12,7 @@ from tireroad.runs.process import observe
 from tireroad.runs.validation.cases import thesis_torus
 from tireroad.runs.validation.tables import Table
 from tireroad.tests.bench.parts import converged_load
-from tireroad.tests.bench.series.harmonics import Rubber, lowest
+from tireroad.tests.bench.parts.harmonics import Rubber, lowest
 
 ABOUT = "element order, mesh, grading, near-incompressibility and mass on the clamped torus"
 YOUNGS_MODULUS, INFLATION = 48e6, 2e5  # Pa

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from tireroad.runs.scene.tables.tire import Region, Tire
 
 # Default (segments, elements along the arc) by order. Largest error of the 28 lowest frequencies of
-# the unloaded torus, E = 480 MPa, against Fourier series around (bench.series.harmonics): 28 x 16
+# the unloaded torus, E = 480 MPa, against Fourier series around (bench.parts.harmonics): 28 x 16
 # of order 3, 47,376 unknowns, 0.06 %, 0.23 % when graded for a road (30 x 14: 0.42 %); 100 x 16 of
 # order 2, 55,800 unknowns, 1.4 to 1.75 %, at the same CPU time as 24 x 14 of order 3.
 MESHES = {1: (160, 32), 2: (100, 16), 3: (28, 16)}

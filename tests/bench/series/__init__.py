@@ -1,1 +1,0 @@
-"""An independent method: Fourier series around, finite elements in the section, no dolfinx."""
