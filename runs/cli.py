@@ -53,6 +53,12 @@ SET_HELP = (
     " of the file that only other kinds have are dropped. May be repeated"
 )
 
+FIT = """\
+Fits compounds and carcass of the built-in tire of a size to the figures of a real one: mass, first modes and damping,
+loads at deflections, stiffness, footprint (docs/how-to/fit.md), from a TOML file or from a .tir with [STRUCTURAL].
+Writes a scene with that tire and prints the figures beside those reached.
+"""
+
 Arguments = Callable[[argparse.ArgumentParser], object]
 
 
@@ -101,6 +107,18 @@ def _export_options(command: argparse.ArgumentParser) -> None:
         "--uff",
         action="store_true",
         help="also frequency responses as Universal File 58: response.uff",
+    )
+    command.add_argument(
+        "--tir",
+        action="store_true",
+        help="also the tire's figures in the form of MF-Tyre/MF-Swift: tire.tir",
+    )
+
+
+def _fit_options(command: argparse.ArgumentParser) -> None:
+    command.add_argument("figures", type=Path, metavar="FIGURES", help=".toml or .tir")
+    command.add_argument(
+        "--out", type=_folder, metavar="DIR", help="for scene.toml; results/<FIGURES> by default"
     )
 
 
@@ -233,6 +251,11 @@ COMMANDS = {
         _check_options,
     ),
     "report": Command("write report.html of a result folder again", _directory),
+    "fit": Command(
+        "the built-in tire's free parameters from a tire's figures (.toml or .tir)",
+        _fit_options,
+        FIT,
+    ),
     "export": Command(
         "XDMF for ParaView and CSV for spreadsheets from a result folder", _export_options
     ),
@@ -431,11 +454,17 @@ def _report(args: argparse.Namespace) -> None:
     print(write_report(directory))
 
 
+def _fit(args: argparse.Namespace) -> None:
+    from tireroad.runs.fit.fit import command
+
+    print(command(args.figures, args.out or Path("results") / args.figures.stem))
+
+
 def _export(args: argparse.Namespace) -> None:
     directory = _results(args.directory)
     from tireroad.runs.files.export import export
 
-    for path in export(directory, uff=args.uff):
+    for path in export(directory, uff=args.uff, tir=args.tir):
         print(path)
 
 
@@ -509,6 +538,7 @@ ALONE: dict[str, Callable[[argparse.Namespace], None]] = {
     "check": _check,
     "report": _report,
     "export": _export,
+    "fit": _fit,
     "compare": _compare,
     "sweep": _sweep,
     "info": _info,

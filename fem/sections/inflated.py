@@ -18,8 +18,10 @@ The lowest Omega over all n is the critical speed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property, partial
+from typing import Any, Protocol
 
 import numpy as np
 from scipy import sparse
@@ -27,7 +29,7 @@ from scipy.sparse.linalg import eigsh, splu
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.sections import mesh2d
-from tireroad.fem.sections.construction import Construction, CordLine
+from tireroad.fem.sections.construction import CordLine
 from tireroad.fem.sections.mesh2d import SectionMesh
 
 STEPS = (0.02, 0.1, 0.3, 0.6, 1.0)  # shares of the inflation pressure
@@ -153,28 +155,58 @@ def dofs(nodes: np.ndarray) -> np.ndarray:
     return (3 * nodes[:, :, None] + np.arange(3)).reshape(len(nodes), -1)
 
 
+class Wall(Protocol):
+    """What a ring is made of, as a Construction."""
+
+    @property
+    def compounds(self) -> Mapping[str, Mapping[str, float]]:
+        """E, nu, density, dynamic over static modulus, loss factor by region."""
+
+    @property
+    def cords(self) -> Sequence[Any]:
+        """Cords on the plies of their names."""
+
+    def section(self, elements: int, order: int) -> SectionMesh:
+        """The section's mesh."""
+
+
+@dataclass(frozen=True)
+class RigidMode:
+    """A mode of the belt: `frequency` Hz, `damping` ratio, and the kg (kg m2 of rotations) that move with it."""
+
+    name: str
+    frequency: float
+    damping: float
+    inertia: float
+
+
 class InflatedRing:
     """A construction with `elements` from bead to bead, inflated to a pressure (Pa), turning at a speed (rad/s).
 
     Fields have components (r, theta, y) per node.
     """
 
-    def __init__(
-        self, tire: Construction, elements: int, order: int, pressure: float, speed: float = 0.0
-    ):
+    def __init__(self, tire: Wall, elements: int, order: int, pressure: float, speed: float = 0.0):
         self.section = mesh = tire.section(elements, order)
         self.pressure, self.speed = pressure, speed
         rubber = [tire.compounds[name] for name in mesh.regions]
         by_cell = {
             key: np.array([c[key] for c in rubber])[mesh.region]
-            for key in ("youngs_modulus", "poisson_ratio", "density", "dynamic")
+            for key in ("youngs_modulus", "poisson_ratio", "density", "dynamic", "loss_factor")
         }
+        self._loss = by_cell["loss_factor"]
         modulus, poisson = by_cell["youngs_modulus"], by_cell["poisson_ratio"]
         self._density, self._dynamic = by_cell["density"], by_cell["dynamic"]
         cellwise = (slice(None), None, None, None)
         self._parts = (
-            (Rule(mesh, order + 1), partial(_distortion, (modulus / 2 / (1 + poisson))[cellwise])),
-            (Rule(mesh, order), partial(_dilatation, (modulus / 3 / (1 - 2 * poisson))[cellwise])),
+            (
+                Rule(mesh, mesh.order + 1),
+                partial(_distortion, (modulus / 2 / (1 + poisson))[cellwise]),
+            ),
+            (
+                Rule(mesh, mesh.order),
+                partial(_dilatation, (modulus / 3 / (1 - 2 * poisson))[cellwise]),
+            ),
         )
         self._cords = [(line, mesh.plies[line.name]) for line in tire.cords]
         self._size = 3 * len(mesh.nodes)
@@ -203,6 +235,53 @@ class InflatedRing:
         """The `count` lowest frequencies (Hz) of a wave, rim held, dynamic moduli; pairs once."""
         squares = self._lowest(wave, count, self.mass)[0]
         return np.sqrt(np.sort(squares)) / (2 * np.pi)
+
+    def rigid_modes(self) -> list[RigidMode]:
+        """The four modes of the belt as a rigid ring on its sidewalls, rim held, dynamic moduli.
+
+        Of the lowest of wave numbers 0 and 1 those that have most of the ring's mass in its motion. The
+        damping ratio is half the loss factors weighted with the strain energy of the compounds; the
+        wall's own part alone, without tension and pressure, loses.
+        """
+        r, y = self.section.nodes.T
+        one, none = np.ones_like(r), np.zeros_like(r)
+        motions = {
+            "lateral": (0, np.stack([none, none, one], axis=-1)),
+            "windup": (0, np.stack([none, r, none], axis=-1)),
+            "vertical": (1, np.stack([one, 1j * one, none], axis=-1)),
+            "yaw": (1, np.stack([-y, -1j * y, r], axis=-1)),
+        }
+        found = []
+        for wave in (0, 1):
+            squares, fields = self._lowest(wave, 3, self.mass)
+            whole = np.zeros((self._size, fields.shape[1]), complex)
+            whole[self._free] = fields
+            heavy = self.mass @ whole
+            sizes = np.einsum("ik,ik->k", whole.conj(), heavy).real
+            for name, (own, motion) in motions.items():
+                if own != wave:
+                    continue
+                around = np.pi if wave else 2 * np.pi
+                parts = np.abs(motion.ravel().conj() @ heavy) ** 2 / sizes * around
+                k = int(parts.argmax())
+                lost = whole[:, k].conj() @ (self._losses(wave) @ whole[:, k])
+                ratio = float((lost / (squares[k] * sizes[k])).real / 2)
+                frequency = float(np.sqrt(squares[k]) / (2 * np.pi))
+                found.append(RigidMode(name, frequency, ratio, float(parts[k])))
+        return found
+
+    def _losses(self, wave: int) -> sparse.csr_matrix:
+        """Loss factor times the dynamic stiffness of the wall itself, at a wave number."""
+        out: sparse.spmatrix = sparse.csr_matrix((self._size, self._size), dtype=complex)
+        for rule, stress in self._parts:
+            F = _deformation(rule.gradient(0), self.displacement.ravel()[dofs(self.section.cells)])
+            A, G = _moduli(stress, F), rule.gradient(wave)
+            turning = np.einsum("ij,cqab->cqiajb", _UNIT, np.linalg.solve(F, stress(F)))
+            share = (self._loss * self._dynamic)[:, None, None, None]
+            A = share * (A - turning.reshape(A.shape))
+            blocks = np.einsum("cqhi,cqhk,cqkj,cq->cij", G.conj(), A, G, rule.volume, optimize=True)
+            out = out + self._assembled(self.section.cells, blocks)
+        return sparse.csr_matrix(out)
 
     def standing(self, wave: int) -> tuple[float, float]:
         """The lowest speed (rad/s) at which a wave stands on the road, and y (m) where it is largest."""

@@ -193,6 +193,7 @@ NAMES = {  # levels in third_octave/ whose names do not give the quantity
     "contact_level_error": "error of the contact force level",
 }
 MADE = {
+    "tire.tir",
     *(f"{name}.csv" for name in ("footprint", "modes", "contact_force", "spectra", "third_octave")),
     *(f"{name}.csv" for name in ("density", "response", "receptance", "vibration", "sound")),
     "response.uff",
@@ -203,10 +204,11 @@ MADE = {
 Columns = dict[str, NDArray]  # heading with unit -> values (n)
 
 
-def export(directory: Path, uff: bool = False) -> list[Path]:
+def export(directory: Path, uff: bool = False, tir: bool = False) -> list[Path]:
     """Write directory/export/*.csv and *.xdmf from the existing result files; returns the paths.
 
-    `uff`: also response.uff, frequency responses as Universal File 58.
+    `uff`: also response.uff, frequency responses as Universal File 58; `tir`: also tire.tir, the tire's
+    figures in the form of MF-Tyre/MF-Swift.
 
     XDMF files refer to the HDF5 results beside `export` and copy no data: do not move that folder.
     Every CSV column names its unit. Each file is written to a temporary name and renamed. Results
@@ -223,6 +225,12 @@ def export(directory: Path, uff: bool = False) -> list[Path]:
             files |= _read(directory / name, reader)
     if uff:
         files["response.uff"] = partial(Path.write_text, data=_universal(directory, others))
+    if tir:
+        from tireroad.runs.files.tir import written  # needs the tire, which no other export does
+
+        files["tire.tir"] = partial(
+            Path.write_text, data=written(directory, others), encoding="utf-8"
+        )
     if not files:
         raise InputError(
             f"{directory} holds nothing to export (none of {', '.join(READERS)}): "

@@ -1,0 +1,1 @@
+"""A built-in tire fitted to the figures of a real one."""

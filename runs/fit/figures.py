@@ -1,0 +1,254 @@
+"""The figures of a tire: mass, first modes, stiffness, footprint; from a TOML file or a .tir file, and as one.
+
+A .tir file is that of MF-Tyre/MF-Swift: sections in brackets, `KEY = value $ comment`, SI units. Of it
+belong here [DIMENSION], [OPERATING_CONDITIONS], [INERTIA], [VERTICAL], [STRUCTURAL] and [CONTACT_PATCH]. The footprint
+of a load F is there, with the vertical stiffness C and the unloaded radius R,
+
+    length = 2 R (Q_RA2 x + Q_RA1 sqrt(x)),  width = 2 w (Q_RB2 x + Q_RB1 x^(1/3)),  x = F / (C R)
+
+with the section's width w (Besselink, Schmeitz, Pacejka, Vehicle System Dynamics 48 S1, 2010).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from tireroad.fem.errors import InputError
+from tireroad.fem.sections.radial import radial, size
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A figure: unit, relative tolerance of a fit, range, key in a .tir file, and what it is."""
+
+    unit: str
+    tolerance: float
+    least: float
+    most: float
+    tir: str
+    doc: str
+
+
+KINDS: Mapping[str, Kind] = {
+    "mass": Kind("kg", 0.01, 1, 200, "MASS", "of the tire"),
+    "lateral_frequency": Kind("Hz", 0.02, 5, 500, "FREQ_LAT", "sidewise, rim held, no road"),
+    "yaw_frequency": Kind("Hz", 0.02, 5, 500, "FREQ_YAW", "yaw and tilt of the belt"),
+    "windup_frequency": Kind("Hz", 0.02, 5, 500, "FREQ_WINDUP", "belt against rim about the axle"),
+    "vertical_frequency": Kind("Hz", 0.02, 5, 500, "FREQ_LONG", "vertical and fore-aft"),
+    "lateral_damping": Kind("-", 0.2, 1e-4, 1, "DAMP_LAT", "damping ratio of these modes"),
+    "yaw_damping": Kind("-", 0.2, 1e-4, 1, "DAMP_YAW", "damping ratio"),
+    "windup_damping": Kind("-", 0.2, 1e-4, 1, "DAMP_WINDUP", "damping ratio"),
+    "vertical_damping": Kind("-", 0.2, 1e-4, 1, "DAMP_LONG", "damping ratio"),
+    "vertical_stiffness": Kind("N/m", 0.04, 1e4, 1e7, "VERTICAL_STIFFNESS", "slope at the load"),
+    "longitudinal_stiffness": Kind(
+        "N/m", 0.05, 1e4, 1e7, "LONGITUDINAL_STIFFNESS", "standing tire, at the load"
+    ),
+    "lateral_stiffness": Kind(
+        "N/m", 0.05, 1e4, 1e7, "LATERAL_STIFFNESS", "standing tire, at the load"
+    ),
+    "torsional_stiffness": Kind(
+        "N m/rad", 0.15, 100, 1e6, "YAW_STIFFNESS", "about the vertical axis, at the load"
+    ),
+    "footprint_length": Kind("m", 0.05, 0.01, 1, "", "at the load"),
+    "footprint_width": Kind("m", 0.05, 0.01, 1, "", "at the load"),
+}
+_LOADS = 0.03  # relative tolerance of the load at a deflection
+MODES = "lateral", "yaw", "windup", "vertical"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Figures:
+    """`size`, `inflation` Pa, the `load` N at which stiffness and footprint hold, `values` by KINDS, and
+    `loads`: pairs of deflection m and load N.
+    """
+
+    size: str
+    inflation: float
+    load: float
+    values: Mapping[str, float] = field(default_factory=dict)
+    loads: tuple[tuple[float, float], ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def pressed(self) -> bool:
+        """Whether there are figures of the tire on the road."""
+        modal = {"mass", *(f"{mode}_{what}" for mode in MODES for what in ("frequency", "damping"))}
+        return bool(self.loads or set(self.values) - modal)
+
+
+def read(path: Path) -> Figures:
+    """The figures in a file. Raises InputError with the key for what is no figure of a tire."""
+    try:
+        text = path.read_text(encoding="utf-8", errors="replace")
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}") from None
+    if path.suffix.lower() == ".tir":
+        return _from_tir(text, path)
+    if path.suffix.lower() != ".toml":
+        raise InputError(f"{path}: figures are read from .toml or .tir")
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path}: {error}") from None
+    return _from_table(table, path)
+
+
+def _from_table(table: dict, path: Path) -> Figures:
+    known = {"size", "inflation", "load", "loads", *KINDS}
+    wrong = sorted(set(table) - known)
+    if wrong:
+        raise InputError(f"{path}: unknown key {wrong[0]}; valid: {', '.join(sorted(known))}")
+    for key in ("size", "inflation"):
+        if key not in table:
+            raise InputError(f"{path}: {key} is missing, as in {key} = {_EXAMPLE[key]}")
+    if not isinstance(table["size"], str):
+        raise InputError(f"{path}: size must be a text, as in size = {_EXAMPLE['size']}")
+    values = {key: _checked(path, key, table[key]) for key in KINDS if key in table}
+    loads = []
+    for pair in table.get("loads", []):
+        if not (isinstance(pair, list) and len(pair) == 2):
+            raise InputError(f"{path}: loads is a list of pairs, [[deflection m, load N], ...]")
+        deflection = _number(path, "loads", pair[0], 1e-4, 0.5)
+        loads.append((deflection, _number(path, "loads", pair[1], 1, 1e6)))
+    return _complete(path, table["size"], table["inflation"], table.get("load"), values, loads, [])
+
+
+_EXAMPLE = {"size": '"205/55 R16"', "inflation": "2.4e5   # Pa"}
+
+
+def _number(
+    path: Path, key: str, value: object, least: float, most: float, unit: str = ""
+) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise InputError(f"{path}: {key} must be a number, not {str(value)[:40]!r}")
+    if not least <= value <= most:
+        raise InputError(f"{path}: {key} = {value:g} {unit} must be from {least:g} to {most:g}")
+    return float(value)
+
+
+def _checked(path: Path, key: str, value: object) -> float:
+    kind = KINDS[key]
+    return _number(path, key, value, kind.least, kind.most, kind.unit)
+
+
+def _complete(
+    path: Path, named: str, inflation: object, load: object, values: dict, loads: list, notes: list
+) -> Figures:
+    try:
+        radial(named)
+    except InputError as error:
+        raise InputError(f"{path}: {str(error).removeprefix('tire.')}") from None
+    pressure = _number(path, "inflation", inflation, 1e4, 2e6, "Pa")
+    if not values and not loads:
+        raise InputError(f"{path}: no figure to fit to; there are: {', '.join(KINDS)}, loads")
+    if load is None:
+        load = loads[-1][1] if loads else 4000.0
+        if set(values) & {
+            "vertical_stiffness",
+            "longitudinal_stiffness",
+            "lateral_stiffness",
+            "torsional_stiffness",
+        }:
+            notes.append(f"load = {load:g} N taken for the load at which stiffness holds")
+    return Figures(
+        size=named,
+        inflation=pressure,
+        load=_number(path, "load", load, 10, 1e6, "N"),
+        values=values,
+        loads=tuple(sorted(loads)),
+        notes=tuple(notes),
+    )
+
+
+_LINE = re.compile(r"^\s*([A-Za-z_]\w*)\s*=\s*('[^']*'|\"[^\"]*\"|[^$!]*)")
+
+
+def tir_values(text: str) -> dict[str, str]:
+    """Values as written by key in capitals; comments begin with $ or !."""
+    found: dict[str, str] = {}
+    for line in text.splitlines():
+        match = None if line.lstrip().startswith(("$", "!", "[", "{")) else _LINE.match(line)
+        if match:
+            found.setdefault(match[1].upper(), match[2].strip().strip("'\""))
+    return found
+
+
+def _from_tir(text: str, path: Path) -> Figures:
+    given = tir_values(text)
+    for key, unit in (
+        ("LENGTH", "meter"),
+        ("FORCE", "newton"),
+        ("MASS_UNIT", "kg"),
+        ("TIME", "second"),
+    ):
+        if given.get(key, unit).lower().rstrip("s") not in (unit, unit[:1], "metre", "m"):
+            raise InputError(
+                f"{path}: {key} = {given[key]}: files in SI units are read ({key} = '{unit}')"
+            )
+
+    def value(key: str) -> float | None:
+        try:
+            return float(given[key].replace("D", "e").replace("d", "e")) if key in given else None
+        except ValueError:
+            return None  # MASS is a unit, too
+
+    masses = re.findall(r"(?im)^\s*MASS\s*=\s*([-+.\d][\w.+-]*)", text)
+    notes = []
+    named, off = _size(path, value)
+    if abs(off) > 0.02:
+        notes.append(
+            f"size {named}: its radius is {100 * off:+.1f} % off the file's UNLOADED_RADIUS"
+        )
+    values: dict[str, float] = {}
+    for key, kind in KINDS.items():
+        found = (
+            float(masses[0]) if key == "mass" and masses else value(kind.tir) if kind.tir else None
+        )
+        if found is None or (found == 0 and key != "mass"):
+            continue
+        values[key] = _checked(path, key, found)
+    load, radius, stiffness = (
+        value("FNOMIN"),
+        value("UNLOADED_RADIUS"),
+        values.get("vertical_stiffness"),
+    )
+    if load and radius and stiffness:
+        x = load / (stiffness * radius)
+        q = [value(f"Q_R{which}") or 0.0 for which in ("A1", "A2", "B1", "B2")]
+        sizes = {
+            "footprint_length": 2 * radius * (q[1] * x + q[0] * math.sqrt(x)),
+            "footprint_width": 2 * (value("WIDTH") or 0.0) * (q[3] * x + q[2] * np.cbrt(x)),
+        }
+        values |= {key: _checked(path, key, float(one)) for key, one in sizes.items() if one > 0}
+    inflation = value("INFLPRES") or value("NOMPRES") or value("IP")
+    if inflation is None:
+        raise InputError(f"{path}: no INFLPRES or NOMPRES in it")
+    return _complete(path, named, inflation, load, values, [], notes)
+
+
+def _size(path: Path, value) -> tuple[str, float]:
+    """The nearest size of passenger tires, and how far its radius is off, relative."""
+    width, rim = value("WIDTH"), value("RIM_RADIUS")
+    radius, ratio = value("UNLOADED_RADIUS"), value("ASPECT_RATIO")
+    if not width or not rim:
+        raise InputError(f"{path}: no size: WIDTH and RIM_RADIUS of [DIMENSION] are needed")
+    if not ratio:
+        if not radius:
+            raise InputError(
+                f"{path}: no size: UNLOADED_RADIUS or ASPECT_RATIO of [DIMENSION] is needed"
+            )
+        ratio = (radius - rim) / width
+    across = 10 * round((1e3 * width - 5) / 10) + 5
+    named = f"{across}/{5 * round(20 * ratio)} R{round(2 * rim / 0.0254)}"
+    try:
+        made = size(named)
+    except InputError as error:
+        raise InputError(f"{path}: {str(error).removeprefix('tire.')}") from None
+    return named, (made.rim + made.height) / radius - 1 if radius else 0.0
