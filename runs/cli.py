@@ -118,6 +118,13 @@ def _export_options(command: argparse.ArgumentParser) -> None:
 def _fit_options(command: argparse.ArgumentParser) -> None:
     command.add_argument("figures", type=Path, metavar="FIGURES", help=".toml or .tir")
     command.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="key=value",
+        help="another value than the file's, as inflation=2.4e5. May be repeated",
+    )
+    command.add_argument(
         "--out", type=_folder, metavar="DIR", help="for scene.toml; results/<FIGURES> by default"
     )
 
@@ -457,7 +464,7 @@ def _report(args: argparse.Namespace) -> None:
 def _fit(args: argparse.Namespace) -> None:
     from tireroad.runs.fit.fit import command
 
-    print(command(args.figures, args.out or Path("results") / args.figures.stem))
+    print(command(args.figures, args.out or Path("results") / args.figures.stem, args.set))
 
 
 def _export(args: argparse.Namespace) -> None:

@@ -54,6 +54,9 @@ def read_header(file: Path) -> tuple[Blocks, int, int]:
             blocks.setdefault(name, [])
         elif name and not text.startswith("*"):
             blocks[name].append((number, text.split("!", 1)[0].strip()))
+    for _, text in blocks.get("ROAD_CRG_FILE", []):
+        if text:
+            raise InputError(f"{file}: has no road of its own and refers to {text}: give that file")
     raise InputError(
         f"{file}: no line of $$$$ that separates header and data within {len(head):,} bytes: "
         "this is not an OpenCRG file, or it is truncated"

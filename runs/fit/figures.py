@@ -14,9 +14,10 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -60,6 +61,7 @@ KINDS: Mapping[str, Kind] = {
     "footprint_width": Kind("m", 0.05, 0.01, 1, "", "at the load"),
 }
 _LOADS = 0.03  # relative tolerance of the load at a deflection
+ORDINARY = 2.2e5  # Pa, where a .tir file names no pressure
 MODES = "lateral", "yaw", "windup", "vertical"
 
 
@@ -83,24 +85,37 @@ class Figures:
         return bool(self.loads or set(self.values) - modal)
 
 
-def read(path: Path) -> Figures:
-    """The figures in a file. Raises InputError with the key for what is no figure of a tire."""
+def read(path: Path, changes: Sequence[str] = ()) -> Figures:
+    """The figures in a file, with `changes` as key=value. Raises InputError with the key for what is no figure."""
     try:
         text = path.read_text(encoding="utf-8", errors="replace")
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}") from None
+    notes: list[str] = []
     if path.suffix.lower() == ".tir":
-        return _from_tir(text, path)
-    if path.suffix.lower() != ".toml":
+        sized = any(change.partition("=")[0].strip() == "size" for change in changes)
+        table = _of_tir(text, path, notes, sized)
+    elif path.suffix.lower() == ".toml":
+        table = _parsed(text, path)
+    else:
         raise InputError(f"{path}: figures are read from .toml or .tir")
+    for change in changes:
+        key, equals, value = change.partition("=")
+        if not equals:
+            raise InputError(f"--set {change}: is key=value, as in inflation=2.4e5")
+        plain = value.strip() if key.strip() != "size" else f'"{value.strip()}"'
+        table |= _parsed(f"{key} = {plain}", Path(f"--set {change}"))
+    return _from_table(table, path, notes)
+
+
+def _parsed(text: str, path: Path) -> dict:
     try:
-        table = tomllib.loads(text)
+        return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path}: {error}") from None
-    return _from_table(table, path)
 
 
-def _from_table(table: dict, path: Path) -> Figures:
+def _from_table(table: dict, path: Path, notes: list[str]) -> Figures:
     known = {"size", "inflation", "load", "loads", *KINDS}
     wrong = sorted(set(table) - known)
     if wrong:
@@ -117,7 +132,25 @@ def _from_table(table: dict, path: Path) -> Figures:
             raise InputError(f"{path}: loads is a list of pairs, [[deflection m, load N], ...]")
         deflection = _number(path, "loads", pair[0], 1e-4, 0.5)
         loads.append((deflection, _number(path, "loads", pair[1], 1, 1e6)))
-    return _complete(path, table["size"], table["inflation"], table.get("load"), values, loads, [])
+    try:
+        radial(table["size"])
+    except InputError as error:
+        raise InputError(f"{path}: {str(error).removeprefix('tire.')}") from None
+    if not values and not loads:
+        raise InputError(f"{path}: no figure to fit to; there are: {', '.join(KINDS)}, loads")
+    load = table.get("load")
+    if load is None:
+        load = loads[-1][1] if loads else 4000.0
+        if any(name.endswith("stiffness") for name in values):
+            notes.append(f"load = {load:g} N taken for the load at which stiffness holds")
+    return Figures(
+        size=table["size"],
+        inflation=_number(path, "inflation", table["inflation"], 1e4, 2e6, "Pa"),
+        load=_number(path, "load", load, 10, 1e6, "N"),
+        values=values,
+        loads=tuple(sorted(loads)),
+        notes=tuple(notes),
+    )
 
 
 _EXAMPLE = {"size": '"205/55 R16"', "inflation": "2.4e5   # Pa"}
@@ -138,35 +171,6 @@ def _checked(path: Path, key: str, value: object) -> float:
     return _number(path, key, value, kind.least, kind.most, kind.unit)
 
 
-def _complete(
-    path: Path, named: str, inflation: object, load: object, values: dict, loads: list, notes: list
-) -> Figures:
-    try:
-        radial(named)
-    except InputError as error:
-        raise InputError(f"{path}: {str(error).removeprefix('tire.')}") from None
-    pressure = _number(path, "inflation", inflation, 1e4, 2e6, "Pa")
-    if not values and not loads:
-        raise InputError(f"{path}: no figure to fit to; there are: {', '.join(KINDS)}, loads")
-    if load is None:
-        load = loads[-1][1] if loads else 4000.0
-        if set(values) & {
-            "vertical_stiffness",
-            "longitudinal_stiffness",
-            "lateral_stiffness",
-            "torsional_stiffness",
-        }:
-            notes.append(f"load = {load:g} N taken for the load at which stiffness holds")
-    return Figures(
-        size=named,
-        inflation=pressure,
-        load=_number(path, "load", load, 10, 1e6, "N"),
-        values=values,
-        loads=tuple(sorted(loads)),
-        notes=tuple(notes),
-    )
-
-
 _LINE = re.compile(r"^\s*([A-Za-z_]\w*)\s*=\s*('[^']*'|\"[^\"]*\"|[^$!]*)")
 
 
@@ -180,7 +184,8 @@ def tir_values(text: str) -> dict[str, str]:
     return found
 
 
-def _from_tir(text: str, path: Path) -> Figures:
+def _of_tir(text: str, path: Path, notes: list[str], sized: bool) -> dict[str, Any]:
+    """The figures of a .tir file by the keys of a TOML file; `sized`: the size is given otherwise."""
     given = tir_values(text)
     for key, unit in (
         ("LENGTH", "meter"),
@@ -199,9 +204,8 @@ def _from_tir(text: str, path: Path) -> Figures:
         except ValueError:
             return None  # MASS is a unit, too
 
-    masses = re.findall(r"(?im)^\s*MASS\s*=\s*([-+.\d][\w.+-]*)", text)
-    notes = []
-    named, off = _size(path, value)
+    masses = re.findall(r"(?im)^\s*MASS\s*=\s*(\d+\.?\d*(?:e[-+]?\d+)?)\s*(?:[$!]|$)", text)
+    named, off = ("", 0.0) if sized else _size(path, value)
     if abs(off) > 0.02:
         notes.append(
             f"size {named}: its radius is {100 * off:+.1f} % off the file's UNLOADED_RADIUS"
@@ -227,18 +231,25 @@ def _from_tir(text: str, path: Path) -> Figures:
             "footprint_width": 2 * (value("WIDTH") or 0.0) * (q[3] * x + q[2] * np.cbrt(x)),
         }
         values |= {key: _checked(path, key, float(one)) for key, one in sizes.items() if one > 0}
-    inflation = value("INFLPRES") or value("NOMPRES") or value("IP")
-    if inflation is None:
-        raise InputError(f"{path}: no INFLPRES or NOMPRES in it")
-    return _complete(path, named, inflation, load, values, [], notes)
+    table = values | {"size": named, "load": load or 4000.0}
+    inflation = value("INFLPRES") or value("IP") or value("NOMPRES")
+    if inflation is not None:
+        return table | {"inflation": inflation}
+    notes.append(
+        f"no INFLPRES in the file: inflation = {ORDINARY:g} Pa taken (--set inflation=...)"
+    )
+    return table | {"inflation": ORDINARY}
 
 
-def _size(path: Path, value) -> tuple[str, float]:
+def _size(path: Path, value: Callable[[str], float | None]) -> tuple[str, float]:
     """The nearest size of passenger tires, and how far its radius is off, relative."""
     width, rim = value("WIDTH"), value("RIM_RADIUS")
     radius, ratio = value("UNLOADED_RADIUS"), value("ASPECT_RATIO")
     if not width or not rim:
-        raise InputError(f"{path}: no size: WIDTH and RIM_RADIUS of [DIMENSION] are needed")
+        raise InputError(
+            f'{path}: no size: WIDTH and RIM_RADIUS of [DIMENSION] are needed, or --set size="205/60 R15"'
+        )
+    ratio = ratio / 100 if ratio and ratio > 2 else ratio  # some write per cent
     if not ratio:
         if not radius:
             raise InputError(

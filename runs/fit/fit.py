@@ -385,9 +385,9 @@ def report(found: Fitted) -> str:
     return "\n".join(lines)
 
 
-def command(path: Path, out: Path) -> str:
+def command(path: Path, out: Path, changes: Sequence[str] = ()) -> str:
     """Fit the figures in a file; writes out/scene.toml. Returns what to print."""
-    figures = read(path)
+    figures = read(path, changes)
     try:
         found = fit(figures)
     except ConvergenceError as error:
@@ -412,8 +412,3 @@ def command(path: Path, out: Path) -> str:
     except OSError as error:
         raise InputError(f"{out / 'scene.toml'}: {error.strerror}") from None
     return f"{text}\n\na scene with this tire: {out / 'scene.toml'}"
-
-
-def names_of(parts: Sequence[Parameter] = PARAMETERS) -> str:
-    """The free parameters, for help."""
-    return ", ".join(one.name for one in parts)

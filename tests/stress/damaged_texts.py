@@ -44,6 +44,47 @@ time = "01:00:00"
 SCENE = "[tire]\n[static]\nload = 500.0\n[rotation]\nspeed = 50.0\n"
 
 
+FIGURES = b"""size = "205/55 R16"
+inflation = 2.4e5
+load = 5026.7
+mass = 8.1
+lateral_frequency = 42.4
+loads = [[0.0182, 3015.5], [0.0324, 6031.0]]
+"""
+DATA = b"""*HYPERELASTIC, OGDEN, N=2, TEST DATA INPUT
+*UNIAXIAL TEST DATA
+1.5E5, 0.1
+2.6E5, 0.2
+3.4E5, 0.3
+*BIAXIAL TEST DATA
+2.1E5, 0.1
+3.9E5, 0.2
+"""
+
+
+def _new_forms() -> Iterator[tuple[str, bytes, Callable[[Path], object]]]:
+    """Decks of parts, with test data, with steps; figures of tires."""
+    from torus_decks import RUBBER, Torus, plain
+
+    from tireroad.fem.decks.history import history
+    from tireroad.runs.fit.figures import read as read_figures
+    from tireroad.tests.fem.decks.test_instances import belted, parted
+    from tireroad.tests.runs.fit.test_fit import TIR
+    from tireroad.tests.runs.report.test_tire_file import REVOLVE
+
+    turned = "*INSTANCE, NAME=T-2, PART=TIRE\n\n0., 0., 0.\n0., 0., 0., 1., 0., 0., 180.\n*END INSTANCE\n"
+    parts = parted(belted(Torus(half=True, arcs=8)), more=turned).replace(
+        "*NODE, NSET=ALL", "*SYSTEM\n0., 0., 0., 1., 0., 0.\n*NODE, NSET=ALL", 1
+    )
+    wishes = Wishes(rim=("RIMNODES",))
+    yield "parts.inp", parts.encode(), lambda file: read(file, wishes)
+    tested = plain(Torus(arcs=6)).encode().replace(RUBBER.split("\n", 1)[1][:19].encode(), DATA, 1)
+    yield "tested.inp", tested, lambda file: read(file, wishes)
+    yield "steps.inp", REVOLVE.encode(), history
+    yield "figures.toml", FIGURES, read_figures
+    yield "figures.tir", TIR.encode(), read_figures
+
+
 def texts() -> Iterator[tuple[str, bytes, Callable[[Path], object]]]:
     """Name and content of a good file, and what reads it."""
     page = (ROOT / "docs" / "section-file.md").read_text(encoding="utf-8")
@@ -54,6 +95,7 @@ def texts() -> Iterator[tuple[str, bytes, Callable[[Path], object]]]:
     line = zip(0.04 * np.arange(400), 0.04 * rng.standard_normal(400).cumsum(), strict=True)
     heights = "\n".join(f"{x:.2f},{z:.4f}" for x, z in line)
     yield "laser.csv", heights.encode(), lambda file: LaserFile(file=str(file)).make()
+    yield from _new_forms()
     for name, data in DECKS.items():
         wishes = Wishes(rim=("RIMNODES",) if name.endswith("inp") else ())
         yield name, data, lambda file, wishes=wishes: read(file, wishes)

@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 MOST_HEIGHTS = 20_000_000  # of a widened profile: 160 MB, and four times that during its making
 ENDINGS = ".csv", ".txt", ".dat", ".asc", ".prn", ".tsv", ".xyz"
 _MANY = 100  # places of a file whose x may be rounded
+_FINEST = 5e-6  # m between heights; less is x in another unit
 _EVEN = 0.02  # of a step: tolerance of even positions
 
 
@@ -132,6 +133,11 @@ class LaserFile(Levelled):
             line = int(found.lines[np.flatnonzero(~np.isfinite(x))[0]])
             raise InputError(f"{source}, line {line}: x is missing")
         pitch = (x[-1] - x[0]) / (len(x) - 1)
+        if self.length_unit == "mm" and 0 < pitch < _FINEST <= 1e3 * pitch:
+            raise InputError(
+                f"{source}: heights every {1e6 * pitch:.3g} um, {x[-1] - x[0]:.3g} m long, where x is read in mm: is it in m? "
+                'Then road.length_unit = "m"'
+            )
         off = np.abs(x - x[0] - pitch * np.arange(len(x)))
         # Both ends are rounded, too. Few places tell no rounding from uneven steps.
         rounded = 2.1 * found.rounding * UNITS[self.length_unit] if len(x) >= _MANY else 0.0

@@ -269,3 +269,11 @@ def test_belgian_block_truncated(tmp_path: Path, share: float) -> None:
     (tmp_path / "cut.crg").write_bytes(data[: int(share * len(data))])
     with pytest.raises(InputError, match=r"cut\.crg"):
         read_opencrg(tmp_path / "cut.crg")
+
+
+def test_a_file_that_refers_to_another(tmp_path):
+    """$ROAD_CRG_FILE without a road of its own: the file it names is what can be read."""
+    text = "$CT\nreference\n$ROAD_CRG_FILE   ! reference\n  ../roads/other.crg  ! path\n$ROAD_CRG_OPTS\n"
+    (tmp_path / "road.crg").write_text(text)
+    with pytest.raises(InputError, match=r"refers to ../roads/other.crg: give that file"):
+        read_opencrg(tmp_path / "road.crg")

@@ -151,6 +151,12 @@ def test_a_tir_file(tmp_path: Path) -> None:
     length = 2 * 0.3135 * (0.733 * x + 0.671 * np.sqrt(x))
     assert found.values["footprint_length"] == pytest.approx(length)
     assert found.pressed and "footprint_width" not in found.values
+    other = read(tmp_path / "tire.tir", ["inflation=2.6e5", "size=215/60 R15"])
+    assert (other.size, other.inflation) == ("215/60 R15", 2.6e5)
+    (tmp_path / "tire.tir").write_text(TIR.replace("INFLPRES", "PRESSURE"))
+    assert any("no INFLPRES" in note for note in read(tmp_path / "tire.tir").notes)
+    with pytest.raises(InputError, match="is key=value"):
+        read(tmp_path / "tire.tir", ["inflation"])
 
 
 @pytest.mark.parametrize(
@@ -182,7 +188,6 @@ def test_refused(tmp_path: Path, text: str, words: str) -> None:
     [
         ("'meter'", "'mm'", "files in SI units"),
         ("WIDTH ", "WIDE ", "no size"),
-        ("INFLPRES", "PRESSURE", "no INFLPRES"),
         (
             "RIM_RADIUS               = 0.1905",
             "RIM_RADIUS               = 0.05",
