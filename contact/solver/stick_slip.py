@@ -64,44 +64,30 @@ Plane = NDArray[np.complex128]
 NEWTON_STEPS = 30
 GRADIENT_STEPS = 5000
 SLIDING_TOLERANCE = 1e-10  # of the largest bound, or of the largest force where nothing is bounded
-INNER = 1e-3  # residual reduction in a Newton step; the slipping points are not known any better
+INNER = 1e-2  # residual reduction in a Newton step; the slipping points are not known any better
 
 
-class Stiffness:
-    """B = W A W^T + diag(spring), plus S of the `tread`, between the points.
+class Carcass:
+    """W A W^T between points: `matrix` A (2n, 2n) m/N, x and y of each node adjacent.
 
-    `matrix` A (2n, 2n) m/N, x and y of each node adjacent; `weights` W (a, n) from nodes to points,
-    None where they are the same; `spring` (a,) m/N. Forces and displacements in the plane are
-    complex, x + iy.
+    `weights` W (a, n) from nodes to points, None where they are the same. `own` (a,) m/N: compliance of
+    each point, the mean of both directions.
     """
 
-    def __init__(
-        self,
-        matrix: Array,
-        weights: Array | None = None,
-        spring: Array | float = 0.0,
-        tread: Between | None = None,
-    ) -> None:
-        self._matrix, self._weights, self._tread = matrix, weights, tread
-        # Own compliance of each point (a,), the mean of both directions.
+    def __init__(self, matrix: Array, weights: sparse.csr_matrix | None = None) -> None:
+        self._matrix, self._weights = matrix, weights
         if weights is None:
-            own = matrix.diagonal().reshape(-1, 2).mean(axis=1)
-        else:
-            mean = 0.5 * (matrix[::2, ::2] + matrix[1::2, 1::2])
-            own = (weights @ mean * weights).sum(axis=1)
-        self._spring = np.broadcast_to(np.asarray(spring, dtype=float), own.shape)
-        self.inverse = 1.0 / (own + self._spring + (tread.own if tread else 0.0))
+            self.own = matrix.diagonal().reshape(-1, 2).mean(axis=1)
+            return
+        self._down = weights.T.tocsr()
+        mean = 0.5 * (matrix[::2, ::2] + matrix[1::2, 1::2])
+        self.own = np.asarray(weights.multiply(weights @ mean).sum(axis=1)).ravel()
 
     def __call__(self, force: Plane) -> Plane:
-        """B t (a,) m for t (a,) N."""
-        moved = self._carcass(force) + self._spring * force
-        return moved + self._tread.apply(force) if self._tread else moved
-
-    def _carcass(self, force: Plane) -> Plane:
-        """W A W^T t."""
+        """Displacements (a,) m of forces (a,) N."""
         if self._weights is None:
             return (self._matrix @ force.view(float)).view(complex)
-        nodal = self._weights.T @ force.view(float).reshape(-1, 2)
+        nodal = self._down @ force.view(float).reshape(-1, 2)
         moved = self._weights @ (self._matrix @ nodal.ravel()).reshape(-1, 2)
         return moved.view(complex)[:, 0]
 
@@ -109,8 +95,32 @@ class Stiffness:
         """An upper bound of the largest singular value, m/N."""
         largest = float(np.linalg.norm(self._matrix, 2))
         if self._weights is not None:
-            largest *= float(np.linalg.norm(self._weights, 2)) ** 2
-        return largest + float(self._spring.max()) + (self._tread.bound if self._tread else 0.0)
+            largest *= float(np.linalg.norm(self._weights.toarray(), 2)) ** 2
+        return largest
+
+
+class Stiffness:
+    """B = W A W^T + diag(spring), plus S of the `tread`, between the points.
+
+    `spring` (a,) m/N. Forces and displacements in the plane are complex, x + iy.
+    """
+
+    def __init__(
+        self, carcass: Carcass, spring: Array | float = 0.0, tread: Between | None = None
+    ) -> None:
+        self._carcass, self._tread = carcass, tread
+        self._spring = np.broadcast_to(np.asarray(spring, dtype=float), carcass.own.shape)
+        self.inverse = 1.0 / (carcass.own + self._spring + (tread.own if tread else 0.0))
+
+    def __call__(self, force: Plane) -> Plane:
+        """B t (a,) m for t (a,) N."""
+        moved = self._carcass(force) + self._spring * force
+        return moved + self._tread.apply(force) if self._tread else moved
+
+    def norm(self) -> float:
+        """An upper bound of the largest singular value, m/N."""
+        largest = self._carcass.norm() + float(self._spring.max())
+        return largest + (self._tread.bound if self._tread else 0.0)
 
 
 def stick_slip(
@@ -191,11 +201,12 @@ def _small(residual: Plane, force: Plane, bound: Array, within: float = SLIDING_
 
 
 TURNS = 100
+MIXED = 4  # results from which the next one is extrapolated
 PATIENCE = 10  # turns after which a point that still comes and goes is lifted off by its bristle
-TOLERANCE = 1e-8  # change in an iteration, relative to the largest normal force
+TOLERANCE = 1e-6  # change in an iteration, relative to the largest normal force
 # Accuracy of stick and slip in the first iteration, in later ones relative to the last change, and
 # the finest.
-ROUGHLY, CLOSER, EXACTLY = 1e-5, 1e-3, 1e-10
+ROUGHLY, CLOSER, EXACTLY = 1e-5, 1e-1, 1e-10
 
 
 class Friction:
@@ -259,6 +270,7 @@ class Friction:
         share, past = self._brush.offer()
         horizontal = 2.0 * self.horizontal - self._before  # linear extrapolation saves an iteration
         within, lifts = ROUGHLY, _Lifting(self._brush.law.friction is None)
+        mixing = _Mixing()
         for self.turns in range(1, TURNS + 1):
             force = normal.solve(q + self._lift(horizontal), guess, reference=static)
             guess = None
@@ -266,14 +278,14 @@ class Friction:
             bearing = lifts.bearing(force, self.turns)
             new = self._stick_slip(bearing, moved, (share, past), horizontal, within)
             change, largest = np.abs(new - horizontal).max(), force.max(initial=0.0)
-            horizontal = new
+            found, horizontal = new, mixing.next(horizontal, new)
             # A guess within a coarse tolerance changes nothing; only an accurate solution proves
             # convergence.
             close = within <= 0.1 * TOLERANCE
             within = max(min(within, CLOSER * change / max(largest, 1e-300)), EXACTLY)
             if close and change <= TOLERANCE * largest:
-                self._finish(force, moved, horizontal)
-                return force, horizontal
+                self._finish(force, moved, found)
+                return force, found
         raise self._unsolved()
 
     def _unsolved(self) -> ConvergenceError:
@@ -329,8 +341,8 @@ class Friction:
         if len(index) == 0:
             return out
         springs = np.broadcast_to(law.stiffness, share.shape)[index] * share[index]
-        matrix, weights, tread = self._between(index)
-        stiffness = Stiffness(matrix, weights, 1.0 / springs, tread)
+        carcass, tread = self._between(index)
+        stiffness = Stiffness(carcass, 1.0 / springs, tread)
         constant = moved[index] + past[index] / share[index, None]
         bound = np.full(len(index), np.inf)
         if law.friction is not None:
@@ -338,17 +350,45 @@ class Friction:
         out[index] = stick_slip(stiffness, constant, bound, guess[index], within)
         return out
 
-    def _between(self, index: NDArray[np.intp]) -> tuple[Array, Array | None, Between | None]:
-        """A_hh between the nodes that carry the points, their weights, and the tread's part."""
+    def _between(self, index: NDArray[np.intp]) -> tuple[Carcass, Between | None]:
+        """The parts of B between the points: of the nodes that carry them, and of the tread."""
         key = index.tobytes()
         if key != self._key:
             own, p = self._w[index], self._w.shape[1]
             nodes = np.unique(own.indices)
             both = np.stack([nodes, nodes + p], axis=-1).ravel()
-            own = None if self._nodal else own[:, nodes].toarray()
+            carcass = Carcass(self._hh.between(both, both), None if self._nodal else own[:, nodes])
             tread = None if self._shear is None else self._shear.between(index)
-            self._carried, self._key = (self._hh.between(both, both), own, tread), key
+            self._carried, self._key = (carcass, tread), key
         return self._carried
+
+
+class _Mixing:
+    """Anderson's acceleration of x = G(x) (J. ACM 12 (1965) 547): the next x from the last few.
+
+    The combination of the last results whose residuals G(x) - x cancel best. It starts anew where a residual has
+    grown, as when points come and go.
+    """
+
+    def __init__(self) -> None:
+        self._results: list[Array] = []
+        self._residuals: list[Array] = []
+
+    def next(self, given: Array, result: Array) -> Array:
+        """The next x, from `given` x and `result` G(x)."""
+        residual = result - given
+        if self._residuals and np.abs(residual).max() > np.abs(self._residuals[-1]).max():
+            self._results, self._residuals = [], []
+        self._results, self._residuals = (
+            [*held, new][-MIXED:]
+            for held, new in ((self._results, result), (self._residuals, residual))
+        )
+        if len(self._residuals) < 2:
+            return result
+        apart = np.array([(residual - other).ravel() for other in self._residuals[:-1]])
+        shares = np.linalg.lstsq(apart.T, residual.ravel(), rcond=1e-10)[0]
+        steps = (result - other for other in self._results[:-1])
+        return result - sum(share * step for share, step in zip(shares, steps, strict=True))
 
 
 class _Lifting:

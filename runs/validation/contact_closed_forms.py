@@ -44,7 +44,7 @@ from tireroad.contact.roads.kinds.shapes import Flat
 from tireroad.contact.roads.under_tire import RoadUnderTire
 from tireroad.contact.setup import ContactSetup, Rolled
 from tireroad.contact.solver.active_set import ActiveSet
-from tireroad.contact.solver.stick_slip import Friction, Stiffness, stick_slip
+from tireroad.contact.solver.stick_slip import Carcass, Friction, Stiffness, stick_slip
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import (
     Influence,
@@ -164,7 +164,7 @@ def _cattaneo_mindlin() -> Iterator[tuple]:
     half = np.float64(pitch / 2)
     potential = rectangle_potential(x[:, None] - x, y[:, None] - y, half, half)
     both = np.kron(potential / (2 * np.pi * pitch**2), np.eye(2))
-    matrix = Stiffness(np.asarray(both, dtype=float))
+    matrix = Stiffness(Carcass(np.asarray(both, dtype=float)))
     total = normal.sum()
     for share in (0.3, 0.7):
         shift = 3 * friction * total / 8 * (1 - (1 - share) ** (2 / 3))
@@ -316,7 +316,7 @@ def pushed(nu: float, cells: int) -> Iterator[tuple]:
     normal = np.sqrt(1 - disc.x**2 - disc.y**2) * disc.pitch**2
     total, count = float(normal.sum()), len(normal)
     tread = disc.shear(nu).between(np.arange(count))
-    stiffness = Stiffness(np.zeros((2 * count, 2 * count)), tread=tread)
+    stiffness = Stiffness(Carcass(np.zeros((2 * count, 2 * count))), tread=tread)
     for share in (0.3, 0.7):
         shift = 3 * SHEAR_FRICTION * total * (2 - nu) / 16 * (1 - (1 - share) ** (2 / 3))
         moved = np.tile([-shift, 0.0], (count, 1))

@@ -10,7 +10,7 @@ from tireroad.contact.loop import Drive, Loop, roll
 from tireroad.contact.roads.kinds.shapes import Flat
 from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.solver.projected_cg import MatrixCompliance, ProjectedCG
-from tireroad.contact.solver.stick_slip import Friction, Stiffness, stick_slip
+from tireroad.contact.solver.stick_slip import Carcass, Friction, Stiffness, stick_slip
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import half_space_compliance, rectangle_potential
 from tireroad.fem.errors import ConvergenceError
@@ -147,8 +147,10 @@ def test_answer_is_the_same_from_any_start() -> None:
     factor = rng.standard_normal((2 * a, 2 * a))
     matrix = factor @ factor.T / a + 0.2 * np.eye(2 * a)
     constant, bound = rng.standard_normal((a, 2)), rng.random(a)
-    first = stick_slip(Stiffness(matrix), constant, bound, np.zeros((a, 2)))
-    second = stick_slip(Stiffness(matrix), constant, bound, 10 * rng.standard_normal((a, 2)))
+    first = stick_slip(Stiffness(Carcass(matrix)), constant, bound, np.zeros((a, 2)))
+    second = stick_slip(
+        Stiffness(Carcass(matrix)), constant, bound, 10 * rng.standard_normal((a, 2))
+    )
     assert np.allclose(first, second, atol=1e-8)
     rate = (matrix @ first.ravel()).reshape(-1, 2) + constant
     slips = np.linalg.norm(first, axis=1) > bound * (1 - 1e-9)
@@ -176,7 +178,9 @@ def test_cattaneo_mindlin() -> None:
     for share in (0.3, 0.7):
         shift = 3 * friction * total / (8 * radius * shear) * (1 - (1 - share) ** (2 / 3))
         constant = np.tile([-shift, 0.0], (len(x), 1))
-        force = stick_slip(Stiffness(matrix), constant, friction * normal, np.zeros((len(x), 2)))
+        force = stick_slip(
+            Stiffness(Carcass(matrix)), constant, friction * normal, np.zeros((len(x), 2))
+        )
         assert force[:, 0].sum() == pytest.approx(share * friction * total, rel=0.01)
         sticks = np.linalg.norm(force, axis=1) < friction * normal * (1 - 1e-6)
         stick_radius = np.sqrt(sticks.sum() * pitch**2 / np.pi)

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy import sparse
 
-from tireroad.contact.solver.stick_slip import Stiffness, gmres, stick_slip
+from tireroad.contact.solver.stick_slip import Carcass, Stiffness, gmres, stick_slip
 
 
 @pytest.mark.parametrize("skew", [0.0, 1.0, 30.0])
@@ -42,7 +43,7 @@ def case(rng: np.random.Generator, points: int, nodes: int):
     weights /= weights.sum(axis=1, keepdims=True)
     lift = np.kron(weights, np.eye(2))
     dense = lift @ matrix @ lift.T + np.diag(np.repeat(spring, 2))
-    return Stiffness(matrix, weights, spring), Stiffness(dense)
+    return Stiffness(Carcass(matrix, sparse.csr_matrix(weights)), spring), Stiffness(Carcass(dense))
 
 
 def test_stiffness_through_nodes_is_the_matrix() -> None:
