@@ -306,6 +306,7 @@ class Summary:
         headline: dict[str, tuple[Any, str]] | None = None,
         indicators: dict[str, tuple[Any, str]] | None = None,
         warnings: list[str] | None = None,
+        notes: list[str] | None = None,
         cost: dict[str, float] | None = None,
     ) -> None:
         """Enter a stage and write the file. Figures are given as name: (value, unit).
@@ -325,6 +326,7 @@ class Summary:
             "headline": _figures(headline) or kept.get("headline", {}),
             "indicators": _figures(indicators) or kept.get("indicators", {}),
             "warnings": warnings or kept.get("warnings", []),
+            **({"notes": said} if (said := notes or kept.get("notes", [])) else {}),
             "cost": cost or kept.get("cost", {}),
         }
         self._write()

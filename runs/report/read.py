@@ -93,6 +93,7 @@ class Section:
     sounds: list[tuple[str, str]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    listing: tuple[str, str] | None = None  # a title, and lines that are shown on request
 
     def show(self, image: str, caption: str, live: dict | None = None) -> None:
         """Add a picture."""

@@ -64,11 +64,12 @@ Figures = dict[str, tuple[Any, str]]
 
 @dataclass
 class Record:
-    """The record of a stage: figures as name: (value, unit), seconds by part."""
+    """The record of a stage: figures as name: (value, unit), seconds by part, notes for the summary."""
 
     headline: Figures = field(default_factory=dict)
     indicators: Figures = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
     cost: Timing = field(default_factory=Timing)
 
     def line(self) -> str:

@@ -225,6 +225,7 @@ class StaticStage(Computed[StaticState]):
                 state = _estimate(record, state, loader)
         _describe(record, state, loader)
         record.headline |= friction_headline(state, self.job.scene.static.friction)
+        record.notes += self._from_file()
         self._warn_at_rest(record)
         observe.say(f"  {record.shares}")
         return state
@@ -293,6 +294,13 @@ class StaticStage(Computed[StaticState]):
     def write(self, file, product: StaticState) -> None:
         """Mesh, displacement, outer face and footprint."""
         fill(file, product, self.job.tire)
+        if taken := self._from_file():
+            file.attrs["from_file"] = "\n".join(taken)
+
+    def _from_file(self) -> list[str]:
+        """What the tire's file gives to the run and what of it is not used, as `check` prints it."""
+        tire = self.job.scene.tire
+        return tire.shape.described(tire)
 
     def read(self, file) -> StaticState:
         """The state, with what it was computed for."""

@@ -73,6 +73,9 @@ def static(results: Results) -> Section:
         pace = quantity(3.6 * speed * radius, "km/h")
         section.facts.append(("travelling speed", pace))
     section.facts += friction(results)
+    taken = results.attribute(name, "from_file")
+    if taken:
+        section.listing = "What the run takes from the tire's file, and what not", str(taken)
     points, quads = results.array(name, "surface/points"), results.array(name, "surface/quads")
     moved, road = (
         results.array(name, "surface/displacement"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
 
@@ -114,3 +115,25 @@ def test_cords_and_gmsh(tmp_path: Path) -> None:
     assert "cords BELT: -20 deg" in describe_tire(tmp_path / "belted.inp", tmp_path)
     told = describe_tire(DECKS / "meshes" / "quad_4.1_0.msh", tmp_path)
     assert 'length_unit = "m"' in told and "region" in told
+
+
+def test_a_run_says_what_it_takes_of_the_file(tmp_path: Path) -> None:
+    """In summary.json, static.h5 and the report, as check prints it; also where the stage is reused."""
+    (tmp_path / "deck.inp").write_text(
+        plain(Torus(arcs=8, wall=1)) + STEPS.split("*STEP")[0] + "*PREPRINT\n"
+    )
+    (tmp_path / "scene.toml").write_text(
+        '[tire]\nsection = "file"\nfile = "deck.inp"\nrim = ["RIMNODES"]\nsegments = 8\n'
+        "[static]\ninflation = 2e4\nerror_estimate = false\n"
+    )
+    out = tmp_path / "out"
+    for _ in range(2):
+        assert (
+            main(["run", str(tmp_path / "scene.toml"), "--out", str(out), "--until", "static"]) == 0
+        )
+        notes = json.loads((out / "summary.json").read_text())["stages"]["static"]["notes"]
+        assert any("region WALL" in line for line in notes)
+        assert any("*PREPRINT: not used" in line for line in notes)
+    assert main(["report", str(out)]) == 0
+    page = (out / "report.html").read_text()
+    assert "What the run takes" in page and "*PREPRINT: not used" in page
