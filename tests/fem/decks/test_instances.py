@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from ring_decks import solids
 from torus_decks import BELT, CORDS, RUBBER, Torus, membranes, plain
 
 from tireroad.fem.errors import InputError
@@ -184,3 +185,21 @@ def test_combined_surfaces(own):
         assert len(own(text, inner=name, tread="OUTSIDE").mesh.inner) == len(by_nodes)
     with pytest.raises(InputError, match="no surface MIDLE; did you mean MIDDLE"):
         own(text + "*SURFACE, NAME=X, COMBINE=UNION\nMIDLE\n", **FACES)
+
+
+@pytest.mark.parametrize(
+    ("position", "axle"),
+    [
+        ("", "y"),
+        ("0., 0., 0.\n0., 0., 0., 0., 0., 1., 90.\n", "x"),
+        ("0., 0., 0.\n0., 0., 0., 1., 0., 0., 90.\n", "z"),
+    ],
+)
+def test_a_body_that_is_turned(own, position, axle):
+    """The axle turns with the instance; the section stays."""
+    text = solids(Torus(False, arcs=8, wall=1), np.linspace(0, 2 * np.pi, 9)[:-1])
+    found = own(parted(text, position))
+    assert f"about {axle}:" in found.used[-1]
+    np.testing.assert_allclose(
+        np.sort(found.mesh.nodes[:, 0]), np.sort(own(text).mesh.nodes[:, 0]), atol=1e-12
+    )
