@@ -194,6 +194,7 @@ NAMES = {  # levels in third_octave/ whose names do not give the quantity
 }
 MADE = {
     "tire.tir",
+    *(f"{name}.csv" for name in ("stiffness", "stiffness_longitudinal", "stiffness_lateral")),
     *(f"{name}.csv" for name in ("footprint", "modes", "contact_force", "spectra", "third_octave")),
     *(f"{name}.csv" for name in ("density", "response", "receptance", "vibration", "sound")),
     "response.uff",
@@ -314,6 +315,24 @@ def static(file: h5py.File) -> dict[str, Callable[[Path], object]]:
     points, force = file["contact/points"][()], file["contact/force"][()]
     columns = _components("position", points, "m") | _components("force", force, "N")
     return _table("footprint.csv", columns) | files
+
+
+def stiffness(file: h5py.File) -> dict[str, Callable[[Path], object]]:
+    """stiffness.csv: load, footprint and rolling radius over deflection; slides, of a run with friction."""
+    curve = file["curve"]
+    columns = {
+        f"{name.replace('_', ' ')} [{curve[name].attrs['unit']}]": curve[name][()] for name in curve
+    }
+    files = _table(
+        "stiffness.csv", dict(sorted(columns.items(), key=lambda one: "deflection" not in one[0]))
+    )
+    for axis in file.get("slide", {}):
+        parts = file[f"slide/{axis}"]
+        columns = {
+            f"{name} [{part.attrs['unit']}]": part[()] for name, part in parts.items() if part.shape
+        }
+        files |= _table(f"stiffness_{axis}.csv", columns)
+    return files
 
 
 def contact(file: h5py.File) -> dict[str, Callable[[Path], object]]:
@@ -449,6 +468,7 @@ def _page(page: Page | None) -> dict[str, Callable[[Path], object]]:
 
 READERS: dict[str, Callable[[h5py.File], dict[str, Callable[[Path], object]]]] = {
     "static.h5": static,
+    "stiffness.h5": stiffness,
     "modes.h5": modes,
     "contact.h5": contact,
     "spectra.h5": spectra,

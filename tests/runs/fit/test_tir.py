@@ -34,6 +34,8 @@ def test_there_and_back(tmp_path: Path) -> None:
     )
     assert main(["export", str(out), "--tir"]) == 0
     path = out / "export" / "tire.tir"
+    heads = (out / "export" / "stiffness.csv").read_text().splitlines()
+    assert heads[0].startswith('"deflection [m]"') and "load [N]" in heads[0] and len(heads) == 6
     found, values = read(path), tir_values(path.read_text())
     with h5py.File(out / "stiffness.h5") as file:
         for name in ("vertical", "longitudinal", "lateral", "torsional"):
