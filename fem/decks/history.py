@@ -38,7 +38,7 @@ def history(path: Path) -> History:
         if isinstance(item, Card):
             _take(found, card, lines)
             card, lines = item, []
-            found.has_mesh |= item.keyword in ("NODE", "ELEMENT")
+            found.has_mesh |= item.keyword in ("ELEMENT", "ELGEN")
         elif card is not None and card.keyword in _TAKEN:
             lines.append(item)
     _take(found, card, lines)

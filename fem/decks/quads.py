@@ -433,6 +433,12 @@ def faces(
         notes.append(
             f"inner face: guessed, the {len(inner)} sides between the rims that look at the axle"
         )
+    else:
+        inner, more = _closed(quads, inner, rim, lines[1:])
+        if more:
+            notes.append(
+                f"inner face: goes on along {more} sides of the bead's base to the rim, which the file leaves without pressure"
+            )
     if tread is None:
         tread = outer
         notes.append(f"tread: not named, the whole outer face of {len(outer)} sides")
@@ -440,6 +446,37 @@ def faces(
     if quads.points[order[0], 1] > quads.points[order[-1], 1]:
         outer = outer[::-1]
     return Faces(outer, tread, inner, rim, tuple(notes))
+
+
+_BASE = 0.15  # of the inner face's length: a longer gap between it and the rim is an error
+
+
+def _closed(
+    quads: Quads, inner: np.ndarray, rim: np.ndarray, lines: list[np.ndarray]
+) -> tuple[np.ndarray, int]:
+    """The inner face with short lines of the outline that join its ends to the rim, and their number of sides.
+
+    A wheel that holds a bead by its flange alone leaves the base of the bead free; the air's boundary
+    has to end on what is held.
+    """
+    faces, uses = np.unique(ends(quads, inner), return_counts=True)
+    loose = np.setdiff1d(faces[uses == 1], ends(quads, rim))
+    whole = _length(quads, inner)
+    found = [inner]
+    for line in lines:
+        nodes, uses = np.unique(ends(quads, line), return_counts=True)
+        tips = nodes[uses == 1]
+        joins = (
+            len(tips) == 2 and np.isin(tips, loose).any() and np.isin(tips, ends(quads, rim)).any()
+        )
+        if joins and _length(quads, line) <= _BASE * whole:
+            found.append(line)
+    return np.concatenate(found), sum(len(line) for line in found[1:])
+
+
+def _length(quads: Quads, sides: np.ndarray) -> float:
+    a, b = quads.points[ends(quads, sides)].transpose(1, 0, 2)
+    return float(np.linalg.norm(b - a, axis=1).sum())
 
 
 def _lines(quads: Quads, sides: np.ndarray) -> list[np.ndarray]:

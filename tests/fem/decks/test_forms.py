@@ -95,6 +95,25 @@ def test_gmsh(file):
     assert radius[::2] == pytest.approx(MINOR - WALL / 2, abs=1e-12)
 
 
+def test_a_bead_held_by_its_flange_alone(own):
+    """The rim holds the outer corner of each bead and the pressure ends at the inner one: the base joins them.
+
+    As in a public deck of a 175 SR14, where it is 4 % of the inner face; a longer gap is an error."""
+    torus = Torus(arcs=12, wall=2)
+    first, last = len(torus.depth) - 1, len(torus.arc) - 1
+    flange = [torus.label(i, j) for j in (0, last) for i in (first, first - 1, first - 2)]
+    text = plain(torus) + "*NSET, NSET=FLANGE\n" + ", ".join(map(str, flange)) + "\n"
+    found = own(text, rim=("FLANGE",), inner="INSIDE", tread="OUTSIDE")
+    whole = own(text, inner="INSIDE", tread="OUTSIDE")
+    assert len(found.mesh.rim) == len(whole.mesh.rim) // 2
+    assert len(found.mesh.inner) == len(whole.mesh.inner) + 2
+    assert any("2 sides of the bead's base" in note for note in found.notes)
+    inner = torus.face(0)
+    short = text + "*NSET, NSET=PART\n" + "".join(f"{n}\n" for n in inner[8:])
+    with pytest.raises(InputError, match="inner face is open"):
+        own(short, rim=("FLANGE",), inner="PART", tread="OUTSIDE")
+
+
 def test_gmsh_with_parameters_of_nodes(tmp_path):
     """Mesh.SaveParametric = 1: the place in the entity stands behind each node."""
     plain = (MESHES[0].parent / "lin_2.2_0.msh").read_text()
