@@ -312,6 +312,8 @@ class Placement:
         ]
         if not table:
             return None
+        if len(table[0][1]) == 7:  # its blank line of no shift is left out
+            table.insert(0, (table[0][0], []))
         (place, shift), (there, turn) = (*table, (table[0][0], []))[:2]
         if len(table) > 2 or len(shift) > 3 or len(turn) not in (0, 7):
             raise place.error(

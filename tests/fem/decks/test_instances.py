@@ -48,6 +48,7 @@ def same(one, other) -> None:
         ("0.05, 0., 0.\n", lambda r, z: (r - 0.05, z)),
         ("0., 0., 0.\n0.22, 0., 0., 0.22, 0., 1., 90.\n", lambda r, z: (0.22 + z, -(r - 0.22))),
         ("-0.05, 0.01, 0.\n0., 0., 0., 0., 0., 1., 30.\n", None),
+        ("\n0.22, 0., 0., 0.22, 0., 1., 90.\n", lambda r, z: (0.22 + z, -(r - 0.22))),
     ],
 )
 def test_placed(own, position, moved, mesh_in):
