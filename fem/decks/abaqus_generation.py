@@ -14,9 +14,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -46,11 +45,11 @@ _FACE = re.compile(r"S([1-6])")
 
 def _among(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Which rows (k, 2) of `first` are rows of `second`."""
-    return np.array(
-        [row in set(map(tuple, second.tolist())) for row in map(tuple, first.tolist())], bool
-    )
+    one, other = (rows[:, 0] * _FACES + rows[:, 1] for rows in (first, second))
+    return np.isin(one, other)
 
 
+_FACES = 16  # more than the faces of an element
 _COMBINED = {
     "UNION": lambda first, second: np.concatenate([first, second]),
     "INTERSECTION": lambda first, second: first[_among(first, second)],
@@ -68,6 +67,33 @@ def data_lines(lines: list[Data]) -> Iterator[tuple[Place, list[str]]]:
                 yield Place(part.place.file, first + offset), fields(line)
 
 
+@dataclass(frozen=True)
+class _Side:
+    """A line of a *SURFACE: one face of the elements of a set, or of an element with its label's offset."""
+
+    of: str
+    face: int
+    offset: int
+    place: Place
+
+
+@dataclass(frozen=True)
+class _Combination:
+    """A *SURFACE, COMBINE: how it is made of surfaces."""
+
+    how: str
+    surfaces: tuple[str, ...]
+    place: Place
+
+
+@dataclass(frozen=True)
+class _Within:
+    """What of a surface belongs to the scope of an instance."""
+
+    surface: str
+    scope: int
+
+
 class SetReader:
     """Collects sets as written; names are resolved once the deck is complete.
 
@@ -79,7 +105,7 @@ class SetReader:
     def __init__(self) -> None:
         self.node_sets: dict[str, Members] = {}
         self.element_sets: dict[str, Members] = {}
-        self.surfaces: dict[str, list] = {}
+        self.surfaces: dict[str, list[_Side | _Combination | _Within]] = {}
         self.pressed: list[str] = []
         self.scopes: dict[str, int] = {}
         self.parts: dict[int, str] = {0: "ASSEMBLY"}  # name of the part of each scope
@@ -135,7 +161,7 @@ class SetReader:
         for name in mine:
             if name in self.surfaces:
                 plain = name.removesuffix(f" ({part})")
-                self.surfaces[f"{instance}.{plain}"] = [(scope, name)]
+                self.surfaces[f"{instance}.{plain}"] = [_Within(name, scope)]
 
     def _all_names(self) -> list[str]:
         return [*self.node_sets, *self.element_sets, *self.surfaces]
@@ -219,11 +245,10 @@ class SetReader:
         for place, parts in data_lines(lines):
             face = self._face(parts[1] if len(parts) > 1 else "", place)
             named = _NAME.search(parts[0])
-            of.append(
-                (self._asked(card, parts[0], scope) if named else parts[0], face, offset, place)
-            )
+            element = self._asked(card, parts[0], scope) if named else parts[0]
+            of.append(_Side(element, face, offset, place))
 
-    def _combined(self, card: Card, lines: list[Data], scope: int) -> tuple[str, list[str]]:
+    def _combined(self, card: Card, lines: list[Data], scope: int) -> _Combination:
         """How a *SURFACE, COMBINE is made of surfaces that stand before it."""
         how = card.options["COMBINE"].upper()
         if how not in _COMBINED:
@@ -236,7 +261,7 @@ class SetReader:
                     raise place.error(missing("surface", part, self.surfaces))
         if not names:
             raise card.place.error("*SURFACE, COMBINE names no surface: is the deck cut short?")
-        return how, names
+        return _Combination(how, tuple(names), card.place)
 
     def _face(self, text: str, place: Place) -> int:
         if not text:
@@ -257,38 +282,57 @@ class SetReader:
     def resolved_surfaces(self, elements: np.ndarray) -> dict[str, np.ndarray]:
         """name -> (k, 2) of (element, face). Raises InputError for an unknown set."""
         sets = Sets("element set", self.element_sets, elements)
-        found: dict[str, np.ndarray] = {}
-        for name, parts in self.surfaces.items():
-            rows = [self._rows(*part, sets, found) for part in parts]
-            found[name] = np.unique(np.concatenate([np.empty((0, 2), np.int64), *rows]), axis=0)
-        return found
+        found: dict[str, np.ndarray | None] = {}  # None: being resolved
 
-    def _rows(self, *of: Any) -> np.ndarray:
-        """(element, face) of one part of a surface: a set's or element's, or of other surfaces."""
-        *part, sets, found = of
-        if len(part) == 2 and isinstance(part[0], int):  # what of a surface is in a scope
-            every = found[part[1]]
-            return every[every[:, 0] // SCOPE == part[0]]
-        if len(part) == 2:
-            first, *others = (found[name] for name in part[1])
-            for rows in others:
-                first = _COMBINED[part[0]](first, rows)
-            return first
-        name, face, offset, place = part
+        def rows(name: str) -> np.ndarray | None:
+            if name not in found:
+                found[name] = None
+                parts = [self._rows(part, sets, rows) for part in self.surfaces[name]]
+                found[name] = np.unique(
+                    np.concatenate([np.empty((0, 2), np.int64), *parts]), axis=0
+                )
+            return found[name]
+
+        return {name: every for name in self.surfaces if (every := rows(name)) is not None}
+
+    def _rows(
+        self,
+        part: _Side | _Combination | _Within,
+        sets: Sets,
+        rows: Callable[[str], np.ndarray | None],
+    ) -> np.ndarray:
+        """(element, face) of one part of a surface; `rows`: those of other surfaces."""
+        if isinstance(part, _Side):
+            return self._side(part, sets)
+        if isinstance(part, _Within):
+            every = rows(part.surface)
+            assert every is not None, "a surface is not made of what is in its instances"
+            return every[every[:, 0] // SCOPE == part.scope]
+        made: np.ndarray | None = None
+        for name in part.surfaces:
+            other = rows(name)
+            if other is None:
+                raise part.place.error(f"surface {name} is made of itself")
+            made = other if made is None else _COMBINED[part.how](made, other)
+        assert made is not None, "a combination of no surface is refused when it is read"
+        return made
+
+    def _side(self, part: _Side, sets: Sets) -> np.ndarray:
         given = (
-            sets.labels(name, place)
-            if _NAME.search(name) or name in sets
-            else np.array([label(name, place) + offset])
+            sets.labels(part.of, part.place)
+            if _NAME.search(part.of) or part.of in sets
+            else np.array([label(part.of, part.place) + part.offset])
         )
         given = given[np.isin(given, sets.known)]
-        if face >= 0 and any(np.isin(given, turned).any() for turned in self.reflected):
-            raise place.error(
+        if part.face >= 0 and any(np.isin(given, turned).any() for turned in self.reflected):
+            raise part.place.error(
                 "the faces of elements copied with REFLECT have no known numbers: "
                 "name the surface by a node set, or leave the face out"
             )
-        faces = np.full(len(given), face)
-        over = np.array([self.turned_over.get(one, 0) for one in given.tolist()], np.int64)
-        faces = np.where((over > 0) & (faces >= 0), over - 1 - faces, faces)
+        faces = np.full(len(given), part.face)
+        if self.turned_over and part.face >= 0:
+            over = np.array([self.turned_over.get(one, 0) for one in given.tolist()], np.int64)
+            faces = np.where(over > 0, over - 1 - faces, faces)
         return np.column_stack([given, faces])
 
 

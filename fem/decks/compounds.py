@@ -161,25 +161,22 @@ class _Law:
             self.shear * series.shear * stress,
             self.bulk * series.bulk * stress,
         )
-        held = not bulk or (3 * bulk - 2 * shear) / (6 * bulk + 2 * shear) > _STIFF
-        if held and (not bulk or self.model == "neo-hookean"):
+        plain = self.model == "neo-hookean"
+        held = not bulk or (plain and _poisson(bulk, shear) > _STIFF)
+        if held:
             bulk = shear * 2 * (1 + INCOMPRESSIBLE) / (3 * (1 - 2 * INCOMPRESSIBLE))
-        else:
-            held = False
-        if self.model == "neo-hookean":
-            poisson = (3 * bulk - 2 * shear) / (6 * bulk + 2 * shear)
+        if plain:
+            poisson = _poisson(bulk, shear)
             return {"youngs_modulus": 2 * shear * (1 + poisson), "poisson_ratio": poisson}, held
-        plain = "locking_stretch", "powers"
-        times = series.shear * stress
-        scaled = {
-            key: value
-            if key in plain
-            else tuple(times * one for one in value)
-            if isinstance(value, tuple)
-            else times * value
-            for key, value in self.values.items()
-        }
-        return scaled | {"bulk_modulus": bulk}, held
+        scaled = self.values | {"bulk_modulus": bulk}
+        for key in self.values.keys() - {"locking_stretch", "powers"}:
+            moduli = np.multiply(self.values[key], series.shear * stress).tolist()
+            scaled[key] = tuple(moduli) if isinstance(moduli, list) else moduli
+        return scaled, held
+
+
+def _poisson(bulk: float, shear: float) -> float:
+    return (3 * bulk - 2 * shear) / (6 * bulk + 2 * shear)
 
 
 def rubber(compound: Compound, units: Units) -> Rubber:

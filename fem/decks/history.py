@@ -27,6 +27,7 @@ class History:
     friction: float | None = None
     modes: int | None = None
     has_mesh: bool = False
+    has_steps: bool = False
 
 
 def history(path: Path) -> History:
@@ -39,6 +40,7 @@ def history(path: Path) -> History:
             _take(found, card, lines)
             card, lines = item, []
             found.has_mesh |= item.keyword in ("ELEMENT", "ELGEN")
+            found.has_steps |= item.keyword in ("STEP", "SYMMETRIC MODEL GENERATION")
         elif card is not None and card.keyword in _TAKEN:
             lines.append(item)
     _take(found, card, lines)

@@ -261,7 +261,11 @@ def read(path: Path | str, wishes: Wishes | None = None) -> OwnSection:
         raise InputError(
             f"{path}: a section is read from .inp (Abaqus), .msh (Gmsh) or .toml (section file)"
         )
-    deck = MESHES[path.suffix.lower()](path)
+    return section_of(MESHES[path.suffix.lower()](path), wishes)
+
+
+def section_of(deck: Deck, wishes: Wishes) -> OwnSection:
+    """Section of a deck or mesh that has been read. Raises InputError as `read` does."""
     try:
         return _section(*revolved.reduced(deck), wishes)
     except InputError as error:

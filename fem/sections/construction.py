@@ -24,6 +24,7 @@ from tireroad.fem.sections.mesh2d import SectionMesh
 from tireroad.fem.sections.ring import Ring, revolved
 
 RADII = 0.1, 2.5  # m, range of the outer radius of a tire
+INFLATION = 2.2e5  # Pa, of a passenger tire whose pressure a file does not give
 _SAMPLES = 4001
 _ARC = 24  # points on each arc
 

@@ -275,10 +275,8 @@ class InflatedRing:
         out: sparse.spmatrix = sparse.csr_matrix((self._size, self._size), dtype=complex)
         for rule, stress in self._parts:
             F = _deformation(rule.gradient(0), self.displacement.ravel()[dofs(self.section.cells)])
-            A, G = _moduli(stress, F), rule.gradient(wave)
-            turning = np.einsum("ij,cqab->cqiajb", _UNIT, np.linalg.solve(F, stress(F)))
-            share = (self._loss * self._dynamic)[:, None, None, None]
-            A = share * (A - turning.reshape(A.shape))
+            G, share = rule.gradient(wave), (self._loss * self._dynamic)[:, None, None, None]
+            A = share * _own(stress, F, _moduli(stress, F))
             blocks = np.einsum("cqhi,cqhk,cqkj,cq->cij", G.conj(), A, G, rule.volume, optimize=True)
             out = out + self._assembled(self.section.cells, blocks)
         return sparse.csr_matrix(out)
@@ -347,9 +345,7 @@ class InflatedRing:
             F = _deformation(rule.gradient(0), u.ravel()[dofs(self.section.cells)])
             A, G = _moduli(stress, F), rule.gradient(wave)
             if dynamic:
-                turning = np.einsum("ij,cqab->cqiajb", _UNIT, np.linalg.solve(F, stress(F)))
-                share = (self._dynamic - 1)[:, None, None, None]
-                A = A + share * (A - turning.reshape(A.shape))
+                A = A + (self._dynamic - 1)[:, None, None, None] * _own(stress, F, A)
             blocks = np.einsum("cqhi,cqhk,cqkj,cq->cij", G.conj(), A, G, rule.volume, optimize=True)
             out = out + self._assembled(self.section.cells, blocks)
         for cords, edges in self._cords:
@@ -403,6 +399,14 @@ def _moduli(stress: Callable[[np.ndarray], np.ndarray], F: np.ndarray) -> np.nda
         moved[..., k // 3, k % 3] += 1j * step
         out[..., k] = _flat(stress(moved).imag / step)
     return out
+
+
+def _own(
+    stress: Callable[[np.ndarray], np.ndarray], F: np.ndarray, moduli: np.ndarray
+) -> np.ndarray:
+    """The part of dP/dF (c, q, 9, 9) that the wall's own moduli make, without that of its tension."""
+    turning = np.einsum("ij,cqab->cqiajb", _UNIT, np.linalg.solve(F, stress(F)))
+    return moduli - turning.reshape(moduli.shape)
 
 
 def lowest(tire: InflatedRing, waves: Sequence[int] = (0, 1)) -> np.ndarray:

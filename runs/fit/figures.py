@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from tireroad.fem.errors import InputError
+from tireroad.fem.sections.construction import INFLATION
 from tireroad.fem.sections.radial import radial, size
 
 
@@ -60,8 +61,7 @@ KINDS: Mapping[str, Kind] = {
     "footprint_length": Kind("m", 0.05, 0.01, 1, "", "at the load"),
     "footprint_width": Kind("m", 0.05, 0.01, 1, "", "at the load"),
 }
-_LOADS = 0.03  # relative tolerance of the load at a deflection
-ORDINARY = 2.2e5  # Pa, where a .tir file names no pressure
+LOADS = 0.03  # relative tolerance of the load at a deflection
 MODES = "lateral", "yaw", "windup", "vertical"
 
 
@@ -187,12 +187,7 @@ def tir_values(text: str) -> dict[str, str]:
 def _of_tir(text: str, path: Path, notes: list[str], sized: bool) -> dict[str, Any]:
     """The figures of a .tir file by the keys of a TOML file; `sized`: the size is given otherwise."""
     given = tir_values(text)
-    for key, unit in (
-        ("LENGTH", "meter"),
-        ("FORCE", "newton"),
-        ("MASS_UNIT", "kg"),
-        ("TIME", "second"),
-    ):
+    for key, unit in (("LENGTH", "meter"), ("FORCE", "newton"), ("TIME", "second")):
         if given.get(key, unit).lower().rstrip("s") not in (unit, unit[:1], "metre", "m"):
             raise InputError(
                 f"{path}: {key} = {given[key]}: files in SI units are read ({key} = '{unit}')"
@@ -231,14 +226,14 @@ def _of_tir(text: str, path: Path, notes: list[str], sized: bool) -> dict[str, A
             "footprint_width": 2 * (value("WIDTH") or 0.0) * (q[3] * x + q[2] * np.cbrt(x)),
         }
         values |= {key: _checked(path, key, float(one)) for key, one in sizes.items() if one > 0}
-    table = values | {"size": named, "load": load or 4000.0}
+    table = values | {"size": named} | ({"load": load} if load else {})
     inflation = value("INFLPRES") or value("IP") or value("NOMPRES")
     if inflation is not None:
         return table | {"inflation": inflation}
     notes.append(
-        f"no INFLPRES in the file: inflation = {ORDINARY:g} Pa taken (--set inflation=...)"
+        f"no INFLPRES in the file: inflation = {INFLATION:g} Pa taken (--set inflation=...)"
     )
-    return table | {"inflation": ORDINARY}
+    return table | {"inflation": INFLATION}
 
 
 def _size(path: Path, value: Callable[[str], float | None]) -> tuple[str, float]:

@@ -22,7 +22,7 @@ from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.sections.construction import Construction
 from tireroad.fem.sections.inflated import InflatedRing
 from tireroad.fem.sections.radial import radial
-from tireroad.runs.fit.figures import KINDS, MODES, Figures, read
+from tireroad.runs.fit.figures import KINDS, LOADS, MODES, Figures, read
 from tireroad.runs.process import observe
 
 WIDE = 1.0  # standard deviation of a parameter's logarithm where no figure speaks
@@ -114,6 +114,7 @@ class Model:
 
     def __init__(self, figures: Figures) -> None:
         self.figures, self.ratios = figures, dict[str, float]()
+        self._known: dict[str, dict[str, float]] = {}  # figures on the road by scene
         self.names = [
             *(name for name in KINDS if name in figures.values and not name.endswith("damping")),
             *(_load_name(deflection) for deflection, _ in figures.loads),
@@ -134,10 +135,13 @@ class Model:
         self, factors: Mapping[str, float], mesh: tuple[int, int] | None
     ) -> dict[str, float]:
         """Loads, stiffness and footprint on a mesh (None: the default one)."""
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder)
-            (path / "scene.toml").write_text(self._scene(factors, mesh))
-            return self._read(_run(path))
+        scene = self._scene(factors, mesh)
+        if scene not in self._known:  # minutes each
+            with tempfile.TemporaryDirectory() as folder:
+                path = Path(folder)
+                (path / "scene.toml").write_text(scene)
+                self._known[scene] = self._read(_run(path))
+        return self._known[scene]
 
     def _scene(self, factors: Mapping[str, float], mesh: tuple[int, int] | None) -> str:
         text = tire_table(self.figures, factors)
@@ -194,7 +198,7 @@ class Model:
 
 
 def _tolerance(name: str) -> float:
-    return KINDS[name].tolerance if name in KINDS else 0.03
+    return KINDS[name].tolerance if name in KINDS else LOADS
 
 
 def _run(folder: Path) -> Path:
@@ -257,7 +261,7 @@ def fit(figures: Figures) -> Fitted:
     if figures.pressed:
         found = model.free(factors) | model.pressed(factors, None)
         observe.say(f"  on the default mesh: {_worst(model, found)}")
-        start = model.free({}) | model.pressed({}, None)
+        start = dict(start) | model.pressed({}, None)
     factors |= _losses(figures, factors)
     return Fitted(figures, factors, start, found | model.free(factors))
 

@@ -12,16 +12,17 @@ from matplotlib.figure import Figure
 from tireroad.fem.decks.compounds import SYSTEMS, Rubber
 from tireroad.fem.decks.deck import Deck
 from tireroad.fem.decks.history import History, history
-from tireroad.fem.decks.own import MESHES, OwnSection, Wishes, read
+from tireroad.fem.decks.own import MESHES, Wishes, section_of
 from tireroad.fem.errors import InputError
-from tireroad.fem.sections.construction import RADII
+from tireroad.fem.sections.construction import INFLATION, RADII
 from tireroad.runs.report.figures import COLOURS, WIDE, canvas, styled
 from tireroad.runs.report.section_figure import NAME, save_section
+from tireroad.runs.scene.sections.kinds.file import FileSection, own_section
+from tireroad.runs.scene.tables.tire import Tire
 
 _RIM = re.compile(r"RIM|BEAD|FLANGE|WHEEL")
 _INNER = re.compile(r"INNER|INSIDE|LINER|CAVITY|INFLAT|PRESS|_IN\b|^IN\b")
 _TREAD = re.compile(r"TREAD|OUTSIDE|OUTER|GROUND|ROAD|CONTACT|_OUT\b|^OUT\b")
-_ORDINARY = 2.2e5  # Pa, where a file gives no pressure
 
 
 def is_tire_file(path: Path) -> bool:
@@ -37,8 +38,8 @@ def describe_tire(path: Path, out: Path) -> str:
     """
     if not path.is_file():
         raise InputError(f"{path}: no such file")
-    steps = history(path) if path.suffix.lower() == ".inp" else History(has_mesh=True)
-    if not steps.has_mesh:
+    steps = history(path) if path.suffix.lower() == ".inp" else History()
+    if steps.has_steps and not steps.has_mesh:
         return "\n".join(
             [
                 f"{path}: steps of an analysis without a mesh of its own; what a scene can take from them:",
@@ -48,48 +49,39 @@ def describe_tire(path: Path, out: Path) -> str:
         )
     deck = MESHES[path.suffix.lower()](path)
     wishes, guessed = _guess(deck)
-    scene = "\n".join([*_table(path, wishes, guessed), "", *_run(steps, wishes.length_unit)]) + "\n"
     out.mkdir(parents=True, exist_ok=True)
-    (out / "scene.toml").write_text(scene)
-    lines = [f"{path}: a tire's section" if deck.dimension == 2 else f"{path}: a tire's body"]
-    lines += [f"  {line}" for line in deck.used]
+
+    def write() -> str:
+        tables = *_table(path, wishes, guessed), "", *_run(steps, wishes.length_unit)
+        text = "\n".join(tables) + "\n"
+        (out / "scene.toml").write_text(text)
+        return text
+
     try:
-        own, wishes = _readable(path, wishes, deck)
+        wishes = _readable(deck, wishes)
     except InputError as error:
+        write()
         raise InputError(
             f"{error}\n  a scene to complete: {out / 'scene.toml'}\n  sets and surfaces: "
             + (", ".join(deck.face_names) or "none")
         ) from None
-    scene = "\n".join([*_table(path, wishes, guessed), "", *_run(steps, wishes.length_unit)]) + "\n"
-    (out / "scene.toml").write_text(scene)
+    scene = write()
+    keys = {key: getattr(wishes, key) for key in ("inner", "tread", "rim", "length_unit", "mirror")}
+    tire = Tire(section="file", shape=FileSection(file=str(path), **keys))
+    own = own_section(tire)
     radius, width = own.mesh.nodes[:, 0].max(), np.ptp(own.mesh.nodes[:, 1])
-    lines.append(f"  outer radius {1e3 * radius:.4g} mm, width {1e3 * width:.4g} mm")
-    lines += [f"  {note}" for note in own.notes]
-    lines += [f"  {line}" for line in _compounds(own)]
-    lines += ["not used of the file", *(f"  {line}" for line in own.unused or ("nothing",))]
-    angles = {ply.name: float(np.degrees(ply.angle)) for ply in own.plies}
-    save_section(own.mesh, out / NAME, angles)
+    kind = "section" if deck.dimension == 2 else "body"
+    lines = [
+        f"{path}: a tire's {kind}, outer radius {1e3 * radius:.4g} mm, width {1e3 * width:.4g} mm",
+        *tire.shape.described(tire),
+    ]
+    save_section(own.mesh, out / NAME, tire.shape.angles(tire))
     lines.append(f"drawn: {out / NAME}")
     fits = [rubber for rubber in own.rubbers if rubber is not None and rubber.fit]
     if fits:
         draw_fits(fits).savefig(out / "test_data.png", dpi=150, bbox_inches="tight")
         lines.append(f"drawn: {out / 'test_data.png'}, laws fitted to test data")
     return "\n".join([*lines, f"a scene to start from: {out / 'scene.toml'}", "", scene])
-
-
-def _compounds(own: OwnSection) -> list[str]:
-    lines = []
-    for name, rubber in zip(own.mesh.regions, own.rubbers, strict=True):
-        if rubber is None:
-            lines.append(f"region {name}: no material in the file")
-            continue
-        density = "no density" if rubber.density is None else f"{rubber.density:.4g} kg/m³"
-        lines.append(f"region {name}: {rubber.name}, {rubber.model}, {density}")
-    lines += [
-        f"cords {ply.name}: {np.degrees(ply.angle):+.4g} deg, E {ply.youngs_modulus:.4g} Pa"
-        for ply in own.plies
-    ]
-    return lines
 
 
 def _guess(deck: Deck) -> tuple[Wishes, dict[str, str]]:
@@ -125,7 +117,7 @@ def _guess(deck: Deck) -> tuple[Wishes, dict[str, str]]:
     guessed["tread"] = "guessed by name"
     y = points[:, 1] if flat else points[:, 2]
     size = max(float(np.ptp(y)), 1e-300)
-    half = flat and (abs(y.min()) < 1e-6 * size or abs(y.max()) < 1e-6 * size)
+    half = flat and min(abs(float(y.min())), abs(float(y.max()))) < 1e-6 * size
     if half:
         guessed["mirror"] = "guessed: the section ends on z = 0"
     wishes = Wishes(inner=inner, tread=tread, rim=rim, length_unit=unit, mirror=half)
@@ -136,37 +128,32 @@ def _first(pattern: re.Pattern[str], names: list[str]) -> str | None:
     return next((name for name in names if pattern.search(name.upper())), None)
 
 
-def _readable(path: Path, wishes: Wishes, deck: Deck) -> tuple[OwnSection, Wishes]:
-    """The section, without the guessed names that are on no face of it."""
-    first = None
-    try:
-        own = read(path, wishes)
-        if len(wishes.rim) < 2:
-            return own, wishes
-    except InputError as error:
-        first = error
-    good = []
-    for name in wishes.rim:
+def _readable(deck: Deck, wishes: Wishes) -> Wishes:
+    """The guessed names that are on a face of the section. Raises InputError where none is its rim."""
+
+    def reads(some: Wishes) -> InputError | None:
         try:
-            read(path, replace(wishes, rim=(name,), inner=None, tread=None))
-            good.append(name)
-        except InputError:
-            continue
+            section_of(deck, some)
+        except InputError as error:
+            return error
+        return None
+
+    first = reads(wishes)
+    if first is None and len(wishes.rim) < 2:
+        return wishes
+    bare = replace(wishes, inner=None, tread=None)
+    rim = tuple(name for name in wishes.rim if reads(replace(bare, rim=(name,))) is None)
     if first is None:
-        return own, replace(wishes, rim=tuple(good))
-    faces: dict[str, str | None] = {}
-    for key, name in (("inner", wishes.inner), ("tread", wishes.tread)):
-        try:
-            alone = replace(wishes, rim=tuple(good), inner=None, tread=None)
-            inner = key == "inner"
-            read(path, replace(alone, inner=name) if inner else replace(alone, tread=name))
-            faces[key] = name
-        except InputError:
-            faces[key] = None
-    wishes = replace(wishes, rim=tuple(good), inner=faces["inner"], tread=faces["tread"])
-    if not good:
+        return replace(wishes, rim=rim)
+    if not rim:
         raise first
-    return read(path, wishes), wishes
+    bare = replace(bare, rim=rim)
+    inner = None if reads(replace(bare, inner=wishes.inner)) else wishes.inner
+    tread = None if reads(replace(bare, tread=wishes.tread)) else wishes.tread
+    wishes = replace(bare, inner=inner, tread=tread)
+    if error := reads(wishes):
+        raise error
+    return wishes
 
 
 def _table(path: Path, wishes: Wishes, guessed: dict[str, str]) -> list[str]:
@@ -206,7 +193,7 @@ def _run(steps: History, unit: str) -> list[str]:
             "absent: as many as the program takes"
         ]
     given = steps.pressure is not None
-    pressure = steps.pressure * of.stress if steps.pressure is not None else _ORDINARY
+    pressure = steps.pressure * of.stress if steps.pressure is not None else INFLATION
     rows += [
         "[static]",
         f"inflation = {pressure:.6g}".ljust(40)

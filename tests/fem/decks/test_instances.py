@@ -184,6 +184,13 @@ def test_combined_surfaces(own):
     by_nodes = own(text, **FACES).mesh.inner
     for name in ("WHOLE", "FULL"):
         assert len(own(text, inner=name, tread="OUTSIDE").mesh.inner) == len(by_nodes)
+    # Written anew after what it is made of, and of itself.
+    again = text + "*SURFACE, NAME=LOW, COMBINE=UNION\nHIGH, LEFT\n"
+    with pytest.raises(InputError, match="is made of itself"):
+        own(again, **FACES)
+    later = text.replace("*SURFACE, NAME=WHOLE", "*SURFACE, NAME=LOW2\n1, S4\n*SURFACE, NAME=WHOLE")
+    later += "*SURFACE, NAME=LOW2, COMBINE=UNION\nLEFT, HIGH\n"
+    assert len(own(later, inner="LOW2", tread="OUTSIDE").mesh.inner) == len(by_nodes)
     with pytest.raises(InputError, match="no surface MIDLE; did you mean MIDDLE"):
         own(text + "*SURFACE, NAME=X, COMBINE=UNION\nMIDLE\n", **FACES)
 
