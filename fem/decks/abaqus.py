@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from tireroad.fem.decks import rebar
 from tireroad.fem.decks.abaqus_generation import (
     Generator,
     KnownElements,
@@ -58,6 +59,24 @@ SUBOPTIONS = (
 )
 
 
+@dataclass
+class _Skin:
+    """A *SURFACE, *MEMBRANE or *SHELL SECTION: what it is of itself, which one layer of its cords carries."""
+
+    elements: str
+    mass: float
+    covering: tuple[str, float] | None
+    card: Card
+    corded: bool = False
+    carried: list[np.ndarray] = field(default_factory=list)  # elements whose cords carry it
+
+    def take(self) -> dict:
+        """Fields of the first layer of the section; of later ones nothing."""
+        itself = {} if self.corded else {"mass": self.mass, "covering": self.covering}
+        self.corded = True
+        return itself
+
+
 class SectionReader:
     """Collects what the elements consist of, as written in the deck."""
 
@@ -68,18 +87,20 @@ class SectionReader:
         self.embedded: list[Embedded] = []
         self.held: list = []
         self.orientations: dict[str, Orientation] = {}
-        self.unused: list[str] = []
-        self._membranes: str | None = None
-        self._mass: float = 0.0
-        self._covering: tuple[str, float] | None = None
+        self._skins: list[_Skin] = []
+        self._skin: _Skin | None = None  # the one whose layers follow
+        self._single: list[tuple[str, int, int]] = []  # set, number of its element, scope
+        self._lines: list[tuple[tuple, str, set[int]]] = []  # sort, set, its elements
+        self._old: list[int] = []  # rows of layers of *REBAR
         self._material: str | None = None
         self._materials: dict[str, tuple[list, Place]] = {}
         self.handlers = {
             "SOLID SECTION": self._solid,
-            "SURFACE SECTION": self._membrane,
-            "MEMBRANE SECTION": self._membrane,
-            "SHELL SECTION": self._shell,
+            "SURFACE SECTION": self._section,
+            "MEMBRANE SECTION": self._section,
+            "SHELL SECTION": self._section,
             "REBAR LAYER": self._layer,
+            "REBAR": self._rebar,
             "EMBEDDED ELEMENT": self._embed,
             "ORIENTATION": self._orientation,
             "RIGID BODY": self._rigid,
@@ -93,34 +114,33 @@ class SectionReader:
             raise card.place.error("*SOLID SECTION needs ELSET= and MATERIAL=")
         self.solids.append(Solid(self._sets.name(elements, scope), material.upper(), card.place))
 
-    def _membrane(self, card: Card, lines: list[Data], scope: int) -> None:
-        if not card.options.get("ELSET"):
+    def _section(self, card: Card, lines: list[Data], scope: int) -> None:
+        """A *SURFACE, *MEMBRANE or *SHELL SECTION: its mass is that of its material, or DENSITY=."""
+        shell = card.keyword == "SHELL SECTION"
+        if not card.options.get("ELSET") and not shell:
             raise card.place.error(f"*{card.keyword} needs ELSET=")
-        self._membranes = self._sets.name(card.options["ELSET"], scope)
-        density = card.options.get("DENSITY", "")
-        self._mass = number(density, card.place) if density else 0.0
-        self._covering = None
-        material = card.options.get("MATERIAL")
-        if card.keyword == "MEMBRANE SECTION" and material:
-            rows = [parts for _, parts in data_lines(lines) if parts and parts[0]]
-            thickness = number(rows[0][0], card.place) if rows else 0.0
-            self._covering = material.upper(), thickness
-            self.unused.append(
-                f"*MEMBRANE SECTION: its cords and its mass are used, the stiffness of the membrane itself "
-                f"({material}) is not ({card.place})"
-            )
-
-    def _shell(self, card: Card, lines: list[Data], _: int) -> None:
-        """Not used: a road or a wheel. Its cords would be taken for the tire's."""
-        self._membranes = None
-        self.unused.append(f"*SHELL SECTION: not used ({card.place})")
+        density, material = (card.options.get(key, "") for key in ("DENSITY", "MATERIAL"))
+        mass = number(density, card.place) if density and not shell else 0.0
+        covering = None
+        if material and card.keyword != "SURFACE SECTION":
+            parts = [parts for _, parts in data_lines(lines) if parts and parts[0]]
+            covering = material.upper(), number(parts[0][0], card.place) if parts else 0.0
+        name = card.options.get("ELSET", "")
+        self._skin = _Skin(self._sets.name(name, scope) if name else "", mass, covering, card)
+        self._skins.append(self._skin)
 
     def _layer(self, card: Card, lines: list[Data], scope: int) -> None:
         """Data: name, area, spacing, position, material, angle, direction, extension, radius."""
-        if self._membranes is None:
+        skin = self._skin
+        if skin is None or not skin.elements:
             raise card.place.error(
-                "*REBAR LAYER belongs after a *SURFACE SECTION or *MEMBRANE SECTION; cords in shells are not read"
+                "*REBAR LAYER must follow a *SURFACE SECTION, *MEMBRANE SECTION or *SHELL SECTION with ELSET="
             )
+        if "COMPOSITE" in skin.card.options:
+            raise card.place.error(
+                "cords in a *SHELL SECTION, COMPOSITE are not read: give it one material"
+            )
+        of_shell = skin.card.keyword == "SHELL SECTION"
         geometry = card.options.get("GEOMETRY", "CONSTANT").upper()
         geometry = "ANGULAR" if "ANGULAR SPACING" in card.options else geometry
         if geometry not in ("CONSTANT", "ANGULAR", "LIFT EQUATION"):
@@ -130,13 +150,13 @@ class SectionReader:
                 raise place.error(
                     "a cord layer needs name, area, spacing, offset, material, angle; is the deck cut short?"
                 )
-            numbers = {i: number(parts[i], place) for i in (1, 2, 5, 7, 8) if i < len(parts)}
+            numbers = {i: number(parts[i], place) for i in (1, 2, 3, 5, 7, 8) if i < len(parts)}
             if numbers[1] <= 0 or numbers[2] <= 0:
                 raise place.error(f"cords of layer {parts[0]}: area and spacing must be > 0")
             self.layers.append(
                 Layer(
                     name=parts[0],
-                    elements=self._membranes,
+                    elements=skin.elements,
                     area=numbers[1],
                     spacing=numbers[2],
                     material=parts[4].upper(),
@@ -145,12 +165,57 @@ class SectionReader:
                     extension=numbers.get(7, 0.0),
                     radius=numbers.get(8, 0.0),
                     orientation=self._orientation_name(card, "ORIENTATION", scope),
-                    mass=self._mass,
-                    covering=self._covering,
+                    position=numbers[3] if of_shell else 0.0,
                     place=place,
+                    **skin.take(),
                 )
             )
-            self._mass, self._covering = 0.0, None
+
+    def _rebar(self, card: Card, lines: list[Data], scope: int) -> None:
+        """A *REBAR: cords of sets, or of elements one by one, which may be one line together."""
+        for layer in rebar.layers(card, lines):
+            orientation = layer.orientation and self._sets.name(layer.orientation, scope)
+            name, line = self._sets.name(layer.elements, scope), ""
+            if layer.elements.isdigit() and name not in self._sets.element_sets:
+                name, line = self._one(layer, int(layer.elements), scope)
+            self._old.append(len(self.layers))
+            self.layers.append(replace(layer, elements=name, line=line, orientation=orientation))
+
+    def _one(self, layer: Layer, element: int, scope: int) -> tuple[str, str]:
+        """Names of the sets of a single element, and of those whose cords are one line with it."""
+        sort = scope, layer.material, layer.area, layer.position, layer.cut is None
+        open_lines = [one for one in self._lines if one[0] == sort and element not in one[2]]
+        if not open_lines:
+            open_lines = [(sort, f"LINE {len(self._lines) + 1} OF *REBAR", set())]
+            self._lines += open_lines
+        _, line, elements = open_lines[0]
+        elements.add(element)
+        name = f"ELEMENT {element} OF *REBAR, {line}"
+        self._single += [(name, element, scope), (line, element, scope)]
+        return name, line
+
+    def complete(self, elements: np.ndarray) -> None:
+        """Once all elements (labels, ascending) are known: those of *REBAR, and what carries its sections."""
+        scopes: dict[str, list[int]] = {}
+        for scope, part in self._sets.parts.items():
+            scopes.setdefault(part, []).append(scope)
+        for name, element, scope in self._single:
+            labels = element + SCOPE * np.array(scopes[self._sets.parts[scope]], np.int64)
+            self._sets.into(self._sets.element_sets, name, labels, 0)
+        sets = Sets("element set", self._sets.element_sets, elements)
+        for row in self._old:
+            layer = self.layers[row]
+            mine = sets.labels(layer.elements, layer.place)
+            for skin in self._skins:
+                if not skin.elements or (skin.corded and not skin.carried):
+                    continue
+                whole = sets.labels(skin.elements, skin.card.place)
+                if len(mine) and np.isin(mine, whole).all():
+                    done = np.concatenate([np.empty(0, np.int64), *skin.carried])
+                    skin.corded = True
+                    skin.carried.append(mine)
+                    if not np.isin(mine, done).any():
+                        self.layers[row] = replace(layer, mass=skin.mass, covering=skin.covering)
 
     def _orientation_name(self, card: Card, key: str, scope: int) -> str:
         """Orientations belong to their part as sets do."""
@@ -216,6 +281,19 @@ class SectionReader:
             for name, (parts, place) in self._materials.items()
         }
 
+    def not_used(self) -> Iterator[str]:
+        """Lines for the user on sections of which not all is used."""
+        for skin in self._skins:
+            keyword, place = skin.card.keyword, skin.card.place
+            if keyword == "SHELL SECTION" and not skin.corded:
+                yield f"*{keyword}: not used ({place})"
+            elif skin.covering:
+                what = keyword.partition(" ")[0].lower()
+                yield (
+                    f"*{keyword}: its cords and its mass are used, the stiffness of the {what} itself "
+                    f"({skin.card.options['MATERIAL']}) is not ({place})"
+                )
+
     def used(self) -> Iterator[str]:
         """Lines for the user on what was read here."""
         counts = Counter(
@@ -251,7 +329,6 @@ CONTACT DAMPING|FASTENER|CONNECTOR SECTION|CONNECTOR BEHAVIOR|BEAM SECTION|RELEA
 # Ignoring these would give a different tire.
 _REFUSED = {
     "NMAP": "nodes are read as they are given, moved by no map: write their places out",
-    "REBAR": "cords are read from *REBAR LAYER in *SURFACE SECTION or *MEMBRANE SECTION",
 }
 
 
@@ -511,15 +588,15 @@ class _Reader:
                 )
         labels, points = self.nodes.table(self.path.name)
         self.elements.check_once()
-        elements = self.elements.labels()
-        return Deck(
+        self.sections.complete(self.elements.labels())
+        read = Deck(
             file=self.path.name,
             labels=labels,
             points=points,
             blocks=tuple(self.elements.blocks),
             node_sets=Sets("node set", self.sets.node_sets, labels),
-            element_sets=Sets("element set", self.sets.element_sets, elements),
-            surfaces=self.sets.resolved_surfaces(elements),
+            element_sets=Sets("element set", self.sets.element_sets, self.elements.labels()),
+            surfaces={},
             solids=tuple(self.sections.solids),
             layers=tuple(self.sections.layers),
             embedded=tuple(self.sections.embedded),
@@ -527,6 +604,11 @@ class _Reader:
             pressed=tuple(self.sets.pressed),
             materials=self.sections.materials(),
             orientations=self.sections.orientations,
+        )
+        deck = rebar.on_lines(read)
+        return replace(
+            deck,
+            surfaces=self.sets.resolved_surfaces(deck.element_sets.known),
             used=tuple(self._used()),
             unused=tuple(self._not_used()),
         )
@@ -535,11 +617,22 @@ class _Reader:
         """One line for each kind of item read."""
         yield f"{self.nodes.count} nodes in {self.nodes.blocks} blocks"
         for block in self.elements.blocks:
-            yield f"{len(block.labels)} elements {block.type} ({block.place})"
+            if block.kind.role != "shell" or self._corded(block):
+                yield f"{len(block.labels)} elements {block.type} ({block.place})"
         yield from self.sections.used()
+
+    def _corded(self, shells: Block) -> bool:
+        """Whether any of them has cords."""
+        sets = Sets("element set", self.sets.element_sets, self.elements.labels())
+        names = {layer.elements for layer in self.sections.layers}
+        return any(np.isin(shells.labels, sets.labels(name)).any() for name in names)
 
     def _not_used(self) -> Iterator[str]:
         """One line for each keyword not used, with its first place."""
+        for block in self.elements.blocks:
+            if block.kind.role == "shell" and not self._corded(block):
+                name = f"ELEMENT, TYPE={block.type}"
+                self.unused.setdefault(name, []).append(block.place)
         for name, places in self.unused.items():
             keyword = name.split(",")[0]
             known = keyword in _ANALYSIS or keyword in self.handlers or keyword == "PART"
@@ -548,5 +641,5 @@ class _Reader:
             times = f", {len(places)} times" if len(places) > 1 else ""
             what = "not used" if known else "unknown keyword, not used"
             yield f"*{name}: {what} ({places[0]}{times}){hint}"
-        yield from self.sections.unused
+        yield from self.sections.not_used()
         yield from self.sets.unused

@@ -384,7 +384,7 @@ def label(text: str, place: Place) -> int:
 
 @dataclass(frozen=True)
 class Kind:
-    """An element shape: `role` solid or membrane, dimension of the deck, nodes and faces.
+    """An element shape: `role` solid, membrane or shell, dimension of the deck, nodes and faces.
 
     A face is given by its corner nodes, in the manual's order S1, S2, ...
     """
@@ -421,6 +421,8 @@ _FAMILIES = (
     (re.compile(r"C3D(4|6|8|10|15|20|27)[RHIMST]*"), "solid", 3),
     (re.compile(r"(?:SFMGAX|SFMAX|MGAX|MAX)([12])[RHT]*"), "membrane", 2),
     (re.compile(r"(?:SFM3D|M3D)([34689])[R]*"), "membrane", 3),
+    (re.compile(r"SAX([12])T?"), "shell", 2),
+    (re.compile(r"S([34689])R?[5ST]?W?"), "shell", 3),
 )
 _SOLIDS = {
     (2, 3): Kind("solid", 2, 3, 3, _TRIANGLE),
@@ -444,6 +446,8 @@ _MEMBRANES = {
     (3, 8): Kind("membrane", 3, 8, 4),
     (3, 9): Kind("membrane", 3, 9, 4),
 }
+_SHELLS = {key: replace(shape, role="shell") for key, shape in _MEMBRANES.items()}
+_SHAPES = {"solid": _SOLIDS, "membrane": _MEMBRANES, "shell": _SHELLS}
 # The first node stays, the others are traversed in reverse; in solids this holds for each end face.
 _REFLECTED = {
     _SOLIDS[2, 3]: [0, 2, 1],
@@ -454,6 +458,10 @@ _REFLECTED = {
     _SOLIDS[3, 8]: [0, 3, 2, 1, 4, 7, 6, 5],
     _SOLIDS[3, 15]: [0, 2, 1, 3, 5, 4, 8, 7, 6, 11, 10, 9, 12, 14, 13],
     _SOLIDS[3, 20]: [0, 3, 2, 1, 4, 7, 6, 5, 11, 10, 9, 8, 15, 14, 13, 12, 16, 19, 18, 17],
+    _SHELLS[3, 3]: [0, 2, 1],
+    _SHELLS[3, 4]: [0, 3, 2, 1],
+    _SHELLS[3, 6]: [0, 2, 1, 5, 4, 3],
+    _SHELLS[3, 8]: [0, 3, 2, 1, 7, 6, 5, 4],
 }
 
 
@@ -462,8 +470,7 @@ def kind(name: str) -> Kind | None:
     for pattern, role, dimension in _FAMILIES:
         match = pattern.fullmatch(name)
         if match:
-            shapes = _SOLIDS if role == "solid" else _MEMBRANES
-            return shapes.get((dimension, int(match[1])))
+            return _SHAPES[role].get((dimension, int(match[1])))
     return None
 
 
@@ -582,12 +589,15 @@ class Solid:
 
 @dataclass(frozen=True, kw_only=True)
 class Layer:
-    """A layer of cords in the membranes of a set, as in the deck (in its units).
+    """A layer of cords in the elements of a set, as in the deck (in its units).
 
     `angle` in degrees: from the meridian in axisymmetric elements, otherwise from the local first
-    direction; `geometry` CONSTANT, ANGULAR (spacing in degrees) or LIFT EQUATION (`extension`,
-    `radius`). `mass`: that of the membrane itself per area, and `covering`, its material and
-    thickness; both of the first layer of a section alone.
+    direction; `geometry` CONSTANT, ANGULAR (spacing in degrees), LIFT EQUATION (`extension`,
+    `radius`) or EDGE: parallel to edge `edge` (1 to 4) of three-dimensional elements. `mass`: that
+    of the membrane itself per area, and `covering`, its material and thickness; both of the first
+    layer of a section alone. Of shells: `position` along the normal from their middle. Of solids:
+    `cut`, the two places where the cords' plane enters and leaves them, in coordinates from 0 to 1.
+    `line`: a set of which the elements are a part, and which is one line of cords ("": themselves).
     """
 
     name: str
@@ -602,6 +612,10 @@ class Layer:
     orientation: str = ""
     mass: float = 0.0
     covering: tuple[str, float] | None = None
+    position: float = 0.0
+    edge: int = 0
+    cut: tuple[tuple[float, float], tuple[float, float]] | None = None
+    line: str = ""
     place: Place
 
 
@@ -701,9 +715,6 @@ class Deck:
         In the file's unit of length. Nodes of one element stay apart. Membranes of two instances
         that meet are one line.
         """
-        from scipy.sparse import coo_matrix
-        from scipy.sparse.csgraph import connected_components
-
         solids = [block for block in self.blocks if block.kind.role == "solid"]
         if not solids or tolerance <= 0:
             return self, 0
@@ -716,10 +727,7 @@ class Deck:
         if not len(pairs):
             return self, 0
         n = len(self.labels)
-        links = coo_matrix((np.ones(len(pairs)), pairs.T), (n, n))
-        _, group = connected_components(links, directed=False)
-        _, first = np.unique(group, return_index=True)
-        same = first[group]
+        same = first_of(pairs, n)
         for block, rows in zip(solids, nodes, strict=True):
             ordered = np.sort(same[rows], axis=1)
             folded = np.flatnonzero((np.diff(ordered, axis=1) == 0).any(axis=1))
@@ -729,6 +737,17 @@ class Deck:
                     "smaller one, or 0"
                 )
         return replace(self, same=same), int((same != np.arange(n)).sum())
+
+
+def first_of(pairs: np.ndarray, count: int) -> np.ndarray:
+    """For each of `count` things the first one that pairs (k, 2) link it to."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    links = coo_matrix((np.ones(len(pairs)), pairs.T), (count, count))
+    _, group = connected_components(links, directed=False)
+    _, first = np.unique(group, return_index=True)
+    return first[group]
 
 
 SCOPE = 10**10  # labels are offset by SCOPE * number of their part

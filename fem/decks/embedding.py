@@ -498,13 +498,19 @@ class Ply:
 
 @dataclass(frozen=True)
 class Laid:
-    """The membranes of a set: numbers of the deck's edges they lie on, and middles (k, 2) and
-    directions (k, 2) of their elements from first to last node.
+    """The membranes of a line: numbers of the deck's edges they lie on, and middles (k, 2) and
+    directions (k, 2) of their elements from first to last node; `corded` (k,): those that have the
+    layer's cords.
     """
 
     numbers: np.ndarray
     middles: np.ndarray
     directions: np.ndarray
+    corded: np.ndarray
+
+    def nearest(self, points: np.ndarray) -> np.ndarray:
+        """The element (k,) nearest to each point (k, 2)."""
+        return np.linalg.norm(points[:, None] - self.middles, axis=2).argmin(axis=1)
 
     def mirrored(self) -> Laid:
         """With the other half, turned by 180 deg about the vertical so that cords continue."""
@@ -512,6 +518,7 @@ class Laid:
             self.numbers,
             np.concatenate([self.middles, self.middles * [1, -1]]),
             np.concatenate([self.directions, self.directions * [-1, 1]]),
+            np.tile(self.corded, 2),
         )
 
 
@@ -520,6 +527,7 @@ def plies(
 ) -> list[Ply]:
     """The plies of one cord layer: one per unbroken line, more if the angle varies along it."""
     sides = with_origin(quads, laid.numbers)
+    sides = sides[laid.corded[laid.nearest(quads.points[ends(quads, sides)].mean(axis=1))]]
     found, branches = strings(ends(quads, sides))
     if branches:
         r, y = quads.points[branches[0]]
@@ -589,8 +597,7 @@ def _sense(quads: Quads, chain: np.ndarray, laid: Laid, layer: Layer) -> int:
     """1 if the membranes run with the chain, -1 if against it."""
     points = quads.points[along(ends(quads, chain))]
     middles, steps = (points[1:] + points[:-1]) / 2, np.diff(points, axis=0)
-    distance = np.linalg.norm(middles[:, None] - laid.middles, axis=2)
-    with_it = (steps * laid.directions[distance.argmin(axis=1)]).sum(axis=1) > 0
+    with_it = (steps * laid.directions[laid.nearest(middles)]).sum(axis=1) > 0
     slanted = abs(np.sin(2 * np.radians(layer.angle))) > 1e-9
     if slanted and with_it.any() != with_it.all():
         raise InputError(
@@ -608,24 +615,31 @@ def lay_all(
     Membranes that share the solids' nodes already lie on sides; others are located
     geometrically.
     """
-    done: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+    done: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
     for layer in deck.layers:
-        if layer.elements in done:
+        whole = layer.line or layer.elements
+        if whole in done:
             continue
-        ends, points, labels = _elements(deck, layer)
+        ends, points, labels = _elements(deck, layer, whole)
         numbers = edges.numbers(ends)
         if (numbers < 0).any():
             quads, numbers = _embed(deck, quads, layer, ends, points, labels, origins)
-        done[layer.elements] = (numbers, points)
-    return quads, {
-        name: Laid(origins.with_parts(numbers), points[:, 1], points[:, 2] - points[:, 0])
-        for name, (numbers, points) in done.items()
-    }
+        done[whole] = numbers, points, labels
+    found = {}
+    for layer in deck.layers:
+        numbers, points, labels = done[layer.line or layer.elements]
+        found[layer.elements] = Laid(
+            origins.with_parts(numbers),
+            points[:, 1],
+            points[:, 2] - points[:, 0],
+            np.isin(labels, deck.element_sets.labels(layer.elements, layer.place)),
+        )
+    return quads, found
 
 
-def _elements(deck: Deck, layer: Layer) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """End nodes (k, 2), points (k, 3, 2) and labels (k,) of a layer's membranes."""
-    wanted = deck.element_sets.labels(layer.elements, layer.place)
+def _elements(deck: Deck, layer: Layer, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """End nodes (k, 2), points (k, 3, 2) and labels (k,) of the membranes of a layer's set."""
+    wanted = deck.element_sets.labels(name, layer.place)
     ends, points, labels = [], [], []
     for block in deck.blocks:
         mine = np.isin(block.labels, wanted)
@@ -639,7 +653,8 @@ def _elements(deck: Deck, layer: Layer) -> tuple[np.ndarray, np.ndarray, np.ndar
         labels.append(block.labels[mine])
     if not ends:
         raise layer.place.error(
-            f"the set {layer.elements} of cords {layer.name} holds no membranes (SFMGAX, MGAX, SFM3D, M3D)"
+            f"the set {layer.elements} of cords {layer.name} holds no membranes (SFMGAX, MGAX, SFM3D, M3D) and "
+            "no shells (SAX, S4, S8)"
         )
     ends, points, labels = (np.concatenate(part) for part in (ends, points, labels))
     flat = np.flatnonzero(ends[:, 0] == ends[:, 1])

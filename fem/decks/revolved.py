@@ -87,20 +87,23 @@ def _clusters(values: np.ndarray, small: float) -> np.ndarray:
     return out
 
 
-def meridian_layers(deck: Deck, senses: dict[int, int], axis: int) -> tuple[Layer, ...]:
+def meridian_layers(deck: Deck, senses: dict[int, int], rings: Rings) -> tuple[Layer, ...]:
     """The layers with angles from the meridian, for lines that run to larger axial coordinates.
 
     `senses` is s for each membrane. Raises InputError for systems that vary around the axle.
     """
-    return tuple(_layer(deck, layer, senses, axis) for layer in deck.layers)
+    return tuple(_layer(deck, layer, senses, rings) for layer in deck.layers)
 
 
-def _layer(deck: Deck, layer: Layer, senses: dict[int, int], axis: int) -> Layer:
+def _layer(deck: Deck, layer: Layer, senses: dict[int, int], rings: Rings) -> Layer:
     labels = deck.element_sets.labels(layer.elements, layer.place).tolist()
     found = {senses[label] for label in labels if label in senses}
     if not found:
         return layer
-    circumferential = _from_circumference(deck, layer, axis)
+    if layer.geometry == "EDGE":
+        around = _runs_around(deck, layer, rings)
+        return replace(layer, geometry="CONSTANT", angle=90.0 if around else 0.0)
+    circumferential = _from_circumference(deck, layer, rings.axis)
     angle = np.radians(layer.angle)
     slanted = abs(np.sin(2 * angle)) > 1e-9
     if len(found) > 1 and slanted:
@@ -116,6 +119,24 @@ def _layer(deck: Deck, layer: Layer, senses: dict[int, int], axis: int) -> Layer
     else:
         angle = sense * angle
     return replace(layer, angle=float(np.degrees(angle)))
+
+
+def _runs_around(deck: Deck, layer: Layer, rings: Rings) -> bool:
+    """Whether the edge to which a layer's cords are parallel runs around the axle, not along the meridian."""
+    labels = deck.element_sets.labels(layer.elements, layer.place)
+    found: set[bool] = set()
+    for block in deck.blocks:
+        mine = np.isin(block.labels, labels)
+        if block.kind.role == "membrane" and mine.any():
+            rows = deck.rows(block.nodes[mine][:, :4], block.place)
+            first, last = rings.ring[rows[:, layer.edge - 1]], rings.ring[rows[:, layer.edge % 4]]
+            found |= set((first == last).tolist())
+    if len(found) != 1:
+        raise layer.place.error(
+            f"cords {layer.name}: edge {layer.edge} of their elements runs around the axle in some and along "
+            "the meridian in others"
+        )
+    return found.pop()
 
 
 def _from_circumference(deck: Deck, layer: Layer, axis: int) -> int:
@@ -191,7 +212,7 @@ def reduced(deck: Deck) -> tuple[Deck, np.ndarray | None]:
         node_sets=_node_sets(deck, rings),
         element_sets=_element_sets(deck, section.owner),
         surfaces={name: _surface(rows, section) for name, rows in deck.surfaces.items()},
-        layers=meridian_layers(deck, senses, rings.axis),
+        layers=meridian_layers(deck, senses, rings),
         used=(*deck.used, f"a body of revolution about {'xyz'[rings.axis]}: its section is used"),
     )
     return flat, rings.angles

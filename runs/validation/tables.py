@@ -162,5 +162,6 @@ def _keep(results: dict[str, list[Table]], about: dict[str, str], out: Path) -> 
 
     data = {name: [asdict(table) for table in tables] for name, tables in results.items()}
     head = {"program": PROGRAM, "version": VERSION, "machine": machine()}
-    write_text(out, json.dumps(head | {"results": data}, indent=1) + "\n")
+    text = json.dumps(head | {"results": data}, indent=1, default=lambda number: number.item())
+    write_text(out, text + "\n")
     write_text(out.with_suffix(".html"), page(results, about))

@@ -64,6 +64,7 @@ DATA = b"""*HYPERELASTIC, OGDEN, N=2, TEST DATA INPUT
 
 def _new_forms() -> Iterator[tuple[str, bytes, Callable[[Path], object]]]:
     """Decks of parts, with test data, with steps; figures of tires."""
+    from test_rebar import every_form
     from torus_decks import RUBBER, Torus, plain
 
     from tireroad.fem.decks.history import history
@@ -78,6 +79,7 @@ def _new_forms() -> Iterator[tuple[str, bytes, Callable[[Path], object]]]:
     )
     wishes = Wishes(rim=("RIMNODES",))
     yield "parts.inp", parts.encode(), lambda file: read(file, wishes)
+    yield "rebar.inp", every_form().encode(), lambda file: read(file, wishes)
     tested = plain(Torus(arcs=6)).encode().replace(RUBBER.split("\n", 1)[1][:19].encode(), DATA, 1)
     yield "tested.inp", tested, lambda file: read(file, wishes)
     yield "steps.inp", REVOLVE.encode(), history
