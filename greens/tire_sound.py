@@ -1,7 +1,8 @@
 """The tire as a body that sounds: its outer face over the road, closed by the wheel.
 
 The boundary elements of greens.sound on rows and columns of the outer face's nodes in the static
-state, as far apart as the waves of the air allow, and on a flat disc at each bead. Their g loads
+state, as far apart as the waves of the air allow, and on a flat disc at each bead, or on a barrel from
+one bead to the other, through which the air can pass. Their g loads
 the nodes of the face, which are finer: vibrations that are short against the waves of the air
 cancel only there. With g linear around each element's center, from its neighbours,
 
@@ -68,12 +69,12 @@ def elements_for(frequency: float, air: Air) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class SoundingTire:
-    """The outer face and the wheel's discs as boundary elements over the road at z = 0.
+    """The outer face and the wheel as boundary elements over the road at z = 0.
 
-    `body`: e elements; `face` (e,): of the outer face, else of a disc; `nodes` (s, e): N; `area`
+    `body`: e elements; `face` (e,): of the outer face, else of the wheel; `nodes` (s, e): N; `area`
     (s, 3) m2, the vector areas in the air, in the wheel's axes; `axes` (3, 3): rows forward, left
     and up of the road in the wheel's axes, `height` (m) of the axle's centre over it; `grid` (e, 2):
-    row and column of the elements of the face, -1 of a disc; `lines`: the nodes' rows and columns,
+    row and column of the elements of the face, -1 of the wheel; `lines`: the nodes' rows and columns,
     in steps of the face's grid, at which the elements end; `turned`: whether their corners run
     against the order of the grid; `slopes`: of g on the elements of the face (`_slopes`).
     """
@@ -95,12 +96,14 @@ class SoundingTire:
         size: float,
         *,
         coarser: float = 1.0,
+        wheel: str = "disc",
         wheel_depth: float = 0.0,
         leak: float = 0.0,
     ) -> SoundingTire:
         """Of a static state on a plane, with elements of at most `coarser` times `size` m.
 
-        `wheel_depth` m: of the discs behind the beads; `leak` m: height of the contact over the road.
+        `wheel`: "disc", closed on both sides, `wheel_depth` m behind the beads, or "open", a barrel
+        between them; `leak` m: height of the contact over the road.
         Whether the body is closed is for `body.checked`.
         """
         if state.road_height is None:
@@ -123,19 +126,22 @@ class SoundingTire:
         right, left = (
             _at(grid, lines[0], np.full(len(lines[0]), c)) for c in (0.0, grid.shape[1] - 1.0)
         )
-        discs = np.concatenate(
-            [
-                _disc(left, WHEEL * size, -wheel_depth),
-                _disc(right, WHEEL * size, wheel_depth)[:, ::-1],
-            ]
-        )
+        disc = WHEEL * size
+        if wheel == "open":
+            closing = _barrel(left, right, disc)
+        else:
+            closing = np.concatenate(
+                [_disc(left, disc, -wheel_depth), _disc(right, disc, wheel_depth)[:, ::-1]]
+            )
         body = Body(
-            np.concatenate([corners[open_to], discs]), np.arange(open_to.sum() + len(discs)), True
+            np.concatenate([corners[open_to], closing]),
+            np.arange(open_to.sum() + len(closing)),
+            True,
         )
         turned = float((body.center * body.vector).sum()) < 0
         if turned:
             body = replace(body, corners=body.corners[:, ::-1])
-        own = np.concatenate([number[open_to], np.full((len(discs), 2), -1)])
+        own = np.concatenate([number[open_to], np.full((len(closing), 2), -1)])
         slopes = _slopes(body, own, len(lines[0]))
         quads = ring_quads(*state.shape)
         area = Surface.of(place, quads[(place[quads, 2] > level).any(axis=1)]).normal
@@ -155,7 +161,7 @@ class SoundingTire:
     def volumes(self, shape: Array, rigid: Array | None = None) -> Array:
         """U (e, m) m2 per unit of m coordinates, which move the face by `shape` (3 s, m) m.
 
-        `rigid` (6, m): how they move the wheel, in m and rad, and with it the discs.
+        `rigid` (6, m): how they move the wheel, in m and rad.
         """
         s = len(self.area)
         moved = np.einsum("sc,scm->sm", self.area, shape.reshape(s, 3, -1))
@@ -170,7 +176,7 @@ class SoundingTire:
     @property
     def outline(self) -> Array:
         """Corners (e, 4, 2) of the elements unrolled: deg around the axle from the lowest point, and
-        place from 0 at one bead to 1 at the other; NaN on the discs."""
+        place from 0 at one bead to 1 at the other; NaN on the wheel."""
         place = (self.body.corners - [0, 0, self.height]) @ self.axes
         angle = np.degrees(np.arctan2(place[..., 0], -place[..., 2]))
         angle = angle[:, :1] + (angle - angle[:, :1] + 180) % 360 - 180
@@ -285,6 +291,14 @@ def _face_elements(grid: Array, lines: tuple[Array, Array]) -> tuple[Array, NDAr
     quads = ring_quads(len(rows), len(columns))
     i, j = np.divmod(quads[:, 0], len(columns))
     return place[quads], np.stack([i, j], axis=-1)
+
+
+def _barrel(first: Array, last: Array, size: float) -> Array:
+    """Quadrilaterals (e, 4, 3) from one ring of points (n, 3) to another; corners follow the first one."""
+    steps = max(int(np.ceil(np.linalg.norm(last - first, axis=1).max() / size - 1e-9)), 1)
+    rings = [list(first + step / steps * (last - first)) for step in range(steps + 1)]
+    found = [_between(a, b, range(len(first))) for a, b in zip(rings, rings[1:], strict=False)]
+    return np.array([one for part in found for one in part])
 
 
 def _disc(ring: Array, size: float, depth: float) -> Array:

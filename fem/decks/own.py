@@ -319,7 +319,7 @@ def _section(deck: Deck, ring_angles: np.ndarray | None, wishes: Wishes) -> OwnS
         plies=tuple(layers),
         used=deck.used,
         unused=deck.unused,
-        notes=tuple(notes),
+        notes=tuple(dict.fromkeys(notes)),
         ring_angles=ring_angles,
     )
 

@@ -91,6 +91,10 @@ def check_sound(scene: Scene, raw: dict[str, Any], error: Where) -> Iterator[Inp
     rotation = scene.rotation
     if not scene.static.on_road:
         yield error(("sound", "microphones"), "are over the road: give [static] a load (N)")
+    if scene.sound.wheel == "open" and scene.sound.wheel_depth:
+        yield error(
+            ("sound", "wheel_depth"), 'is that of discs, which wheel = "open" does not have'
+        )
     if scene.road is not None and scene.road.drum_radius is not None:
         yield error(("road", "drum_radius"), "is not possible with [sound], whose road is a plane")
     if rotation is not None and rotation.speed and rotation.method == "full":

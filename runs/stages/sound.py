@@ -191,7 +191,7 @@ class RadiationStage(Computed[Paths]):
 
 def sounding(state: StaticState, table: Table, size: float, coarser: float = 1.0) -> SoundingTire:
     """The tire of a static state in elements of at most `coarser` times `size` m."""
-    rest = {"wheel_depth": table.wheel_depth, "leak": table.leak}
+    rest: dict[str, Any] = {key: getattr(table, key) for key in ("wheel", "wheel_depth", "leak")}
     return SoundingTire.of(state, size, coarser=coarser, **rest)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from tireroad.fem.parameters import Key, Limits, described, finite, number, parameter
+from tireroad.fem.parameters import Key, Limits, choice, described, finite, number, parameter
 
 MICROPHONES = ("cpx", "obsi", "pass-by")
 HEARD = 1130.0  # Hz: the end of the third octave of 1 kHz
@@ -60,6 +60,11 @@ class Sound:
         "highest frequency; absent: 0.8 of modal.up_to, at most 1130 Hz, the end of the third octave of 1 kHz",
         least=50,
         most=3000,
+    )
+    wheel: str = choice(
+        "disc",
+        ("disc", "open"),
+        "disc: the wheel is closed on both sides; open: air passes through, between the beads lies the rim's barrel",
     )
     wheel_depth: float = number(
         0.0, "m", "depth of the wheel's discs behind the beads", least=0, most=0.2
