@@ -469,23 +469,16 @@ class Transfer:
     def pressure(self, volume: Complex, lines: Array) -> Complex:
         """Pressure (k, l) Pa, e^{+iwt}, of the displaced volumes U (e, l) m3 at lines (l,) Hz.
 
-        g is interpolated over frequency by a cubic spline, piece by piece in products of matrices.
+        g is interpolated over frequency by a cubic spline, that is by sum_n W(line, n) g(n): a product
+        of matrices for each solved frequency n.
         """
         # g(-f) is the conjugate of g(f): no end conditions at 0.
         knots = np.concatenate([-self.frequency[1:2], self.frequency])
         values = np.concatenate([self.ahead[1:2].conj(), self.ahead])
+        share = interpolate.CubicSpline(knots, np.eye(len(knots)))(lines)
         out = np.zeros((values.shape[1], len(lines)), complex)
-        pieces = np.clip(np.searchsorted(knots, lines, side="right") - 1, 0, len(knots) - 2)
-        most = max(int(2e7 / values[0, 0].size / len(knots)), 1)
-        for first in range(0, values.shape[1], most):
-            some = slice(first, first + most)
-            spline = interpolate.CubicSpline(knots, values[:, some]).c.astype(np.complex64)
-            for piece in np.unique(pieces):
-                which = np.flatnonzero(pieces == piece)
-                ahead = lines[which] - knots[piece]
-                moved = volume[:, which]
-                for power in range(4):
-                    out[some, which] += spline[power, piece] @ (moved * ahead ** (3 - power))
+        for n, value in enumerate(values):
+            out += share[:, n] * (value.astype(complex) @ volume)
         wave = 2 * np.pi * lines
         delay = np.exp(-1j * wave / self.air.speed * self.distance[:, None])
         return -(wave**2) * self.air.density * delay * out

@@ -411,8 +411,9 @@ def _normal_velocity(
     some = size > 0
     unit = tire.area[some] / np.sqrt(size[some])[:, None]
     moved = np.einsum("sc,scm->sm", unit, shape.reshape(len(size), 3, -1)[some])
-    square = (moved @ a.T.real) ** 2 + (moved @ a.T.imag) ** 2
-    return square.sum(axis=0) * (2 * np.pi * frequency) ** 2 / 2
+    # Contiguous, or BLAS is not used: 17 times the time.
+    parts = (moved @ np.ascontiguousarray(part).T for part in (a.real, a.imag))
+    return sum((part**2).sum(axis=0) for part in parts) * (2 * np.pi * frequency) ** 2 / 2
 
 
 def _sound(
