@@ -307,6 +307,23 @@ def distance(
     return Distance(float(np.linalg.norm(off) / np.linalg.norm(exact)), float(worst / most))
 
 
+_ORDER = 4  # of the filter, passed twice: 24 dB an octave each way
+
+
+def in_band(values: np.ndarray, step: float, up_to: float) -> np.ndarray:
+    """The part of values (n, d), in steps of `step` s, below `up_to` Hz, where it is 6 dB down.
+
+    Butterworth of fourth order forwards and backwards, so without delay. As given where there is no
+    room for it: a limit near half the sampling rate, or a record shorter than a period of it.
+    """
+    from scipy.signal import butter, sosfiltfilt
+
+    if up_to * step > 0.45 or up_to * step * len(values) < 1 or len(values) <= 6 * _ORDER:
+        return values
+    low = butter(_ORDER, up_to, fs=1 / step, output="sos")
+    return sosfiltfilt(low, values, axis=0, padtype="constant")
+
+
 def low_part(values: np.ndarray, duration: float, band: float) -> np.ndarray:
     """Fourier coefficients of windowed values (n, k) at t = h ... duration, to `band` Hz."""
     n = len(values)

@@ -105,12 +105,15 @@ def _rolling(results: Results, given: Given) -> list[Fact]:
     error, spread = (
         given("accuracy", f"{what} contact force") for what in ("error of the mean", _SPREAD)
     )
-    there = given("accuracy", "deviation of the contact force")
+    there = given("accuracy", "deviation of the contact force in the window of the error bars")
     off = spread / there * varies if spread and there else spread
     after = f" from {quantity(start * step, 's')} on" if start else ""
-    what = "its standard deviation" + (f" up to {quantity(end, 'Hz')}" if end else "")
+    what = "its standard deviation" + (f" to {quantity(end, 'Hz')}" if end else "")
     return [
-        (f"vertical force, rolling (mean{after})", bounded(float(force.mean()), error, "N")),
+        (
+            f"vertical contact force, rolling (mean{after})",
+            bounded(float(force.mean()), error, "N"),
+        ),
         (what, bounded(varies, off, "N")),
     ]
 

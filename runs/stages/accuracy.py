@@ -698,12 +698,15 @@ def _describe(
         record.headline |= {
             f"error of the mean {what}": (float(bar.mean[2]), "N"),
             f"error of the deviation of the {what}": (float(bar.deviation[2]), "N"),
-            f"deviation of the {what}": (float(figures.deviation[2]), "N"),
             f"error of the {what}'s history up to {product.up_to:.4g} Hz": (
                 100 * float(bar.history[2]),
                 "%",
             ),
         }
+        record.indicators[f"deviation of the {what} in the window of the error bars"] = (
+            float(figures.deviation[2]),
+            "N",
+        )
         known = bar.level[np.isfinite(bar.level[:, 2]), 2]
         if len(known):
             record.headline[f"largest error of a third octave of the {what}"] = (

@@ -21,6 +21,7 @@ from tireroad.contact.results.spectra import (
     Limit,
     amplitudes,
     density,
+    in_band,
     least_duration,
     lowest,
     lowest_wanted,
@@ -145,6 +146,18 @@ def describe(
         record.headline["bands left out, narrower than three lines"] = (_named(narrow), "-")
 
 
+def extremes(record: Record, history: ContactHistory, start: int, up_to: float) -> None:
+    """Record the least and largest forces after the run-in, of what lies below `up_to` Hz."""
+    forces = {"contact": history.total_force, "axle": history.axle_force}
+    for what, values in forces.items():
+        if values is None or start == len(values):
+            continue
+        low = in_band(values, history.step, up_to)[start:]
+        for axis, name in ((2, "vertical"), (0, "longitudinal")):
+            for how, found in (("least", low.min(axis=0)), ("largest", low.max(axis=0))):
+                record.headline[f"{how} {name} {what} force"] = (float(found[axis]), "N")
+
+
 def _warn_of_window(record: Record, force: np.ndarray, what: str) -> None:
     """Warn where an impact near an end of the record, or in its middle, sets its level."""
     off = float(off_middle(force)[0])
@@ -244,6 +257,7 @@ class SpectraStage(Computed[Spectra]):
         below = frequency <= limit.frequency
         found = levels_of(history, start, limit.frequency)
         describe(record, found, history, start, limit.frequency)
+        extremes(record, history, start, limit.frequency)
         grows = run_in(self.setup.product, self.job.scene.road)
         short = too_short(found["third_octave/centre"], limit.frequency, grows)
         record.warnings += [short] if short else []
@@ -358,5 +372,8 @@ def _largest(record: Record, frequency: np.ndarray, axle: np.ndarray) -> None:
     band = np.arange(min(3, len(frequency)), len(frequency))
     if np.abs(axle[band, 2]).max(initial=0.0) > ROUNDING * np.abs(axle[:, 2]).max(initial=0.0):
         peak = band[np.abs(axle[band, 2]).argmax()]
-        record.headline["largest vertical axle force"] = (float(np.abs(axle[peak, 2])), "N")
+        record.headline["largest line of the vertical axle force"] = (
+            float(np.abs(axle[peak, 2])),
+            "N",
+        )
         record.headline["at"] = (float(frequency[peak]), "Hz")

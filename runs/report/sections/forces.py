@@ -12,11 +12,13 @@ Report sections about forces: rolling contact and point forces.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from tireroad.contact.results.spectra import in_band
 from tireroad.runs.report import figures, live, realism, surface_figures
 from tireroad.runs.report.figures import COLOURS, COMPONENTS, WIDE, canvas, encode, envelope, styled
 from tireroad.runs.report.read import Absent, Results, Section, attributes, quantity
@@ -217,16 +219,15 @@ def contact(results: Results) -> Section:
     if not len(time):
         raise Absent(f"{name} holds no step yet")
     wanted = (("road", ""), ("scheme", ""), ("step", "s"), ("speed", "rad/s"))
-    vertical = total[:, 2]
-    extremes = (("least", vertical.min()), ("mean", vertical.mean()), ("greatest", vertical.max()))
+    axle, active = results.optional(name, "axle_force"), results.optional(name, "active")
+    low = _valid(results, {"contact": total, "axle": axle})
+    vertical = low.forces["contact"][:, 2]
     section.facts = [("simulated", quantity(float(time[-1]), "s")), ("steps", quantity(len(time)))]
     section.facts += attributes(results, name, wanted)
-    section.facts += [(f"{key} vertical force", quantity(float(v), "N")) for key, v in extremes]
-    section.facts.append(("its standard deviation", quantity(float(vertical.std()), "N")))
-    axle, active = results.optional(name, "axle_force"), results.optional(name, "active")
-    picture = figures.forces(time, total, axle, active)
-    drawn = histories(time, {"contact": total, "axle": axle}, active)
-    section.show(picture, "Forces over time; peaks are kept in the drawing.", drawn)
+    section.facts += low.facts
+    picture = figures.forces(time, low.forces["contact"], low.forces.get("axle"), active)
+    drawn = histories(time, low.forces, active)
+    section.show(picture, f"Forces over time{low.words}; peaks are kept in the drawing.", drawn)
     pressure_maps(results, section, time, vertical)
     if len(time) == 1:
         return section
@@ -240,6 +241,54 @@ def contact(results: Results) -> Section:
     caption = f"Normal force summed across the width, one instant in {stride}."
     section.show(picture, caption)
     return section
+
+
+@dataclass(frozen=True)
+class _Valid:
+    """Forces (nt, 3) N as far as they are valid, the `words` that say so, and figures of them."""
+
+    forces: dict[str, NDArray]
+    words: str
+    facts: list[tuple[str, str]]
+
+
+def _valid(results: Results, given: Mapping[str, NDArray | None]) -> _Valid:
+    """The forces below the limit of spectra.h5, and their figures after its run-in; all without it.
+
+    Impacts of points make forces beyond the modes, which a single step may have several times as
+    large as what the tire feels.
+    """
+    forces = {name: values for name, values in given.items() if values is not None}
+    try:
+        limit, left_out, step = (
+            float(results.attribute(file, name))
+            for file, name in (
+                ("spectra.h5", "limit"),
+                ("spectra.h5", "left_out"),
+                ("contact.h5", "step"),
+            )
+        )
+    except (Absent, TypeError):
+        limit, left_out, step = np.inf, 0.0, 1.0
+    words = f" below {quantity(limit, 'Hz')}" if np.isfinite(limit) else ""
+    if np.isfinite(limit):
+        forces = {name: in_band(values, step, limit) for name, values in forces.items()}
+    start = min(round(left_out / step), len(forces["contact"]) - 1)
+    after = f" from {quantity(start * step, 's')} on" if start else ""
+    facts = []
+    if words or after:
+        facts.append(("forces here", f"those{words}{',' if words and after else ''}{after}"))
+    for name, values in forces.items():
+        for axis, component in ((2, "vertical"), (0, "longitudinal")):
+            some = values[start:, axis]
+            for how, value in (
+                ("least", some.min()),
+                ("mean", some.mean()),
+                ("largest", some.max()),
+                ("standard deviation of the", some.std()),
+            ):
+                facts.append((f"{how} {component} {name} force", quantity(float(value), "N")))
+    return _Valid(forces, words, facts)
 
 
 def sampled(dataset: h5py.Dataset, stride: int) -> NDArray:

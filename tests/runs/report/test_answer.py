@@ -36,13 +36,13 @@ def test_an_error_stands_beside_the_figure_it_is_of(tmp_path: Path) -> None:
         file.attrs["left_out"], file.attrs["limit"] = 16 * step, 0.5 / step
     window = {
         "error of the mean contact force": 3.0,
-        "deviation of the contact force": 10.0,
+        "deviation of the contact force in the window of the error bars": 10.0,
         "error of the deviation of the contact force": 0.5,
     }
     headline = {name: {"value": value, "unit": "N"} for name, value in window.items()}
     with Results(directory, {}) as results:
         told = answer(results, {"accuracy": {"headline": headline}})
     (what, mean), (_, spread) = (fact for fact in told if "±" in fact[1])
-    assert what == f"vertical force, rolling (mean from {quantity(16 * step, 's')} on)"
+    assert what == f"vertical contact force, rolling (mean from {quantity(16 * step, 's')} on)"
     assert mean == "500 ± 3 N"
     assert spread == "14.14 ± 0.71 N"  # 5 %, as in the window
