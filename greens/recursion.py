@@ -418,7 +418,7 @@ class Recursion:
         self._free = self._state  # at the end of the step without a new force
         self._moved = False  # whether `_free` belongs to this step yet
         self._taken = True  # whether `_state` includes the last force
-        self._samples: list[tuple[np.ndarray, np.ndarray, np.ndarray]] | None = None
+        self._samples: list[tuple[np.ndarray, ...]] | None = None
         self._begun = response.direct_momentum_rate()
         self._add_same_step(response, into)
         self.ahead = self if self._idle else None
@@ -515,7 +515,8 @@ class Recursion:
             self._block.advance(self._force)
         self._taken = True
         if self._samples is not None:
-            self._samples.append((self._state, self._push, self._force))
+            block = self._block.state if self._block else np.zeros(0)
+            self._samples.append((self._state, self._push, self._force, block))
 
     def _seen(self) -> np.ndarray:
         """This process's part of the outputs without a new force."""
@@ -562,8 +563,11 @@ class Recursion:
         """Record `samples` of each step from now on."""
         self._samples = []
 
-    def samples(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """States and pushes (mine,), and force (k,) N, of each step since the last call."""
+    def samples(self) -> list[tuple[np.ndarray, ...]]:
+        """States and pushes (mine,), force (k,) N, and the block's states, of each step since the last call.
+
+        Those of the block are on the process that has it, empty on others: `block_everywhere`.
+        """
         self._take()
         kept, self._samples = self._samples, []
         assert kept is not None, "samples() before keep_samples()"
@@ -572,6 +576,10 @@ class Recursion:
     def everywhere(self, samples: list[np.ndarray]) -> np.ndarray:
         """Samples of n steps as (n, q), all states in the order of the response. Collective."""
         return self._spread.everywhere(np.array(samples).T).T
+
+    def block_everywhere(self, samples: list[np.ndarray]) -> np.ndarray:
+        """The block's states of n steps as (n, b). Collective."""
+        return self.comm.bcast(np.array(samples), self._idle)
 
     def snapshot(self) -> dict[str, np.ndarray]:
         """All states in the order of the response, alike for any number of processes.

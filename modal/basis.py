@@ -200,6 +200,16 @@ class Projection:
         turn, joined = self._change, self.wheel.joined(drag, stiffness, speed)
         return turn.T @ joined[0] @ turn, turn.T @ joined[1] @ turn
 
+    def hub_damping(self) -> tuple[np.ndarray, np.ndarray]:
+        """Of a wheel that moves: tire and air relative to it (m + a, all), and its dampers (all, all) 1/s.
+
+        Both act on all coordinates, of unit mass.
+        """
+        turn, n = self._change, self.inside.shape[1]
+        part = self.wheel.taking_part
+        dampers = self.wheel.axle.joined(self.wheel.axle.damping)[np.ix_(part, part)]
+        return turn[:n], turn[n:].T @ dampers @ turn[n:]
+
     def seen(self, shapes: np.ndarray, probes: sparse.csr_matrix) -> np.ndarray:
         """What `probes` read of all coordinates (k, m + a + c), from `shapes` (k, m) of the modes.
 

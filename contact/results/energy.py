@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy import linalg
 
 from tireroad.contact.patch import LEAST_REACH, Patch
 from tireroad.contact.results.chatter import Alternation, Chatter
@@ -77,21 +78,33 @@ class Dissipation:
         lost = int r . D r dt >= 0,   drive = int (Omega P q) . D r dt,
 
     so that work of the forces + drive = change of the energy of `stored` + lost. Summed over the
-    steps by the trapezoidal rule.
+    steps by the trapezoidal rule. Where the wheel moves, q is `held` times all coordinates, the motion of
+    tire and air relative to it, and the dampers of its `hub` lose q' . C q' of all of them.
     """
 
-    def __init__(self, damping: np.ndarray, turning: np.ndarray, step: float) -> None:
-        """`damping` (m,) 1/s; `turning` Omega P (m, m) 1/s; `step` s."""
+    def __init__(
+        self,
+        damping: np.ndarray,
+        turning: np.ndarray,
+        step: float,
+        held: np.ndarray | None = None,
+        hub: np.ndarray | None = None,
+    ) -> None:
+        """`damping` (n,) 1/s; `turning` Omega P (n, n) 1/s; `step` s; `held` (n, m); `hub` C (m, m) 1/s."""
         self._damping, self._turning, self._step = damping[:, None], turning, step
+        self._held, self._hub = held, hub
         self.lost = self.drive = 0.0
         self._last = np.zeros(2)
 
     def add(self, coordinates: np.ndarray, rates: np.ndarray) -> None:
         """Count n steps: coordinates and rates (m, n) at their ends."""
+        beside = np.zeros(rates.shape[1]) if self._hub is None else _power(rates, self._hub @ rates)
+        if self._held is not None:
+            coordinates, rates = self._held @ coordinates, self._held @ rates
         turned = self._turning @ coordinates
         body = rates + turned
         braked = self._damping * body
-        power = np.stack([(body * braked).sum(axis=0), (turned * braked).sum(axis=0)])
+        power = np.stack([_power(body, braked) + beside, _power(turned, braked)])
         power = np.column_stack([self._last, power])
         # Step by step, so that the sums do not depend on how steps are blocked.
         for lost, drive in (self._step * (power[:, 1:] + power[:, :-1]) / 2).T.tolist():
@@ -107,6 +120,11 @@ class Dissipation:
         """Continue from `state`."""
         self.lost, self.drive = kept["dissipation"].tolist()
         self._last = kept["dissipation_last"]
+
+
+def _power(rates: np.ndarray, forces: np.ndarray) -> np.ndarray:
+    """Power (n,) of forces (m, n) at rates (m, n)."""
+    return (rates * forces).sum(axis=0)
 
 
 class Circulation:
@@ -188,9 +206,10 @@ def springs(response: Response, force: np.ndarray, own: np.ndarray | None = None
 
 
 class Motion:
-    """Modal coordinates and rates from the states of a time loop, and their dissipation.
+    """Coordinates and rates from the states of a time loop, and their dissipation.
 
-    For a tire that rolls on its own states only, without air, corner and nearly defective block.
+    For a tire that rolls on its own states only. Its air loses energy as it does, at the rate relative to
+    the wheel, and the dampers of a corner theirs.
     """
 
     def __init__(self, rolling: RollingModes, slow: np.ndarray, step: float) -> None:
@@ -198,23 +217,30 @@ class Motion:
         right = states.right[:, slow]
         self._real, self._imaginary = right.real.copy(), right.imag.copy()
         self._eigenvalue = states.eigenvalue[slow][:, None]
+        self._block, self._block_right = states.block, states.block_right
         damping = rates(turning.damping, projection)
         _, _, body = projection.rotating(turning.inertia)
-        self.losses = Dissipation(damping, turning.speed * body, step)
+        if projection.air is not None:
+            duct = projection.air.duct
+            damping = np.concatenate([damping, duct.loss])
+            body = linalg.block_diag(body, duct.gyroscopic)
+        moving = projection.hub_damping() if projection.moves else (None, None)
+        self.losses = Dissipation(damping, turning.speed * body, step, *moving)
 
     @staticmethod
     def known(rolling: RollingModes, response: Response) -> bool:
         """Whether the dissipation of these states can be computed."""
-        projection = rolling.basis.projection
-        plain = not rolling.full and projection.air is None and not projection.moves
-        moving = rolling.turning.speed > 0 and not len(response.block)
-        return plain and moving and own_states(response, rolling)
+        return not rolling.full and rolling.turning.speed > 0 and own_states(response, rolling)
 
-    def add(self, states: np.ndarray, pushes: np.ndarray) -> np.ndarray:
-        """Count n steps: all states and pushes (n, q) at their ends; the coordinates (n, m) there."""
-        z = states.T
-        coordinates = self._coordinates(z)
-        self.losses.add(coordinates, self._coordinates(self._eigenvalue * z + pushes.T))
+    def add(self, states: np.ndarray, pushes: np.ndarray, block: np.ndarray) -> np.ndarray:
+        """Count n steps: all states and pushes (n, q), and the block's states (n, b), at their ends.
+
+        Returns the coordinates (n, m) there.
+        """
+        z, defective = states.T, block.reshape(len(states), -1).T
+        coordinates = self._coordinates(z) + self._block_right @ defective
+        rates = self._coordinates(self._eigenvalue * z + pushes.T)
+        self.losses.add(coordinates, rates + self._block_right @ (self._block @ defective))
         return coordinates.T
 
     def _coordinates(self, z: np.ndarray) -> np.ndarray:
@@ -229,7 +255,12 @@ def energy_left(rolling: RollingModes, kept: dict[str, np.ndarray], slow: np.nda
     rates = (right @ (states.eigenvalue[slow] * state + kept["push"])).real
     rates += states.block_right @ (states.block @ kept["block_state"])
     # Damping's contribution to the rolling stiffness stores nothing: it is work of the drive.
-    _, stiffness = pencil(rolling.basis.projection, replace(rolling.turning, damping=(0.0, 0.0)))
+    projection = rolling.basis.projection
+    if projection.air is not None:
+        air = projection.air
+        duct = replace(air.duct, loss=np.zeros_like(air.duct.loss))
+        projection = replace(projection, air=replace(air, duct=duct))
+    _, stiffness = pencil(projection, replace(rolling.turning, damping=(0.0, 0.0)))
     return stored(coordinates, rates, stiffness)
 
 

@@ -270,9 +270,11 @@ class Losses:
         """Account for the steps since the last call. Collective."""
         if self._motion is None or not (samples := self._tire.samples()):
             return
-        states, pushes, every = map(list, zip(*samples, strict=True))
-        forces = np.array(every)
-        moved = self._motion.add(self._tire.everywhere(states), self._tire.everywhere(pushes))
+        states, pushes, every, block = map(list, zip(*samples, strict=True))
+        forces, tire = np.array(every), self._tire
+        moved = self._motion.add(
+            tire.everywhere(states), tire.everywhere(pushes), tire.block_everywhere(block)
+        )
         self._circulation.add(forces[:, self._leaning.others])
         if self._leaning.shape is not None:
             self._aside.add(forces[:, self._leaning.own] @ self._leaning.shape, moved)

@@ -57,8 +57,12 @@ def terms(tire: RollingModes, steps: int, comm=MPI.COMM_SELF, counted: RollingMo
         march.advance(f)
         moved.append(free + march.same_step @ f)
     work.add(force, np.array(moved))
-    states, pushes, _ = zip(*march.samples(), strict=True)
-    everywhere = march.everywhere(states), march.everywhere(pushes)
+    states, pushes, _, block = zip(*march.samples(), strict=True)
+    everywhere = (
+        march.everywhere(states),
+        march.everywhere(pushes),
+        march.block_everywhere(block),
+    )
     for block in range(0, steps, 37):
         motion.add(*(part[block : block + 37] for part in everywhere))
     kept = march.snapshot()

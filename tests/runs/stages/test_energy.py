@@ -62,9 +62,29 @@ def test_an_undamped_standing_tire_keeps_what_it_takes(run) -> None:
     assert not warnings
 
 
+AIR = """
+[tire.cavity]
+loss_factor = 0.05
+"""
+CORNER = """
+[axle]
+kind = "corner"
+wheel_mass = 5.0
+body_mass = 30.0
+stiffness = [2e5, 0.0, 8e3, 0.0, 0.0, 0.0]
+damping = [300.0, 0.0, 600.0, 0.0, 0.0, 0.0]
+locked = ["y", "rx", "ry", "rz"]
+"""
+
+
 @pytest.mark.slow
-def test_a_rolling_tire_loses_what_contact_and_drive_put_in(run) -> None:
-    found, warnings = run("rolling", "[damping]\nmass = 400.0\n[rotation]\nspeed = 50.0\n")
+@pytest.mark.parametrize(
+    "more", ["", AIR, CORNER, AIR + CORNER], ids=["alone", "air", "corner", "air and corner"]
+)
+def test_a_rolling_tire_loses_what_contact_and_drive_put_in(run, more: str) -> None:
+    """Also with air, whose own losses count, and on a corner, with those of its dampers."""
+    name = f"rolling-{'air' * (AIR in more)}{'corner' * (CORNER in more)}"
+    found, warnings = run(name, "[damping]\nmass = 400.0\n[rotation]\nspeed = 50.0\n" + more)
     lost, drive = (
         found["energy lost in the material"],
         found["work of the drive against the damping"],
