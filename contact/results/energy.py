@@ -244,7 +244,9 @@ class Motion:
         return coordinates.T
 
     def _coordinates(self, z: np.ndarray) -> np.ndarray:
-        return self._real @ z.real - self._imaginary @ z.imag
+        # Contiguous, or BLAS is not used.
+        real, imaginary = (np.ascontiguousarray(part) for part in (z.real, z.imag))
+        return self._real @ real - self._imaginary @ imaginary
 
 
 def energy_left(rolling: RollingModes, kept: dict[str, np.ndarray], slow: np.ndarray) -> float:
