@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.contact.results.spectra import in_band
+from tireroad.fem.errors import InputError
 from tireroad.runs.report import figures, live, realism, surface_figures
 from tireroad.runs.report.figures import COLOURS, COMPONENTS, WIDE, canvas, encode, envelope, styled
 from tireroad.runs.report.read import Absent, Results, Section, attributes, quantity
@@ -268,7 +269,7 @@ def _valid(results: Results, given: Mapping[str, NDArray | None]) -> _Valid:
                 ("contact.h5", "step"),
             )
         )
-    except (Absent, TypeError):
+    except (Absent, InputError, TypeError):  # a file that is damaged is told of by its own section
         limit, left_out, step = np.inf, 0.0, 1.0
     words = f" below {quantity(limit, 'Hz')}" if np.isfinite(limit) else ""
     if np.isfinite(limit):
