@@ -471,24 +471,20 @@ class Companion(NamedTuple):
     ratio: float = 1.0
 
     def bars(
-        self, run: Mapping[str, np.ndarray], step: float, since: float, limit: float, up_to: float
+        self, run: Mapping[str, Measured], since: float, limit: float, up_to: float
     ) -> dict[str, Bars]:
-        """Error bars of the forces (n, 3) N of a `run` from `since` s on; see contact.results.error_bars.measured."""
-
-        def both(*ends: float) -> tuple[dict[str, Measured], dict[str, Measured]]:
-            own = {name: measured(values, step, *ends) for name, values in run.items()}
-            other = _figures(self.beside, since, *ends) if self.beside else own
-            return other, _figures(self.forces, since, *ends)
-
-        other, off = both(limit, up_to)
+        """Error bars of a `run` after `since` s; see contact.results.error_bars.measured."""
+        off = _figures(self.forces, since, limit, up_to)
+        other = _figures(self.beside, since, limit, up_to) if self.beside else run
         found = {name: bars(other[name], off[name], self.share) for name in run}
-        if limit <= self.limit:
+        if self.beside is None or limit <= self.limit:
             return found
-        near, apart = both(self.ratio * limit, self.ratio * min(limit, up_to))
+        below = self.ratio * limit, self.ratio * min(limit, up_to)
+        near, apart = (_figures(one, since, *below) for one in (self.beside, self.forces))
         for name, bar in found.items():
             low = bars(near[name], apart[name], 1 + self.share)  # errors of the companion itself
             whole = bars(other[name], off[name], 1 + self.share)
-            centre = other[name].centre
+            centre = run[name].centre
             beyond = (centre * 10**0.05 > self.limit)[:, None]
             grown = np.where(near[name].deviation > 0, other[name].deviation, 0.0)
             grown = grown / np.maximum(near[name].deviation, 1e-300)
@@ -632,8 +628,7 @@ class AccuracyStage(Computed[Accuracy]):
             except (ConvergenceError, InputError) as error:
                 absent[cause] = str(error)
                 continue
-            since = start * history.step
-            parts = [one.bars(runs, history.step, since, limit, up_to) for one in told]
+            parts = [one.bars(exact, start * history.step, limit, up_to) for one in told]
             for name in exact:
                 found[name][cause] = total(dict(enumerate(part[name] for part in parts)))
         product = Accuracy(

@@ -77,24 +77,20 @@ def test_a_companion_is_judged_where_it_is_an_answer_itself() -> None:
     run, exact = off_by_modes(highest), off_by_modes(1e6)
     coarse = off_by_modes(FEWER * highest)
     share = 1 / (FEWER**-3 - 1)
-    figures = {"contact_force": run.contact}
-    bare = Companion(coarse, None, share)
+    figures = {"contact_force": measured(run.contact, run.step, limit)}
+    bare = Companion(coarse, run, share)
     told = bare._replace(limit=FEWER * limit, ratio=FEWER)
-    true = bars(
-        measured(run.contact, run.step, limit), measured(exact.contact, exact.step, limit), 1.0
-    )
-    good, plain = (
-        one.bars(figures, run.step, 0.0, limit, np.inf)["contact_force"] for one in (told, bare)
-    )
+    true = bars(figures["contact_force"], measured(exact.contact, exact.step, limit), 1.0)
+    good, plain = (one.bars(figures, 0.0, limit, np.inf)["contact_force"] for one in (told, bare))
     for name in ("deviation", "history"):
         ratio = getattr(good, name) / getattr(true, name)
-        assert (ratio > 0.7).all() and (ratio < 1.5).all(), name
+        assert (0.7 < ratio).all() and (ratio < 1.5).all(), name
     assert (plain.history > 2 * true.history).all()
-    centre = measured(run.contact, run.step, limit).centre
+    centre = figures["contact_force"].centre
     for band in (200.0, 251.2):
         k = int(abs(centre - band).argmin())
         ratio = good.level[k] / true.level[k]
-        assert (ratio > 0.6).all() and (ratio < 1.7).all(), band
+        assert (0.6 < ratio).all() and (ratio < 1.7).all(), band
     low = centre < 150
     np.testing.assert_allclose(good.level[low], plain.level[low])
 
@@ -140,7 +136,7 @@ def test_a_companion_is_the_run_it_stands_for(run, whole, cause, sets):
     other, _ = run(cause, "contact", *sets)
     told = companions(cause, given)
     assert len(told) == (2 if cause == "mesh" else 1)
-    forces, beside, part = told[0][:3]
+    forces, beside, part = told[0]
     assert forces.step == 2e-4 and (beside is None) == (cause == "step")
     # Elements of order 2 make 3; the footprint is a few points wide, so that finer ones tell, whose errors have
     # nothing to do with the run's.
@@ -157,11 +153,12 @@ def test_the_step_is_told_by_the_order_of_the_scheme(whole, scheme):
     limit, step = 200.0, 4e-4
     given = replace(_given(whole), scheme=scheme, step=step, steps=70)
     fine = replace(given, scheme="linear", step=step / 8, steps=8 * 70)
-    run, better = (one.repeated(one.settled, one.response, coarser=1) for one in (given, fine))
-    own, exact = (measured(found.contact, found.step, limit) for found in (run, better))
+    own, exact = (
+        measured(found.contact, found.step, limit)
+        for found in (one.repeated(one.settled, one.response, coarser=1) for one in (given, fine))
+    )
     (told,) = companions("step", given)
-    forces = {"contact_force": run.contact}
-    estimated = told.bars(forces, run.step, 0.0, limit, limit)["contact_force"].history[2]
+    estimated = told.bars({"contact_force": own}, 0.0, limit, limit)["contact_force"].history[2]
     assert 0.5 < estimated / bars(own, exact, 1.0).history[2] < 2.0
 
 
