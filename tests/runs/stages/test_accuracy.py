@@ -15,17 +15,8 @@ from tireroad.fem.errors import InputError
 from tireroad.runs.files.disk import Refused
 from tireroad.runs.process import observe
 from tireroad.runs.scene.load import load
-from tireroad.runs.stages.accuracy import (
-    FEWER,
-    Companion,
-    Given,
-    backed,
-    coarser,
-    coarser_job,
-    companions,
-)
+from tireroad.runs.stages.accuracy import Given, backed, coarser, coarser_job, companions
 from tireroad.runs.stages.pipeline import run_scene
-from tireroad.runs.stages.rolling import Forces
 from tireroad.runs.stages.setup import points_of
 from tireroad.runs.stages.stage import Job
 
@@ -58,41 +49,6 @@ run_in = 0.05
 duration = 0.03
 step = 1e-4
 """
-
-
-def off_by_modes(highest: float) -> Forces:
-    """A noise whose lines truncation makes larger by 0.4 (f over the highest mode)^3, four times beyond it."""
-    step, n = 5e-4, 4000
-    lines = np.fft.rfftfreq(n, step)
-    rng = np.random.default_rng(4)
-    noise = np.exp(2j * np.pi * rng.random((len(lines), 3)))
-    off = np.where(lines < highest, 0.4 * (lines / highest) ** 3, 3.0)[:, None]
-    force = np.fft.irfft(noise * (1 + off), n, axis=0)
-    return Forces(force, force, step)
-
-
-def test_a_companion_is_judged_where_it_is_an_answer_itself() -> None:
-    """Modes to 350 Hz, forces to 0.8 of it: one with modes to 247 Hz says nothing of 250 Hz."""
-    highest, limit = 350.0, 280.0
-    run, exact = off_by_modes(highest), off_by_modes(1e6)
-    coarse = off_by_modes(FEWER * highest)
-    share = 1 / (FEWER**-3 - 1)
-    figures = {"contact_force": measured(run.contact, run.step, limit)}
-    bare = Companion(coarse, run, share)
-    told = bare._replace(limit=FEWER * limit, ratio=FEWER)
-    true = bars(figures["contact_force"], measured(exact.contact, exact.step, limit), 1.0)
-    good, plain = (one.bars(figures, 0.0, limit, np.inf)["contact_force"] for one in (told, bare))
-    for name in ("deviation", "history"):
-        ratio = getattr(good, name) / getattr(true, name)
-        assert (0.7 < ratio).all() and (ratio < 1.5).all(), name
-    assert (plain.history > 2 * true.history).all()
-    centre = figures["contact_force"].centre
-    for band in (200.0, 251.2):
-        k = int(abs(centre - band).argmin())
-        ratio = good.level[k] / true.level[k]
-        assert (0.6 < ratio).all() and (ratio < 1.7).all(), band
-    low = centre < 150
-    np.testing.assert_allclose(good.level[low], plain.level[low])
 
 
 @pytest.fixture(scope="module")
