@@ -106,16 +106,6 @@ def bars(run: Measured, companion: Measured, share: float) -> Bars:
     )
 
 
-def levels_from_below(level: np.ndarray, centre: np.ndarray, ratio: float) -> np.ndarray:
-    """For each band (b,) at `centre` Hz the larger of the levels (b, 3) around `ratio` times it, NaN without any."""
-    out = np.full(level.shape, np.nan)
-    for k, middle in enumerate(centre):
-        near = level[np.abs(np.log10(centre / (ratio * middle))) < 0.1]
-        if len(near):
-            out[k] = near.max(axis=0)
-    return out
-
-
 def _apart(run: np.ndarray, companion: np.ndarray) -> np.ndarray:
     """Relative L2 distance (3,) of two spectra (f, 3) on the same lines."""
     count = min(len(run), len(companion))

@@ -25,14 +25,12 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from tireroad.contact.grid_patch import MOST, finer_touching, halved, ratio, thinned
-from tireroad.contact.results.band import USABLE
 from tireroad.contact.results.chatter import choose, oscillation
 from tireroad.contact.results.error_bars import (
     CAUSES,
     Bars,
     Measured,
     bars,
-    levels_from_below,
     measured,
     orders,
     random_share,
@@ -458,17 +456,12 @@ COMPANIONS: dict[str, Callable[[Given], Forces]] = {
 class Companion(NamedTuple):
     """The `forces` of a companion run and their reference `beside` (None: the run itself).
 
-    `share`: the fraction of their difference that is the error. `limit` Hz: up to where it is itself an
-    answer, `ratio` of where the run is. What truncated modes make off depends on the frequency over the
-    highest mode: beyond the limit the run is off as much as the companion is at `ratio` times the
-    frequency, and in its whole band as much as the companion in its own.
+    `share`: the fraction of their difference that is the error.
     """
 
     forces: Forces
     beside: Forces | None
     share: float
-    limit: float = np.inf
-    ratio: float = 1.0
 
     def bars(
         self, run: Mapping[str, Measured], since: float, limit: float, up_to: float
@@ -476,25 +469,7 @@ class Companion(NamedTuple):
         """Error bars of a `run` after `since` s; see contact.results.error_bars.measured."""
         off = _figures(self.forces, since, limit, up_to)
         other = _figures(self.beside, since, limit, up_to) if self.beside else run
-        found = {name: bars(other[name], off[name], self.share) for name in run}
-        if self.beside is None or limit <= self.limit:
-            return found
-        below = self.ratio * limit, self.ratio * min(limit, up_to)
-        near, apart = (_figures(one, since, *below) for one in (self.beside, self.forces))
-        for name, bar in found.items():
-            low = bars(near[name], apart[name], 1 + self.share)  # errors of the companion itself
-            whole = bars(other[name], off[name], 1 + self.share)
-            centre = run[name].centre
-            beyond = (centre * 10**0.05 > self.limit)[:, None]
-            grown = np.where(near[name].deviation > 0, other[name].deviation, 0.0)
-            grown = grown / np.maximum(near[name].deviation, 1e-300)
-            found[name] = Bars(
-                bar.mean,
-                low.deviation * grown,
-                np.where(beyond, levels_from_below(whole.level, centre, self.ratio), bar.level),
-                low.history if min(limit, up_to) > self.limit else bar.history,
-            )
-        return found
+        return {name: bars(other[name], off[name], self.share) for name in run}
 
 
 def _figures(forces: Forces, since: float, limit: float, up_to: float) -> dict[str, Measured]:
@@ -513,9 +488,6 @@ def companions(cause: str, given: Given) -> list[Companion]:
     with observe.quiet():
         beside = None if cause == "step" else given.base
         found = [Companion(COMPANIONS[cause](given), beside, _share(cause, given))]
-        if cause == "modes":
-            highest = given.rolling.highest / (2 * np.pi)
-            found = [found[0]._replace(limit=USABLE * FEWER * highest, ratio=FEWER)]
         if cause == "mesh":
             with suppress(InputError, ConvergenceError):
                 found.append(Companion(finer_wall(given), beside, 1.0))
