@@ -59,16 +59,50 @@ SUBOPTIONS = (
 )
 
 
+# Of the thickness: from a shell's middle to its nodes.
+_OFFSETS = {"": 0.0, "SPOS": 0.5, "SNEG": -0.5}
+
+
 @dataclass
 class _Skin:
-    """A *SURFACE, *MEMBRANE or *SHELL SECTION: what it is of itself, which one layer of its cords carries."""
+    """A *SURFACE, *MEMBRANE or *SHELL SECTION: what it is of itself, which one layer of its cords carries.
+
+    Its numbers are read where it has cords alone: a road's or a wheel's do not matter.
+    """
 
     elements: str
-    mass: float
-    covering: tuple[str, float] | None
     card: Card
+    first: str  # its first number
     corded: bool = False
     carried: list[np.ndarray] = field(default_factory=list)  # elements whose cords carry it
+
+    @property
+    def shell(self) -> bool:
+        return self.card.keyword == "SHELL SECTION"
+
+    @property
+    def mass(self) -> float:
+        """Per area, of a surface or membrane that has no material."""
+        density = self.card.options.get("DENSITY", "")
+        return number(density, self.card.place) if density and not self.shell else 0.0
+
+    @property
+    def covering(self) -> tuple[str, float] | None:
+        """Its material and thickness."""
+        material = self.card.options.get("MATERIAL", "").upper()
+        thick = material and self.card.keyword != "SURFACE SECTION"
+        return (material, self._thickness) if thick else None
+
+    @property
+    def middle(self) -> float:
+        """Of a shell, along the normal from its nodes: OFFSET= is a share of the thickness, towards them."""
+        offset = self.card.options.get("OFFSET", "").upper() if self.shell else ""
+        share = _OFFSETS[offset] if offset in _OFFSETS else number(offset, self.card.place)
+        return -share * self._thickness
+
+    @property
+    def _thickness(self) -> float:
+        return number(self.first, self.card.place)
 
     def take(self) -> dict:
         """Fields of the first layer of the section; of later ones nothing."""
@@ -116,17 +150,12 @@ class SectionReader:
 
     def _section(self, card: Card, lines: list[Data], scope: int) -> None:
         """A *SURFACE, *MEMBRANE or *SHELL SECTION: its mass is that of its material, or DENSITY=."""
-        shell = card.keyword == "SHELL SECTION"
-        if not card.options.get("ELSET") and not shell:
-            raise card.place.error(f"*{card.keyword} needs ELSET=")
-        density, material = (card.options.get(key, "") for key in ("DENSITY", "MATERIAL"))
-        mass = number(density, card.place) if density and not shell else 0.0
-        covering = None
-        if material and card.keyword != "SURFACE SECTION":
-            parts = [parts for _, parts in data_lines(lines) if parts and parts[0]]
-            covering = material.upper(), number(parts[0][0], card.place) if parts else 0.0
         name = card.options.get("ELSET", "")
-        self._skin = _Skin(self._sets.name(name, scope) if name else "", mass, covering, card)
+        if not name and card.keyword != "SHELL SECTION":
+            raise card.place.error(f"*{card.keyword} needs ELSET=")
+        parts = [parts for _, parts in data_lines(lines) if parts and parts[0]]
+        first = parts[0][0] if parts else ""
+        self._skin = _Skin(self._sets.name(name, scope) if name else "", card, first)
         self._skins.append(self._skin)
 
     def _layer(self, card: Card, lines: list[Data], scope: int) -> None:
@@ -140,7 +169,6 @@ class SectionReader:
             raise card.place.error(
                 "cords in a *SHELL SECTION, COMPOSITE are not read: give it one material"
             )
-        of_shell = skin.card.keyword == "SHELL SECTION"
         geometry = card.options.get("GEOMETRY", "CONSTANT").upper()
         geometry = "ANGULAR" if "ANGULAR SPACING" in card.options else geometry
         if geometry not in ("CONSTANT", "ANGULAR", "LIFT EQUATION"):
@@ -165,7 +193,7 @@ class SectionReader:
                     extension=numbers.get(7, 0.0),
                     radius=numbers.get(8, 0.0),
                     orientation=self._orientation_name(card, "ORIENTATION", scope),
-                    position=numbers[3] if of_shell else 0.0,
+                    position=numbers[3] + skin.middle if skin.shell else 0.0,
                     place=place,
                     **skin.take(),
                 )
@@ -214,6 +242,8 @@ class SectionReader:
                     done = np.concatenate([np.empty(0, np.int64), *skin.carried])
                     skin.corded = True
                     skin.carried.append(mine)
+                    layer = replace(layer, position=layer.position + skin.middle)
+                    self.layers[row] = layer
                     if not np.isin(mine, done).any():
                         self.layers[row] = replace(layer, mass=skin.mass, covering=skin.covering)
 
@@ -285,7 +315,7 @@ class SectionReader:
         """Lines for the user on sections of which not all is used."""
         for skin in self._skins:
             keyword, place = skin.card.keyword, skin.card.place
-            if keyword == "SHELL SECTION" and not skin.corded:
+            if skin.shell and not skin.corded:
                 yield f"*{keyword}: not used ({place})"
             elif skin.covering:
                 what = keyword.partition(" ")[0].lower()

@@ -274,8 +274,8 @@ class _Lines:
         first = SCOPE * (1 + int(every.max(initial=0)) // SCOPE)
         for line in self._lines:
             at, row = _joined(line.points.reshape(-1, 3), _TOUCHING * size)
-            nodes = first + 1 + row.reshape(line.points.shape[:2])
-            count = nodes.shape[1]
+            count = line.points.shape[1]
+            nodes = first + 1 + row.reshape(-1, count)
             name = {2: "SFMGAX1", 3: "SFMGAX2"}.get(count, f"SFM3D{count}")
             blocks.append(Block(name, used_kind(name), line.labels, nodes, line.place))
             labels.append(first + 1 + np.arange(len(at)))

@@ -76,3 +76,17 @@ def _solid(torus, nodes, k, after):
         return corner
     between = [n + 100_000 * (k + 1) for n in nodes[:count]]
     return corner + a[count:] + b[count:] + between
+
+
+def around(torus, kind, name) -> str:
+    """Quadrilaterals between the two layers of `solids` at eight angles, along the axis first, then around."""
+    text, number, arc = f"*ELEMENT, TYPE={kind}, ELSET={name}\n", 90001, range(4, 13, 2)
+    for n in range(8):
+        for a, b in zip(arc, [*arc][1:], strict=False):
+            corner = [
+                torus.label(2, j) + 200_000 * k
+                for j, k in ((a, n), (b, n), (b, (n + 1) % 8), (a, (n + 1) % 8))
+            ]
+            text += f"{number}, " + ", ".join(map(str, corner)) + "\n"
+            number += 1
+    return text

@@ -121,7 +121,7 @@ def test_three_dimensional_membranes(own):
     The cord is laid down as a vector: at the lowest point, with the axle's direction y, it must be the
     same line as that of the section's ply.
     """
-    from ring_decks import solids
+    from ring_decks import around, solids
 
     torus = Torus(False, arcs=8, wall=2)
     angles = np.linspace(0, 2 * np.pi, 9)[:-1]
@@ -130,17 +130,7 @@ def test_three_dimensional_membranes(own):
         ("y", "ORI", 20.0),
         ("z", "ORI", 20.0),
     ):
-        text = solids(torus, angles, axis) + "*ELEMENT, TYPE=SFM3D4R, ELSET=BELT\n"
-        arc = range(4, 13, 2)
-        number = 90001
-        for n in range(8):
-            for a, b in zip(arc, [*arc][1:], strict=False):
-                corner = [
-                    torus.label(2, j) + 200_000 * k
-                    for j, k in ((a, n), (b, n), (b, (n + 1) % 8), (a, (n + 1) % 8))
-                ]
-                text += f"{number}, " + ", ".join(map(str, corner)) + "\n"
-                number += 1
+        text = solids(torus, angles, axis) + around(torus, "SFM3D4R", "BELT")
         ends = {"x": "1,0,0", "y": "0,1,0", "z": "0,0,1"}[axis]
         option = f", ORIENTATION={orientation}" if orientation else ""
         text += f"*ORIENTATION, NAME=ORI, SYSTEM=CYLINDRICAL\n0,0,0,{ends}\n1, 0.\n"

@@ -116,6 +116,19 @@ def test_in_axisymmetric_shells(own, kind, new):
     assert any("SHELL SECTION: its cords and its mass" in line for line in found.unused)
 
 
+@pytest.mark.parametrize("new", [False, True])
+def test_a_shell_whose_nodes_are_on_its_outer_side(own, new):
+    """OFFSET=SPOS: the middle lies half a thickness against the normal of the nodes."""
+    torus = Torus(arcs=24, wall=1)
+    text = plain(torus) + CORDS + lines(torus, 0, "SAX2", "SKIN")
+    text += "*SHELL SECTION, ELSET=SKIN, MATERIAL=RUBBER, OFFSET=SPOS\n2.E-3, 5\n"
+    if new:
+        text += f"*REBAR LAYER\nC, {NUMBERS}, -0.003, STEEL, 70.\n"
+    else:
+        text += f"*REBAR, ELEMENT=AXISHELL, MATERIAL=STEEL, NAME=C\nSKIN, {NUMBERS}, -0.003, 70.\n"
+    assert depths(own(text), "C")[0] == pytest.approx(WALL - 0.004, abs=2e-5)
+
+
 def test_in_the_middle_of_shells(own):
     """Cords at the middle of shells that share the solids' nodes lie on those nodes."""
     torus = Torus(arcs=12, wall=2)
@@ -199,30 +212,15 @@ def test_the_mass_of_a_membrane_is_carried_once(own):
     assert masses == pytest.approx([1.2, 0.0])
 
 
-def shells_around(torus, kind, name):
-    """Three-dimensional elements on the nodes between the two layers, about x, y or z."""
-    text, number = f"*ELEMENT, TYPE={kind}, ELSET={name}\n", 90001
-    arc = range(4, 13, 2)
-    for n in range(8):
-        for a, b in zip(arc, [*arc][1:], strict=False):
-            corner = [
-                torus.label(2, j) + 200_000 * k
-                for j, k in ((a, n), (b, n), (b, (n + 1) % 8), (a, (n + 1) % 8))
-            ]
-            text += f"{number}, " + ", ".join(map(str, corner)) + "\n"
-            number += 1
-    return text
-
-
 @pytest.mark.parametrize("shells", [False, True])
 def test_around_the_axle(own, shells):
     """Skew and isoparametric *REBAR in three dimensions: membranes and shells, in their middle and beside it."""
-    from ring_decks import solids
+    from ring_decks import around, solids
 
     torus = Torus(False, arcs=8, wall=2)
     angles = np.linspace(0, 2 * np.pi, 9)[:-1]
     text = solids(torus, angles, "y") + CORDS
-    text += shells_around(torus, "S4R" if shells else "M3D4R", "BELT")
+    text += around(torus, "S4R" if shells else "M3D4R", "BELT")
     text += "*ORIENTATION, NAME=ORI, SYSTEM=CYLINDRICAL\n0,0,0,0,1,0\n1, 0.\n"
     element, middle = ("SHELL", ", 0.") if shells else ("MEMBRANE", "")
     head = f"*REBAR, ELEMENT={element}, MATERIAL=STEEL, NAME="
