@@ -13,6 +13,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
+
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.runs.files.disk import write_text
 from tireroad.runs.process import observe
@@ -153,7 +155,7 @@ def show(table: Table) -> None:
 def _shown(value) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    return f"{value:.4g}" if isinstance(value, float | np.floating) else str(value)
 
 
 def _keep(results: dict[str, list[Table]], about: dict[str, str], out: Path) -> None:
