@@ -312,11 +312,18 @@ class SoundStage(WholeTire[Sound]):
 
     @cached_property
     def _errors(self) -> tuple[np.ndarray, np.ndarray]:
-        """Bands (b,) Hz and the errors (b,) dB of the contact force in them, NaN where unknown."""
+        """Bands (b,) Hz and the errors (b,) dB of the vibration in them, NaN where unknown.
+
+        Those of the vertical contact force, which drives it, and of the force on the axle, which the modes
+        carry there as they do to the outer face: the largest of its three directions.
+        """
         found = self.spectra.product if self.spectra else None
         if found is None or found.contact_level_error is None:
             return np.zeros(0), np.zeros(0)
-        return found.levels["third_octave/centre"], found.contact_level_error[:, 2]
+        error = found.contact_level_error[:, 2]
+        if found.level_error is not None:
+            error = np.hypot(error, found.level_error.max(axis=1))
+        return found.levels["third_octave/centre"], error
 
     def write(self, file: h5py.File, product: Sound) -> None:
         """All fields of the product."""
@@ -417,7 +424,7 @@ def _normal_velocity(
 
 
 def _sound(
-    heard: Heard, of_forces: tuple[np.ndarray, np.ndarray], volume: np.ndarray, duration: float
+    heard: Heard, of_vibration: tuple[np.ndarray, np.ndarray], volume: np.ndarray, duration: float
 ) -> dict[str, Any]:
     """The fields of Sound but the efficiency; `volume` (e, f): of the record over time."""
     paths, frequency = heard.paths, heard.frequency
@@ -428,14 +435,15 @@ def _sound(
     _, coarse = heard.bands((np.abs(heard.coarse) ** 2 / 2).T)
     _, power = heard.bands(heard.power)
     _, away = heard.bands((np.abs(heard.far) ** 2 / 2).T)
-    error = _errors(paths, centre, 10 * np.log10(coarse / band), of_forces)
+    error = _errors(paths, centre, 10 * np.log10(coarse / band), of_vibration)
     every = square.sum(axis=0) / HANN
     share, shares = _shares(heard)
     elevation, azimuth = angles()
     near = decibels(away * (FAR / PASS_BY) ** 2, PRESSURE**2)
     rate = RATE * 2 ** max(0, math.ceil(math.log2(4 * frequency[-1] / RATE)))
     known = np.isfinite(error).all(axis=0)
-    total_error = (band * np.nan_to_num(error.T)).sum(axis=0) / np.maximum(band.sum(axis=0), 1e-300)
+    loud = band[known]
+    total_error = (loud * error.T[known]).sum(axis=0) / np.maximum(loud.sum(axis=0), 1e-300)
     return {
         "names": paths.names,
         "places": paths.places,
@@ -466,19 +474,22 @@ def _sound(
 
 
 def _errors(
-    paths: Paths, centre: np.ndarray, coarser: np.ndarray, of_forces: tuple[np.ndarray, np.ndarray]
+    paths: Paths,
+    centre: np.ndarray,
+    coarser: np.ndarray,
+    of_vibration: tuple[np.ndarray, np.ndarray],
 ) -> np.ndarray:
-    """Errors (k, b) dB: of the elements, by larger ones (b, k) dB and sources inside, and of the force."""
+    """Errors (k, b) dB: of the elements, by larger ones (b, k) dB and sources inside, and of the vibration."""
     elements = coarser.T / (COARSER**ORDER - 1)
     solved = paths.near.frequency[1:]
     inside = np.array([np.interp(centre, solved, one) for one in paths.error]).reshape(
         len(paths.names), -1
     )
-    force = np.full(len(centre), np.nan)
-    for band, value in zip(*of_forces, strict=True):
-        force[np.isclose(centre, band)] = value
-    whole = np.sqrt(elements**2 + inside**2 + np.nan_to_num(force) ** 2)
-    return whole if not len(of_forces[0]) else np.where(np.isnan(force), np.nan, whole)
+    moved = np.full(len(centre), np.nan)
+    for band, value in zip(*of_vibration, strict=True):
+        moved[np.isclose(centre, band)] = value
+    whole = np.sqrt(elements**2 + inside**2 + np.nan_to_num(moved) ** 2)
+    return whole if not len(of_vibration[0]) else np.where(np.isnan(moved), np.nan, whole)
 
 
 def _signal(

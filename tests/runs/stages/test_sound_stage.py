@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import wave
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from tireroad.runs.files.export import export
 from tireroad.runs.report.page import write_report
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.pipeline import run_scene
+from tireroad.runs.stages.sound import SoundStage
 
 pytestmark = pytest.mark.slow
 
@@ -156,3 +158,18 @@ def test_what_cannot_be_heard_is_refused(
 ) -> None:
     with pytest.raises(tireroad.InputError, match=message):
         run(tmp_path / "run", change)
+
+
+def test_the_vibration_errs_as_the_contact_force_and_the_worst_of_the_axle() -> None:
+    """Per band, as a root of squares; unknown where one is unknown, and the contact alone without the axle."""
+    contact, axle = np.array([[9.0, 9.0, 3.0], [9.0, 9.0, np.nan]]), np.array([[1.0, 4.0, 2.0]] * 2)
+    levels = {"third_octave/centre": np.array([100.0, 126.0])}
+    found = SimpleNamespace(contact_level_error=contact, level_error=axle, levels=levels)
+    stage = SimpleNamespace(spectra=SimpleNamespace(product=found))
+    centre, error = SoundStage._errors.func(stage)
+    np.testing.assert_allclose(centre, [100.0, 126.0])
+    np.testing.assert_allclose(error, [5.0, np.nan])
+    found.level_error = None
+    np.testing.assert_allclose(SoundStage._errors.func(stage)[1], [3.0, np.nan])
+    found.contact_level_error = None
+    assert not len(SoundStage._errors.func(stage)[0])
