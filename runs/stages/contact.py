@@ -21,6 +21,7 @@ from threadpoolctl import threadpool_limits
 from tireroad.contact.loop import Driven, Loop, roll
 from tireroad.contact.model import solver_name
 from tireroad.contact.patch import Patch
+from tireroad.contact.results.band import USABLE
 from tireroad.contact.results.chatter import LIMIT, Chatter, Chosen, warning
 from tireroad.contact.results.energy import (
     Circulation,
@@ -31,6 +32,7 @@ from tireroad.contact.results.energy import (
     own_states,
     springs,
 )
+from tireroad.contact.roads.kinds.shapes import Edges
 from tireroad.contact.setup import ContactSetup
 from tireroad.fem.static.footprint import Footprint
 from tireroad.fem.static.state import StaticState
@@ -41,6 +43,7 @@ from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files import store
 from tireroad.runs.process import observe
 from tireroad.runs.process.signals import Deferred, Stopped
+from tireroad.runs.scene.tables.scene import Road
 from tireroad.runs.stages import contact_file
 from tireroad.runs.stages import setup as stages_setup
 from tireroad.runs.stages.contact_file import (
@@ -70,6 +73,11 @@ from tireroad.runs.stages.stage import Done, Record, Stage
 # too large at 1.8, 2 % at 2.4 (torus.toml), 5 % too small at 2.5, 3 % at 3.6. Only on a mesh
 # whose nodes are as far apart as the footprint is wide was it 35 % at 2.4: its error bars tell.
 FEW = 2.2
+# Times the band's end: least frequency at which points pass an edge. Over a step of 10 mm (quickstart.toml, no friction)
+# the longitudinal force was 2.2 times too large at 1.8 times, whether with 10 mm at 30 or 5 mm at 15 km/h, and 4 to 9 %
+# at 3.6; work over the step 127, 78 J and 58, 66 J, where lifting the tire takes 50 J.
+APART = 3.0
+_CREEPING = 0.02
 # Share of the static deflection: motion of the contact up to which a linear tire is trusted.
 LINEAR = 1 / 3
 
@@ -121,6 +129,24 @@ def points(record: Record, patch: Patch, extent: Footprint, relief: float) -> No
             f"contact points are {1e3 * spacing[0]:.3g} × {1e3 * spacing[1]:.3g} mm apart on a footprint of {1e3 * size[0]:.3g} × "
             f"{1e3 * size[1]:.3g} mm: on a rough road forces of so few may vary by a third too much; take a quarter "
             "of its width and length or less (contact.points)"
+        )
+
+
+def edges(record: Record, road: Road, patch: Patch, speed: float, highest: float) -> None:
+    """Warn if the points pass an edge of the road (speed, m/s) at a frequency near the modes' band, `highest` Hz.
+
+    They meet it one by one, with a force each along the road, which the tire then feels; not where it rolls so
+    slowly that it follows them at rest.
+    """
+    spacing, end = float(patch.spacing[0]), USABLE * highest
+    if not (isinstance(road.surface, Edges) and spacing and speed > 0):
+        return
+    passing = speed / spacing
+    if _CREEPING * end < passing < APART * end:
+        record.warnings.append(
+            f"contact points {1e3 * spacing:.3g} mm apart pass the edges of the {road.kind} at {passing:.3g} Hz, less than "
+            f"{APART:g} times the band's end of {end:.3g} Hz: the tire feels them one by one, and forces along the road may be "
+            f"twice too large; take contact.points.dx = {speed / (APART * end):.2g} m or less"
         )
 
 
@@ -504,6 +530,8 @@ class ContactStage(Stage[ContactHistory]):
         describe(record, totals, loop.solver, chosen, chosen.steps - done)
         alternation(record, totals.alternation.worst, scheme)
         points(record, setup.patch, self.static.product.footprint(), setup.relief)
+        highest = self.rotating.product.highest / (2 * np.pi)
+        edges(record, self.job.scene.road, setup.patch, abs(setup.rolled.speed), highest)
         deflection, held = self.static.product.deflection, self.job.scene.axle.kind == "fixed"
         excursion(record, totals.figures.excursion, deflection, held=held)
         stages_setup.describe(record, setup)

@@ -1,15 +1,17 @@
 """How far the contact moves beyond the static state, as the wheel sees it, and what is said of it."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from tireroad.contact.results.chatter import Chatter
 from tireroad.contact.results.energy import Totals
+from tireroad.contact.roads.kinds.shapes import Cleat, Flat
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.static.footprint import Footprint
-from tireroad.runs.stages.contact import excursion, points
+from tireroad.runs.stages.contact import edges, excursion, points
 from tireroad.runs.stages.stage import Record
 from tireroad.runs.validation.cases import oval_patch
 
@@ -83,3 +85,25 @@ def test_points_that_touch_on_a_soft_tread_are_counted_as_they_settled() -> None
     points(record, patch, Footprint(0.005, 0.004, 1e-5), 1e-3)
     assert patch.touching.tolist() == [5, 5]
     assert not record.warnings
+
+
+@pytest.mark.parametrize(
+    ("speed", "spacing", "surface", "said"),
+    [
+        (8.3, 0.010, Cleat(), True),
+        (8.3, 0.005, Cleat(), False),
+        (4.1, 0.005, Cleat(), True),
+        (16.6, 0.010, Cleat(), False),
+        (8.3, 0.010, Flat(), False),
+        (0.003, 0.010, Cleat(), False),
+        (8.3, 0.0, Cleat(), False),
+    ],
+)
+def test_points_that_pass_an_edge_one_by_one_are_told_of(speed, spacing, surface, said) -> None:
+    """Modes to 570 Hz: 830 Hz is too near to 456 Hz, 1660 Hz is not, whatever makes it."""
+    record = Record()
+    patch = SimpleNamespace(spacing=np.array([spacing, spacing]))
+    edges(record, SimpleNamespace(surface=surface, kind="cleat"), patch, speed, 570.0)
+    assert any("one by one" in text for text in record.warnings) == said
+    if said:
+        assert f"contact.points.dx = {speed / 1368:.2g} m" in record.warnings[0]
