@@ -315,14 +315,17 @@ class SoundStage(WholeTire[Sound]):
         """Bands (b,) Hz and the errors (b,) dB of the vibration in them, NaN where unknown.
 
         Those of the vertical contact force, which drives it, and of the force on the axle, which the modes
-        carry there as they do to the outer face: the largest of its three directions.
+        carry there as they do to the outer face: of its three directions by their power.
         """
         found = self.spectra.product if self.spectra else None
         if found is None or found.contact_level_error is None:
             return np.zeros(0), np.zeros(0)
         error = found.contact_level_error[:, 2]
         if found.level_error is not None:
-            error = np.hypot(error, found.level_error.max(axis=1))
+            level = found.levels["third_octave/level"]
+            share = 10 ** ((level - level.max(axis=1, keepdims=True)) / 10)
+            axle = (share * found.level_error).sum(axis=1) / share.sum(axis=1)
+            error = np.hypot(error, axle)
         return found.levels["third_octave/centre"], error
 
     def write(self, file: h5py.File, product: Sound) -> None:
