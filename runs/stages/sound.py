@@ -446,7 +446,9 @@ def _sound(
     rate = RATE * 2 ** max(0, math.ceil(math.log2(4 * frequency[-1] / RATE)))
     known = np.isfinite(error).all(axis=0)
     loud = band[known]
-    total_error = (loud * error.T[known]).sum(axis=0) / np.maximum(loud.sum(axis=0), 1e-300)
+    # Errors of bands have one sign and the other: their squares add.
+    total_error = np.linalg.norm(loud * error.T[known], axis=0)
+    total_error /= np.maximum(loud.sum(axis=0), 1e-300)
     return {
         "names": paths.names,
         "places": paths.places,
