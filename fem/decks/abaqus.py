@@ -59,6 +59,7 @@ SUBOPTIONS = (
 )
 
 
+_SINGLE = 5000  # elements with a *REBAR each: a section has some hundreds
 # Of the thickness: from a shell's middle to its nodes.
 _OFFSETS = {"": 0.0, "SPOS": 0.5, "SNEG": -0.5}
 
@@ -211,6 +212,10 @@ class SectionReader:
 
     def _one(self, layer: Layer, element: int, scope: int) -> tuple[str, str]:
         """Names of the sets of a single element, and of those whose cords are one line with it."""
+        if len(self._single) >= 2 * _SINGLE:
+            raise layer.place.error(
+                f"more than {_SINGLE} elements have a *REBAR of their own: name sets of elements"
+            )
         sort = scope, layer.material, layer.area, layer.position, layer.cut is None
         open_lines = [one for one in self._lines if one[0] == sort and element not in one[2]]
         if not open_lines:

@@ -264,3 +264,11 @@ def test_triangles_with_rebar_are_refused(own):
     text += f"*REBAR, ELEMENT=CONTINUUM, MATERIAL=STEEL, NAME=C\nWALL, {NUMBERS}, 0., 0.5, 1\n"
     with pytest.raises(Exception, match="axisymmetric quadrilaterals"):
         own(text)
+
+
+def test_a_rebar_for_each_of_very_many_elements_is_refused(own):
+    torus = Torus(arcs=12, wall=2)
+    text = plain(torus) + CORDS + "*REBAR, ELEMENT=AXIMEMBRANE, MATERIAL=STEEL, NAME=C\n"
+    text += "".join(f"{n}, {NUMBERS}, 0.\n" for n in range(1, 5002))
+    with pytest.raises(Exception, match="more than 5000 elements"):
+        own(text)
