@@ -74,7 +74,8 @@ def layers(card: Card, lines: list[Data]) -> Iterator[Layer]:
         raise card.place.error("*REBAR without MATERIAL=")
     rows = list(data_lines(lines))
     pairs = element == "CONTINUUM" and geometry == "SKEW"
-    for place, parts in rows[:: 2 if pairs else 1]:
+    for n in range(0, len(rows), 2 if pairs else 1):
+        place, parts = rows[n]
         if len(parts) < 2 or not parts[0]:
             raise place.error(
                 "a *REBAR needs an element or set, area, spacing; is the deck cut short?"
@@ -84,8 +85,8 @@ def layers(card: Card, lines: list[Data]) -> Iterator[Layer]:
         given = dict(zip(columns, rest, strict=True))
         layer = _layer(card, parts[0], area, spacing or 1.0, given, place)
         if pairs:
-            follows = [line for _, line in rows[rows.index((place, parts)) + 1 :][:1]]
-            layer = replace(layer, cut=_skew(follows[0] if follows else [], place))
+            second = rows[n + 1][1] if n + 1 < len(rows) else []
+            layer = replace(layer, cut=_skew(second, place))
         elif element == "CONTINUUM":
             layer = replace(layer, edge=0, cut=_parallel(given["edge"], given["fraction"], place))
         yield layer
