@@ -9,6 +9,7 @@ import difflib
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -652,20 +653,25 @@ class _Reader:
         """One line for each kind of item read."""
         yield f"{self.nodes.count} nodes in {self.nodes.blocks} blocks"
         for block in self.elements.blocks:
-            if block.kind.role != "shell" or self._corded(block):
+            if self._takes_part(block):
                 yield f"{len(block.labels)} elements {block.type} ({block.place})"
         yield from self.sections.used()
 
-    def _corded(self, shells: Block) -> bool:
-        """Whether any of them has cords."""
+    @cached_property
+    def _corded(self) -> np.ndarray:
+        """Labels of the elements with cords, once the file has ended."""
         sets = Sets("element set", self.sets.element_sets, self.elements.labels())
         names = {layer.elements for layer in self.sections.layers}
-        return any(np.isin(shells.labels, sets.labels(name)).any() for name in names)
+        return np.concatenate([np.empty(0, np.int64), *map(sets.labels, names)])
+
+    def _takes_part(self, block: Block) -> bool:
+        """Whether the elements are the tire's: shells are where one of them has cords."""
+        return block.kind.role != "shell" or bool(np.isin(block.labels, self._corded).any())
 
     def _not_used(self) -> Iterator[str]:
         """One line for each keyword not used, with its first place."""
         for block in self.elements.blocks:
-            if block.kind.role == "shell" and not self._corded(block):
+            if not self._takes_part(block):
                 name = f"ELEMENT, TYPE={block.type}"
                 self.unused.setdefault(name, []).append(block.place)
         for name, places in self.unused.items():

@@ -323,9 +323,7 @@ def _moved(points: np.ndarray, nodes: np.ndarray, dimension: int, distance: floa
         step = points[:, 1] - points[:, 0]
         normal = np.column_stack([-step[:, 1], step[:, 0], np.zeros(len(step))])
     else:
-        normal = np.cross(
-            points[:, 2] - points[:, 0], points[:, 3 % points.shape[1]] - points[:, 1]
-        )
+        normal = np.cross(points[:, 2] - points[:, 0], points[:, 3] - points[:, 1])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     known, row = np.unique(nodes, return_inverse=True)
     mean = np.zeros((len(known), 3))
