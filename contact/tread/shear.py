@@ -18,6 +18,7 @@ Mechanics, (3.75) and (3.76).
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from typing import Protocol
 
 import numpy as np
@@ -37,24 +38,62 @@ Plane = NDArray[np.complex128]  # x + iy
 Index = NDArray[np.intp]
 
 
+MARGIN = 4  # points beyond the grid, over which the kernel of the preconditioner has fallen off
+
+
 class Convolution:
     """Convolution by FFT over twice a grid of `shape`, with kernels (3 or 5, ...) of a larger one.
 
-    `place` (a,): flat indices of the points on the grid.
+    `place` (a,): flat indices of the points on the grid. `beside` m/N: compliance of each point in
+    series with the tread, which the preconditioner includes.
     """
 
-    def __init__(self, kernels: Array, shape: tuple[int, int], place: Index) -> None:
+    def __init__(
+        self, kernels: Array, shape: tuple[int, int], place: Index, beside: float = 0.0
+    ) -> None:
+        self._shape = shape
         self._size = tuple(fft.next_fast_len(2 * n - 1, real=True) for n in shape)
         rows, columns = (
             np.concatenate([np.arange(n), np.zeros(size - 2 * n + 1, int), np.arange(1 - n, 0)])
             for n, size in zip(shape, self._size, strict=True)
         )
-        self._place = place // shape[1] * self._size[1] + place % shape[1]
         some = kernels[:, rows[:, None], columns]
         self.own = float(some[0, 0, 0] + some[2, 0, 0]) / 2
         # Upper bound of the row sums of both components of `spread`.
         self.bound = float(np.abs(some[:3]).sum())
         self._xx, self._xy, self._yy, *self._lift = fft.rfft2(some)
+        self._period = tuple(
+            min(fft.next_fast_len(n + MARGIN, real=True), 2 * n - 1) for n in shape
+        )
+        around = np.ix_(*(np.fft.ifftshift(np.arange(n) - n // 2) for n in self._period))
+        xx, xy, yy = (fft.rfft2(kernel[around]).real for kernel in kernels[:3])
+        xx, yy = xx + beside, yy + beside
+        determinant = xx * yy - xy**2
+        least = 1e-6 * float(determinant.max())
+        self._inverse = np.stack([yy, -xy, xx]) / np.maximum(determinant, least)
+        self.set_points(place)
+
+    def at(self, place: Index) -> Convolution:
+        """The same between other points of the grid."""
+        other = copy(self)
+        other.set_points(place)
+        return other
+
+    def set_points(self, place: Index) -> None:
+        """Take the points `place` (a,)."""
+        rows, columns = np.divmod(place, self._shape[1])
+        self._place = rows * self._size[1] + columns
+        self._place_in_period = rows * self._period[1] + columns
+
+    def precondition(self, moved: Plane) -> Plane:
+        """Approximate forces (a,) N in the plane for displacements (a,) m: the periodic inverse."""
+        field = np.zeros((2, self._period[0] * self._period[1]))
+        field[:, self._place_in_period] = _parts(moved)
+        x, y = fft.rfft2(field.reshape(2, *self._period), overwrite_x=True)
+        xx, xy, yy = self._inverse
+        force = np.stack([xx * x + xy * y, xy * x + yy * y])
+        whole = fft.irfft2(force, self._period, overwrite_x=True).reshape(2, -1)
+        return _plane(whole[:, self._place_in_period])
 
     def spread(self, force: Plane) -> Plane:
         """Displacements (a,) m in the plane under forces (a,) N in the plane."""
@@ -93,11 +132,6 @@ def _parts(plane: Plane) -> Array:
 def _plane(parts: Array) -> Plane:
     """(2, a) as x + iy (a,)."""
     return np.ascontiguousarray(parts.T).view(complex)[:, 0]
-
-
-# Number of points up to which a matrix product is faster than transforms: for 181 points 31 us
-# against 137, for 357 both take 170.
-FEW = 200
 
 
 def half_space_shear(
@@ -166,8 +200,8 @@ class Shear(Protocol):
     def lifted(self, index: Index) -> Array:
         """`lift` between the points `index`, (a, 2a): of all forces along x, then along y."""
 
-    def between(self, index: Index) -> Between:
-        """`spread` between the points `index`."""
+    def between(self, index: Index, beside: float = 0.0) -> Between:
+        """`spread` between the points `index`; `beside` m/N is in series with each."""
 
     def matrix(self, index: Index) -> Array:
         """The same as a matrix (2a, 2a): all forces along x, then those along y."""
@@ -177,11 +211,17 @@ class Between:
     """The operator `apply` from (a,) N to (a,) m, complex.
 
     `own` m/N: mean self-compliance of a point's two components; `bound` m/N of the largest singular
-    value.
+    value; `precondition` from (a,) m to (a,) N, about the inverse, None: only `own` is known.
     """
 
-    def __init__(self, apply: Callable[[Plane], Plane], own: float | Array, bound: float) -> None:
-        self.apply, self.own, self.bound = apply, own, bound
+    def __init__(
+        self,
+        apply: Callable[[Plane], Plane],
+        own: float | Array,
+        bound: float,
+        precondition: Callable[[Plane], Plane] | None = None,
+    ) -> None:
+        self.apply, self.own, self.bound, self.precondition = apply, own, bound, precondition
 
 
 class MatrixShear:
@@ -221,16 +261,26 @@ class MatrixShear:
         some = np.concatenate([2 * index, 2 * index + 1])
         return self._matrix[np.ix_(some, some)]
 
-    def between(self, index: Index) -> Between:
+    def between(self, index: Index, beside: float = 0.0) -> Between:
         """`spread` between the points `index`."""
         some = np.stack([2 * index, 2 * index + 1], axis=-1).ravel()
-        return _product(self._matrix[np.ix_(some, some)])
+        matrix = self._matrix[np.ix_(some, some)]
+
+        def apply(force: Plane) -> Plane:
+            return (matrix @ force.view(float)).view(complex)
+
+        own = matrix.diagonal().reshape(-1, 2).mean(axis=1)
+        return Between(apply, own, float(np.abs(matrix).sum(axis=1).max(initial=0.0)))
+
+
+MOST_RECTANGLES = 100  # whose kernels are kept
 
 
 class KernelShear:
     """The same on a regular grid, by FFT.
 
-    Between few points by a matrix, between more by FFT over the rectangle that contains them.
+    Between some of the points over the rectangle that contains them, whose kernels are kept: it
+    changes less often than the points.
     """
 
     def __init__(self, grid: GridPlaces, influence: Influence) -> None:
@@ -239,6 +289,7 @@ class KernelShear:
         self._kernels = influence(x, y, *(np.full(x.shape, d / 2) for d in grid.spacing))
         self.coupled = bool(self._kernels[3:].any())
         self._whole = Convolution(self._kernels, grid.shape, grid.place)
+        self._rectangles: dict[tuple[int, int, float], Convolution] = {}
 
     def spread(self, force: Plane) -> Plane:
         """Displacements (c,) m in the plane under forces (c,) N in the plane."""
@@ -261,34 +312,21 @@ class KernelShear:
         xx, xy, yy = self._between(index)[:3]
         return np.block([[xx, xy], [xy, yy]])
 
-    def between(self, index: Index) -> Between:
-        """`spread` between the points `index`."""
-        if len(index) <= FEW:
-            return _dense(self._between(index))
+    def between(self, index: Index, beside: float = 0.0) -> Between:
+        """`spread` between the points `index`; `beside` m/N is in series with each."""
         i, j = np.divmod(self._grid.place[index], self._grid.shape[1])
         i, j = i - i.min(), j - j.min()
         shape = int(i.max()) + 1, int(j.max()) + 1
-        part = Convolution(self._kernels[:3], shape, i * shape[1] + j)
-        return Between(part.spread, part.own, part.bound)
+        place = i * shape[1] + j
+        if (*shape, beside) not in self._rectangles:
+            if len(self._rectangles) >= MOST_RECTANGLES:
+                self._rectangles.clear()
+            one = Convolution(self._kernels[:3], shape, place, beside)
+            self._rectangles[(*shape, beside)] = one
+        part = self._rectangles[(*shape, beside)].at(place)
+        return Between(part.spread, part.own, part.bound, part.precondition)
 
     def _between(self, index: Index) -> Array:
         """All kernels between the points `index`, (5, a, a)."""
         i, j = np.divmod(self._grid.place[index], self._grid.shape[1])
         return self._kernels[:, i[:, None] - i, j[:, None] - j]
-
-
-def _dense(kernels: Array) -> Between:
-    """The operator of the kernels (3 or more, a, a) of `spread`."""
-    xx, xy, yy = kernels[:3]
-    matrix = np.stack([np.stack([xx, xy], axis=-1), np.stack([xy, yy], axis=-1)], axis=1)
-    return _product(matrix.reshape(2 * len(xx), -1))
-
-
-def _product(matrix: Array) -> Between:
-    """The operator of a matrix (2a, 2a), x and y of each point adjacent."""
-
-    def apply(force: Plane) -> Plane:
-        return (matrix @ force.view(float)).view(complex)
-
-    own = matrix.diagonal().reshape(-1, 2).mean(axis=1)
-    return Between(apply, own, float(np.abs(matrix).sum(axis=1).max(initial=0.0)))

@@ -132,9 +132,9 @@ _BARS = 0.42
 # unknowns (2026-11-25). The companion runs of error bars go without it.
 _LOAD_ERROR = 1.8
 # s a step of the horizontal forces: a few Newton steps, each with an iterative solver, whose calls
-# cost more than their operations. Measured: 20 to 37 ms with a tread that shears and 640 points that
-# touch, a passenger tire (2026-11-27), 7.2 to 10 ms with 44 to 113; 4.4 ms with a brush alone.
-_SHEARED, _BRISTLES = 3.3e-2, 4.4e-3
+# cost more than their operations. Measured with a tread that shears (2026-11-28): 10.7 ms with 644
+# points that touch, a passenger tire, 5.7 ms with 166; with a brush alone 4.1 and 2.6 ms.
+_SHEARED, _SHEARED_POINT, _BRISTLES = 4e-3, 1.05e-5, 3.3e-3
 # One tangent with friction, of the frictionless static state: its factor has two triangles, and is
 # of the whole ring. Measured on the built-in tire (2026-11-25): 0.2 standing, 0.24 and 0.26 rolling.
 _RUBBING = 0.25
@@ -199,7 +199,7 @@ def operations(
         points = size.points**2 if dense else 4000 * size.points
         step = 2e-4 + 1e-9 * (4 * loads * size.coordinates + points)
         if scene.contact.rubs:
-            sheared = _SHEARED * max(size.touching / 640, 0.25)
+            sheared = _SHEARED + _SHEARED_POINT * size.touching
             step += sheared if scene.contact.sheared else _BRISTLES
         if scene.time.scheme == "convolution":
             step += 1e-9 * 0.5 * size.steps * loads**2

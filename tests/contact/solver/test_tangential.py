@@ -55,6 +55,21 @@ def test_stiffness_through_nodes_is_the_matrix() -> None:
     assert through.norm() >= dense.norm() * (1 - 1e-12)
 
 
+def test_between_some_points_it_is_their_block() -> None:
+    """Nodes that carry none of them are left out; weights may be negative, as those of quadratic elements."""
+    rng = np.random.default_rng(6)
+    factor = rng.standard_normal((24, 24))
+    weights = np.zeros((40, 12))
+    for point, row in enumerate(weights):
+        row[(point // 4 + np.arange(3)) % 12] = [0.6, -0.1, 0.5]
+    whole = Carcass(factor @ factor.T, sparse.csr_matrix(weights))
+    for index in (np.array([3, 4, 9, 17]), np.arange(8, 20), np.arange(40)):
+        block, force = whole.between(index), np.zeros(40, dtype=complex)
+        force[index] = rng.standard_normal(len(index)) + 1j * rng.standard_normal(len(index))
+        assert np.allclose(block(force[index]), whole(force)[index], rtol=1e-12)
+        assert np.array_equal(block.own, whole.own[index])
+
+
 @pytest.mark.parametrize("bound", [0.5, 2.0, np.inf])
 def test_hundreds_of_points_balance(bound: float) -> None:
     rng = np.random.default_rng(3)

@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 from tireroad.contact.loop import Drive, Loop, roll
 from tireroad.contact.solver.active_set import ActiveSet
-from tireroad.contact.solver.stick_slip import Friction
+from tireroad.contact.solver.stick_slip import Friction, gmres
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import half_space_compliance, half_space_influence
 from tireroad.contact.tread.creep import TreadMemory
@@ -214,3 +214,29 @@ def test_layer_of_both_directions_is_positive_definite() -> None:
     whole = np.block([[normal, zx, zy], [zx.T, xx, xy], [zy.T, xy.T, yy]])
     assert np.abs(whole - whole.T).max() < 1e-12 * np.abs(whole).max()
     assert np.linalg.eigvalsh(whole)[0] > 0
+
+
+@pytest.mark.parametrize("beside", [0.0, 2e-6])
+@pytest.mark.parametrize("shape", [(1, 9), (3, 4), (14, 11)])
+def test_a_preconditioner_spares_most_products(shape, beside) -> None:
+    """An oval patch of a layer, a bristle's compliance in series with each point."""
+    grid, points, _ = cells(*shape, 5e-3, 5e-3)
+    middle, half = points.mean(axis=0), np.maximum(np.ptp(points, axis=0), 1e-3) / 2
+    index = np.flatnonzero((((points - middle) / half) ** 2).sum(axis=1) <= 1.2)
+    one = KernelShear(grid, LayerShear(1e7, 0.49, 0.01)).between(index, beside)
+    rng, calls = np.random.default_rng(5), []
+    right = rng.standard_normal(2 * len(index))
+
+    def apply(flat: np.ndarray) -> np.ndarray:
+        calls.append(1)
+        force = flat.view(complex)
+        return (one.apply(force) + beside * force).view(float)
+
+    def inverse(flat: np.ndarray) -> np.ndarray:
+        return one.precondition(flat.view(complex)).view(float)
+
+    plain = gmres(apply, right, 1e-6)
+    spent = len(calls)
+    found = gmres(apply, right, 1e-6, inverse)
+    assert np.abs(found - plain).max() < 1e-4 * np.abs(plain).max()
+    assert len(calls) - spent <= 0.65 * spent
