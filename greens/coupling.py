@@ -68,9 +68,9 @@ from tireroad.modal.states import StateModes
 # Of each point's own static flexibility: the most that the shapes left out may add up to. At
 # 90 rad/s the receptance up to half the highest mode changes by 1.2e-3, with 1e-3 by 5e-3.
 TOLERANCE = 1e-4
-# Pseudo-modes this many times faster than the highest mode are static (`dynamic`). At 50 rad/s the
-# receptance between 187 points up to half the highest mode changes by 4e-4, at 3 by 1e-3, at 2 by
-# 4e-3.
+# Pseudo-modes and states this many times faster than the highest mode are static (`dynamic`): they
+# would determine the automatic step. Receptances between 187 points up to half the highest mode
+# change by 4e-4 at 50 rad/s and 4e-3 at 90; at 3 by 1e-3, at 2 by 4e-3 at 50 rad/s.
 FASTEST = 4.0
 FEW = 100  # pseudo-modes that are kept in any case, since they cost next to nothing
 
@@ -109,7 +109,8 @@ def dynamic(projection: Projection, speed: float, known: int) -> np.ndarray:
     Relative to its static response, a coordinate's response at w has the dynamic part
     (w^2 + 2 w Omega n) / (omega_k^2 - Omega^2 n^2),  n = |S_kk|^1/2: inertia and convection. It
     counts as static if at half the highest mode this is no more than for a standing wheel at
-    `FASTEST` times the highest mode.
+    `FASTEST` times the highest mode. One whose states would be faster than that is static as a
+    coordinate, not as a state: what is left is a problem of second order with an energy of its own.
     """
     squares = projection.squares
     highest = np.sqrt(squares[projection.modes - 1])
@@ -119,6 +120,7 @@ def dynamic(projection: Projection, speed: float, known: int) -> np.ndarray:
     moving = highest**2 + 4 * highest * turning
     stays = squares - turning**2 <= FASTEST**2 * moving
     stays[: known + FEW] = True
+    stays[known:] &= (np.sqrt(squares) + turning <= FASTEST * highest)[known:]
     return stays
 
 
@@ -243,17 +245,27 @@ class Wheel:
             raise InputError(
                 "greens.residual: second-order is not available for a wheel that moves"
             )
-        r, same = outputs.shape[0], outputs is loads
-        probes = loads if same else sparse.vstack([outputs, loads], format="csr")
         if option == "attachment":
             assert modes is not None, "attachment modes need the modes on all unknowns"
-            whole = self._attached(basis, modes, probes, light)
-        else:
-            if light is not None:
-                probes = sparse.vstack([probes, light], format="csr")
-            whole = self._of_second_order(basis, probes)
-        forces = slice(0 if same else r, None)
-        return whole if same and light is None else whole.between(slice(r), forces)
+            return self.respond_attached(basis, modes, outputs, loads, light)[0]
+        probes = _together(outputs, loads)
+        if light is not None:
+            probes = sparse.vstack([probes, light], format="csr")
+        return _between(self._of_second_order(basis, probes), outputs, loads, light)
+
+    def respond_attached(
+        self,
+        basis: Basis,
+        modes: Modes,
+        outputs: Probes,
+        loads: Probes,
+        light: Probes | None = None,
+    ) -> tuple[Response, Basis]:
+        """`respond` with attachment modes, and the basis of modes with them whose states it has.
+        Collective."""
+        probes = _together(outputs, loads)
+        whole, grown = self._attached(basis, modes, probes, light)
+        return _between(whole, outputs, loads, light), grown
 
     def _of_second_order(self, basis: Basis, probes: Probes) -> Response:
         """The states, and residual states in place of the truncated modes. Collective."""
@@ -302,14 +314,16 @@ class Wheel:
 
     def _attached(
         self, basis: Basis, modes: Modes, probes: Probes, light: Probes | None
-    ) -> Response:
-        """Response of the modes and the attachment modes of all probes; the `light` ones have none.
-        Collective."""
+    ) -> tuple[Response, Basis]:
+        """Response of the modes and the attachment modes of all probes, and their basis; the
+        `light` ones have none. Collective."""
         self._check_same(basis, modes)
         if self._drifts:
             drifting = self.standing_attachments(modes, probes)[0]
             found = drifting.couple(probes, probes)
-            return found if light is None else found.with_forces(drifting.couple(probes, light))
+            if light is not None:
+                found = found.with_forces(drifting.couple(probes, light))
+            return found, drifting
         weights, loads = fewest(probes)
         loads = on_own_rows(self.operators, loads)
         rows = sparse.csr_matrix(self._beside(basis.of_hub(probes)))
@@ -327,7 +341,9 @@ class Wheel:
             lacking = regained(grown.held, *self._pencils(grown.projection), probes, probes)
             flexibility, beside = flexibility + lacking.compliance, beside + lacking.momentum
         found = self._completed(grown, probes, probes, flexibility, beside)
-        return found if light is None else found.with_forces(grown.couple(probes, light))
+        if light is not None:
+            found = found.with_forces(grown.couple(probes, light))
+        return found, grown
 
     def _foremost(self, basis: Basis, probes: Probes, flexibility: Array) -> Array:
         """Load combinations (p, k) whose shapes join the basis, among probes that move anything."""
@@ -390,6 +406,19 @@ class Wheel:
         """H (f, r, k) m/N of the full matrices, at the frequencies in Hz. Collective."""
         full = self.rotating_stiffness, self.rotating_damping
         return receptance(self.operators, *full, outputs, loads, frequency, air=self.air)
+
+
+def _together(outputs: Probes, loads: Probes) -> Probes:
+    """Outputs and loads as one set of probes, which a response is symmetric in."""
+    return loads if outputs is loads else sparse.vstack([outputs, loads], format="csr")
+
+
+def _between(whole: Response, outputs: Probes, loads: Probes, light: Probes | None) -> Response:
+    """The response between `outputs` and `loads`, then the `light` ones, of that of all together."""
+    same, r = outputs is loads, outputs.shape[0]
+    if same and light is None:
+        return whole
+    return whole.between(slice(r), slice(0 if same else r, None))
 
 
 def wheel_of(

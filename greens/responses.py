@@ -21,13 +21,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 from scipy import sparse
 
 from tireroad.fem.errors import ConvergenceError, InputError, NearlySingular
-from tireroad.greens.coupling import Basis, Wheel
+from tireroad.greens.coupling import FASTEST, Basis, Wheel
 from tireroad.greens.response import Response, keep
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.damping import beyond
@@ -92,15 +92,12 @@ def _size(matrices: np.ndarray) -> np.ndarray:
 
 Figures = dict[str, tuple[float, str]]
 
+Answer = TypeVar("Answer")
 RESIDUALS = ("none", "dirac", "static", "second-order", "attachment")
 CHOICES = ("participation", "frequency")
 # Points and frequencies at which the truncation error is estimated: enough for its magnitude.
 _SAMPLE = 40
 _FREQUENCIES = 25
-# Residual states faster than this many times the highest mode follow statically: they would
-# determine the automatic step and change the receptance up to half the highest mode by at most
-# 0.001 (measured).
-_FASTEST = 3.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,11 +127,15 @@ def _check_known(name: str, value: str, known: tuple[str, ...]) -> None:
 
 @dataclass(frozen=True)
 class Made:
-    """A `response` with `figures`, name: (value, unit), and `warnings`."""
+    """A `response` with `figures`, name: (value, unit), and `warnings`.
+
+    `attached`: modes and attachment modes, whose states the response has; None without the latter.
+    """
 
     response: Response
     figures: Figures = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    attached: RollingModes | None = None
 
 
 def make_response(
@@ -160,23 +161,38 @@ def make_response(
         found = fields()
         if found is not rolling.basis:  # a new solution: its states must be its own too
             rolling = rolling_modes(found, rolling.turning, wheel().operators.body.comm)
-        response = _completed(wheel(), rolling, found.modes, outputs, loads, residual, light)
+        assert found.modes is not None, "the modes on all unknowns"
+        joined = Basis.of(rolling), found.modes, outputs, loads, light
+        response, basis = _singular_named(wheel(), lambda: wheel().respond_attached(*joined))
+        attached: RollingModes | None = _attached(basis, rolling)
     else:
-        response = _completed(wheel(), rolling, None, outputs, loads, residual, light)
+        given = Basis.of(rolling), None, outputs, loads, residual, light
+        response, attached = _singular_named(wheel(), lambda: wheel().respond(*given)), None
     if residual in ("static", "dirac"):
         return _made(response)
     highest = cutoff(rolling)
-    limit = _FASTEST * max(highest.circular, highest.rate)
+    limit = FASTEST * max(highest.circular, highest.rate)
     kept = response.keeping_where(lambda s: np.abs(s) <= limit)
     static = len(response.every) - len(kept.every)
-    what = f"residual states faster than {_FASTEST:g} times the highest mode, made static"
-    return _made(kept, {what: (static, "-")})
+    what = f"residual states faster than {FASTEST:g} times the highest mode, made static"
+    if attached is not None:
+        slow = np.abs(attached.states.eigenvalue) <= limit
+        attached = replace(attached, states=attached.states.among(slow))
+    return replace(_made(kept, {what: (static, "-")}), attached=attached)
 
 
-def _completed(wheel: Wheel, rolling: RollingModes, *given: Any) -> Response:
-    """`Wheel.respond` of these states, which names the speed if K_Omega is singular. Collective."""
+def _attached(basis: Basis, rolling: RollingModes) -> RollingModes:
+    """The modes with their attachment modes and the states of both, as the wheel rolls."""
+    projection = basis.projection
+    frequency = np.sqrt(np.maximum(projection.squares[: projection.modes], 0.0)) / (2 * np.pi)
+    modes = ModalBasis(frequency=frequency, shape=basis.shape, projection=projection)
+    return RollingModes(basis=modes, states=basis.states, turning=rolling.turning)
+
+
+def _singular_named(wheel: Wheel, respond: Callable[[], Answer]) -> Answer:
+    """What `respond` returns; the speed is named if K_Omega is singular. Collective."""
     try:
-        return wheel.respond(Basis.of(rolling), *given)
+        return respond()
     except NearlySingular as error:
         if not wheel.speed:
             raise

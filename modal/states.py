@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -47,6 +47,17 @@ class StateModes:
     left_residual: np.ndarray
     condition: float
     rigid: int = 0
+
+    def among(self, poles: np.ndarray) -> StateModes:
+        """Only the `poles` (q,) bool, and the block."""
+        return replace(
+            self,
+            eigenvalue=self.eigenvalue[poles],
+            right=np.ascontiguousarray(self.right[:, poles]),
+            left=self.left[poles],
+            residual=self.residual[poles],
+            left_residual=self.left_residual[poles],
+        )
 
     @property
     def every(self) -> np.ndarray:

@@ -182,8 +182,8 @@ def stored(coordinates: np.ndarray, rates: np.ndarray, stiffness: np.ndarray) ->
 def own_states(response: Response, rolling: RollingModes) -> bool:
     """Whether the response consists of the modes' own states.
 
-    With residual states, attachment modes or states of the full matrices, the modal coordinates are
-    not known here.
+    With residual states or states of the full matrices, the modal coordinates are not known here;
+    with attachment modes they are those of `rolling` if these have joined it.
     """
     if rolling.full:
         return False

@@ -507,7 +507,7 @@ class ContactStage(Stage[ContactHistory]):
             driven = driven_tire(self.job, chosen, setup.patch)
             loop = self._loop(record, setup, driven or chosen.tire, chosen.step)
         totals = Totals(setup.patch, setup.reach, scheme.limit, work=Work(scheme.scheme))
-        losses = Losses(chosen, response, self.rotating.product, self._leaning(setup))
+        losses = Losses(chosen, response, self._states, self._leaning(setup))
         with ExitStack() as stack, record.timing("time loop"):
             attributes = {"step": chosen.step, "scheme": chosen.scheme, "road_relief": setup.relief}
             attributes |= {"free_slip": slip, "scheme_reason": scheme.reason}
@@ -538,10 +538,15 @@ class ContactStage(Stage[ContactHistory]):
         contact_file.describe(record, setup, self.job.scene.road)
         if chosen.scheme != "convolution":
             work = works(totals.work, driven if self.job.scene.force else None)
-            given = self.rotating.product, response, loop.tire.snapshot(), work
+            given = self._states, response, loop.tire.snapshot(), work
             state = self.static.product
             pressed = float(state.normal_force.sum()) * (state.deflection or 0.0)
             describe_energy(record, *given, losses, chosen.step, pressed)
+
+    @property
+    def _states(self) -> RollingModes:
+        """The modes, with the attachment modes where there are any, whose states the loop has."""
+        return self.greens.product.attached or self.rotating.product
 
     def _leaning(self, setup: ContactSetup) -> Leaning:
         """The forces of the road's slope among those of the loop."""
@@ -549,7 +554,7 @@ class ContactStage(Stage[ContactHistory]):
         every = np.arange(response.residual.shape[1])
         if not leaning(self.job):
             return Leaning(every[:0], every, None)
-        rolling, shape = self.rotating.product, np.zeros((2 * p, 0))
+        rolling, shape = self._states, np.zeros((2 * p, 0))
         if Motion.known(rolling, response):
             probes = leaning_loads(self.static.product, setup)
             shape = Basis.of(rolling).seen(probes)

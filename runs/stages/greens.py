@@ -5,7 +5,7 @@ Stage greens: Green's functions between driven points, and between those of the 
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import ClassVar
 
 import h5py
@@ -16,12 +16,13 @@ from tireroad.contact.setup import ContactSetup
 from tireroad.fem.static.state import StaticState
 from tireroad.greens.coupling import Wheel
 from tireroad.greens.response import Response
-from tireroad.greens.responses import Wanted, band, judged, make_response, selected
+from tireroad.greens.responses import Made, Wanted, band, judged, make_response, selected
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
 from tireroad.runs.scene.tables.scene import PointForce, has_air
-from tireroad.runs.stages import cavity, corner
+from tireroad.runs.stages import cavity, corner, rotating
+from tireroad.runs.stages.modes import fill_projection, read_projection
 from tireroad.runs.stages.setup import components, leaning, leaning_loads, points_of, probes
 from tireroad.runs.stages.stage import Computed, Done, Record, turning_of
 
@@ -71,21 +72,27 @@ def read_responses(file: h5py.File) -> dict[str, Response]:
     }
 
 
+_ATTACHED = "attached"
+
+
 @dataclass(frozen=True)
 class Responses:
     """The responses of a scene, each None if the scene has none.
 
     `contact`: between the points of the patch, with the prescribed forces among its inputs;
-    `force`: between the points of the prescribed forces.
+    `force`: between the points of the prescribed forces. `attached`: the modes with their attachment
+    modes, whose states these are; None without the latter.
     """
 
     contact: Response | None = None
     force: Response | None = None
+    attached: RollingModes | None = None
 
     @property
     def named(self) -> dict[str, Response]:
         """The responses that exist, by name."""
-        return {name: made for name, made in vars(self).items() if made is not None}
+        both = {"contact": self.contact, "force": self.force}
+        return {name: made for name, made in both.items() if made is not None}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,18 +155,19 @@ class GreensStage(Computed[Responses]):
         if self._stands_with_air:
             cavity.describe(record, rolling)
         points = probes(self.job, self.static.product, self.setup.product)
-        whole = self._whole(record, rolling, points, wanted.residual)
+        made = self._whole(record, rolling, points, wanted.residual)
+        whole = made.response
         response = selected(whole, rolling, wanted, points.counted)
         seen, kept = (one.between(points.counted, points.counted) for one in (whole, response))
         record.indicators |= judged(points.name, seen, kept, rolling, wanted)
         if rolling.basis.projection.moves:
             loads, top = points.loads[points.counted], band(rolling, wanted)
             corner.check_blocked(record, rolling, loads, top)
-        responses = Responses(**self._apart(points.name, response))
+        responses = replace(self._apart(points.name, response), attached=made.attached)
         self._describe(record, responses)
         return responses
 
-    def _whole(self, record: Record, rolling: RollingModes, points, residual: str) -> Response:
+    def _whole(self, record: Record, rolling: RollingModes, points, residual: str) -> Made:
         """The response with all states. Collective."""
         if residual == "attachment":
             with record.timing("modes once more"):
@@ -176,24 +184,24 @@ class GreensStage(Computed[Responses]):
             )
         record.indicators |= made.figures
         record.warnings += made.warnings
-        return made.response
+        return made
 
-    def _apart(self, name: str, whole: Response) -> dict[str, Response]:
+    def _apart(self, name: str, whole: Response) -> Responses:
         """The contact's response, with prescribed forces as inputs (contact.loop), and theirs."""
         forces, more = len(self.job.scene.force), corner.readings(self.job)
         light = 2 * len(self.setup.product.patch.index) if self._leaning else 0
         if name == "force" or not (forces or more or light):
-            return {name: whole}
+            return Responses(contact=whole) if name == "contact" else Responses(force=whole)
         count, last = self._contact_forces, whole.input.shape[1]
         inputs = count + forces
         # What leans follows the vertical forces, before the prescribed ones.
         order = np.r_[:count, last - light : last, count:inputs]
-        contact = {"contact": whole.between(slice(None), order)}
+        contact = whole.between(slice(None), order)
         if not forces:
-            return contact
+            return Responses(contact=contact)
         held = 0 if self.job.axle else more
         readings = slice(inputs, inputs + 3 * forces + held)
-        return contact | {"force": whole.between(readings, slice(count, inputs))}
+        return Responses(contact=contact, force=whole.between(readings, slice(count, inputs)))
 
     def _describe(self, record: Record, responses: Responses) -> None:
         scene, setup = self.job.scene, self.setup.product
@@ -224,10 +232,28 @@ class GreensStage(Computed[Responses]):
             cavity.fill_states(file, self.rotating.product)
         if self.setup.product:
             put(file, "contact/index", self.setup.product.patch.index, "-")
+        if product.attached is not None:
+            group, basis = file.create_group(_ATTACHED), product.attached.basis
+            put(group, "shape", basis.shape, "kg^-1/2")
+            put(group, "frequency", basis.frequency, "Hz")
+            fill_projection(group, basis.projection)
+            rotating.fill(group.create_group("states"), product.attached)
 
     def read(self, file) -> Responses:
         """The responses."""
-        return Responses(**read_responses(file))
+        found = read_responses(file)
+        responses = Responses(contact=found.get("contact"), force=found.get("force"))
+        if _ATTACHED not in file:
+            return responses
+        group = file[_ATTACHED]
+        shape, frequency = group["shape"][:], group["frequency"][:]
+        projection = read_projection(group, self.job.axle, shape.shape[1] - len(frequency))
+        attached = RollingModes(
+            basis=ModalBasis(frequency=frequency, shape=shape, projection=projection),
+            states=rotating.read(group["states"]),
+            turning=turning_of(self.job),
+        )
+        return replace(responses, attached=attached)
 
 
 def _share_of_residual(record, where: str, response: Response) -> None:

@@ -76,13 +76,25 @@ def fill(file, basis: ModalBasis, points: np.ndarray) -> None:
         put(file, "wave_number", labels.wave, "-")
         put(file, "section_mode", labels.section, "-")
         put(file, "wave_share", labels.share, "-")
-    for name, unit in _UNITS.items():
-        if getattr(basis.projection, name) is not None:
-            put(file, f"projected/{name}", getattr(basis.projection, name), unit)
-    cavity.fill(file, basis.projection.air)
-    corner.fill(file, basis.projection.corner)
+    fill_projection(file, basis.projection)
     file.attrs["inertia_count"] = modes.inertia_count
     file.attrs["rigid_modes"] = modes.rigid
+
+
+def fill_projection(file, projection: Projection) -> None:
+    """Write the projected matrices, with those of the air and of the rim's motions."""
+    for name, unit in _UNITS.items():
+        if getattr(projection, name) is not None:
+            put(file, f"projected/{name}", getattr(projection, name), unit)
+    cavity.fill(file, projection.air)
+    corner.fill(file, projection.corner)
+
+
+def read_projection(file, axle: Axle | None, shapes: int) -> Projection:
+    """The projection on the coordinates, the last of which are `shapes`."""
+    matrices = {name: values[:] for name, values in file["projected"].items()}
+    air, rim = cavity.read(file), corner.read(file, axle)
+    return Projection(**matrices, shapes=shapes, air=air, corner=rim)
 
 
 def read(file, axle: Axle | None) -> ModalBasis:
@@ -93,17 +105,9 @@ def read(file, axle: Axle | None) -> ModalBasis:
     if "rim" in file:
         parts += [file["rim/translation"][:], file["rim/rotation"][:]]
     shape = np.hstack([part.reshape(len(part), -1) for part in parts]).T.copy()
-    matrices = {name: values[:] for name, values in file["projected"].items()}
-    return ModalBasis(
-        frequency=file["frequency"][:],
-        shape=shape,
-        projection=Projection(
-            **matrices,
-            shapes=len(shape.T) - len(file["frequency"]),
-            air=cavity.read(file),
-            corner=corner.read(file, axle),
-        ),
-    )
+    frequency = file["frequency"][:]
+    projection = read_projection(file, axle, len(shape.T) - len(frequency))
+    return ModalBasis(frequency=frequency, shape=shape, projection=projection)
 
 
 NAME = "fields"
