@@ -164,7 +164,8 @@ def excursion(record: Record, most: float, deflection: float | None, *, held: bo
         record.warnings.append(
             f"the contact moved by up to {1e3 * most:.3g} mm beyond the static state, {share:.2g} of the static "
             f"deflection of {1e3 * deflection:.3g} mm: the tire is linear about that state, so forces are doubtful "
-            "beyond a third of it; take a lower road, or a longer road.run_in or road.longest_wave"
+            "beyond a third of it (a step that lifts the whole footprint by a third gives a force 14 % too large, by "
+            "all of it 56 %); take a lower road, or a longer road.run_in or road.longest_wave"
             + (', or a wheel that moves (axle.kind = "corner")' if held else "")
         )
 
