@@ -35,7 +35,9 @@ def tandem(height: float, length: float, given: tuple[float, ...]) -> tuple[floa
     vertical = STIFFNESS * (front + rear) / 2
     along_road = (LOAD + vertical) * (front - rear) / distance
     mean = np.ones(round(WINDOW / (place[1] - place[0])))
-    vertical, along_road = (np.convolve(f, mean / len(mean), "same") for f in (vertical, along_road))
+    vertical, along_road = (
+        np.convolve(f, mean / len(mean), "same") for f in (vertical, along_road)
+    )
     return float(vertical.max()), float(along_road.max())
 
 
