@@ -8,6 +8,7 @@ import pytest
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.static.equilibrium import Step
 from tireroad.fem.static.load_steps import Loader, Way
+from tireroad.fem.static.virtual_work import AT_REST
 
 # As measured on a torus of 16 x 6 elements: m, N. Its wall folds at 0.094 m.
 DEFLECTION = 0.0, 0.0511, 0.0661, 0.0886, 0.0916, 0.0938, 0.0948, 0.0976, 0.1066, 0.1124, 0.13
@@ -21,7 +22,7 @@ class MadeUp:
     Its load is a `curve` of the deflection, and never solved for.
     """
 
-    touch, rounding, farthest = 0.0, 0.0, 0.13
+    touch, rounding, farthest, rolling = 0.0, 0.0, 0.13, AT_REST
     march, _seen = Loader.march, Loader._seen
 
     def __init__(self, curve) -> None:
