@@ -84,6 +84,57 @@ def footprint(
     return Footprint(x1 - x0, y1 - y0, area)
 
 
+@dataclass(frozen=True)
+class Evenness:
+    """How a footprint is loaded across its width.
+
+    `shape_factor`: length in the middle over the mean of those at 0.8 of the half width, above 1 for a
+    round footprint; `shoulder`: mean pressure from 0.6 of the half width outwards over that of the
+    middle fifth of the width. Both are read from lines around the tire, interpolated between them.
+    """
+
+    shape_factor: float
+    shoulder: float
+
+
+_LINE, _MIDDLE, _SHOULDER = 0.8, 0.2, 0.6  # of the half width
+
+
+def evenness(
+    shape: tuple[int, int],
+    positions: np.ndarray,
+    force: np.ndarray,
+    area: np.ndarray,
+    gap: np.ndarray,
+) -> Evenness | None:
+    """Evenness of the contact on a face of `shape`; `force` N and `area` m2 (s,) of each node.
+
+    None where fewer than five lines around touch.
+    """
+    inside = (force > 0).reshape(shape)
+    if np.count_nonzero(inside.any(axis=0)) < 5:
+        return None
+    start = _opposite(inside)
+    grid, opening = positions.reshape(*shape, 3), np.maximum(gap, 0.0).reshape(shape)
+    there, apart, on = (np.roll(values, -start, 0) for values in (grid, opening, inside))
+    around = _Lines.of(there, apart, on, axis=0)
+    low, high = _Lines.of(there.swapaxes(0, 1), apart.T, on.T, axis=1).ends
+    middle, half = (low + high) / 2, (high - low) / 2
+    length = np.interp(middle + half * np.array([-_LINE, 0.0, _LINE]), around.place, around.chord)
+    # Forces and areas of the lines in the order of their places, as the chords.
+    some = inside.any(axis=0)
+    touching = np.where(inside, 1.0, 0.0)
+    whole = [(values.reshape(shape) * touching).sum(axis=0)[some] for values in (force, area)]
+    place = (grid[..., 1] * touching).sum(axis=0)[some] / touching.sum(axis=0)[some]
+    order = np.argsort(place)
+    pressure = (whole[0] / whole[1])[order]
+    inner = middle + half * np.linspace(-_MIDDLE, _MIDDLE, 21)
+    outer = half * np.linspace(_SHOULDER, 1.0, 21)
+    outer = np.concatenate([middle - outer, middle + outer])
+    means = [float(np.interp(y, place[order], pressure).mean()) for y in (inner, outer)]
+    return Evenness(float(2 * length[1] / (length[0] + length[2])), means[1] / means[0])
+
+
 def _opposite(inside: np.ndarray) -> int:
     """Index of the line across the face in the middle of the longest arc without contact."""
     lines = np.flatnonzero(inside.any(axis=1))

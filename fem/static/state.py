@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.footprint import Footprint, footprint, nodal_area
+from tireroad.fem.static.footprint import Evenness, Footprint, evenness, footprint, nodal_area
 from tireroad.fem.static.road import FLAT, RoadShape
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.cord_forces import CordForce, cord_forces
@@ -149,6 +149,12 @@ class StaticState:
         if self.road_height is None:
             return Footprint(0.0, 0.0, 0.0)
         return footprint(self.shape, self.positions, self.pressure, self.gap)
+
+    def evenness(self) -> Evenness | None:
+        """How the footprint is loaded across its width; None without one, or on too few nodes."""
+        if self.road_height is None or not self.force.any():
+            return None
+        return evenness(self.shape, self.positions, self.force, self.area, self.gap)
 
 
 def static_state(equilibrium: Equilibrium, touch_height: float) -> StaticState:

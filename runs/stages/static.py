@@ -159,6 +159,9 @@ def fill(file: h5py.File, state: StaticState, tire: TireModel) -> None:
     file.attrs["deflection"] = state.deflection
     for name, value in asdict(state.footprint()).items():
         file.attrs[f"footprint_{name}"] = value
+    if (even := state.evenness()) is not None:
+        file.attrs["footprint_shape_factor"] = even.shape_factor
+        file.attrs["footprint_shoulder"] = even.shoulder
 
 
 _SPEEDS, _SAME_SPEED = 6, 1e-6  # most solutions at a travel speed, and when two speeds agree
@@ -383,6 +386,11 @@ def _describe(record: Record, state: StaticState, loader: Loader) -> None:
             "mean contact pressure": (extent.pressure(state.load), "Pa"),
             "largest contact pressure": (float(state.pressure.max()), "Pa"),
         }
+        if (even := state.evenness()) is not None:
+            record.headline |= {
+                "footprint shape factor": (even.shape_factor, "-"),
+                "pressure of the shoulders over that of the middle": (even.shoulder, "-"),
+            }
         record.indicators["least contact force"] = (float(state.force.min()), "N")
         record.indicators["largest penetration"] = (state.penetration, "m")
     record.headline["rolling radius"] = (state.rolling_radius(), "m")

@@ -63,6 +63,8 @@ def static(results: Results) -> Section:
             ("touch_height", "m"),
             ("footprint_length", "m"),
             ("footprint_width", "m"),
+            ("footprint_shape_factor", "-"),
+            ("footprint_shoulder", "-"),
             ("camber", "deg"),
             ("drum_radius", "m"),
         ),

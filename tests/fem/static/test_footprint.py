@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tireroad.fem.compat import field_nodes
-from tireroad.fem.static.footprint import Footprint, footprint, nodal_area
+from tireroad.fem.static.footprint import Footprint, evenness, footprint, nodal_area
 from tireroad.fem.tire.mesh import Lattice, Torus, _edge
 
 A, B = 0.03, 0.02  # m, half axes of the known footprint
@@ -95,3 +95,20 @@ def test_extent_grows_with_the_load_without_jumps(plane):
     rise = np.diff(lengths)
     assert rise.min() > -1e-12
     assert rise.max() < 0.3 * (lengths[-1] - lengths[0])
+
+
+def test_evenness_of_an_ellipse_and_of_a_saddle(plane):
+    """Of an ellipse: lengths as sqrt(1 - y^2), pressures p(y)/p(0) as the mean along x, (1 - y^2)^(1/2)."""
+    lattice, points = plane(2, 160, 40)
+    q = (points[:, 0] / A) ** 2 + (points[:, 1] / B) ** 2
+    gap, area = 1e-3 * np.maximum(q - 1, 0) ** 1.5, nodal_area(lattice, points)
+    shape, across = lattice.face_shape, np.abs(points[:, 1]) / B
+    for rise in (0.0, 3.0):
+        force = area * np.sqrt(np.maximum(1 - q, 0)) * (1 + rise * across**2)
+        found = evenness(shape, points, force, area, gap)
+        y = np.linspace(0.0, 1.0, 2001)
+        pressure = np.sqrt(1 - y**2) * (1 + rise * y**2)
+        known = pressure[y >= 0.6].mean() / pressure[y <= 0.2].mean()
+        assert found.shape_factor == pytest.approx(1 / 0.6, rel=0.02)
+        assert found.shoulder == pytest.approx(known, rel=0.05)
+    assert evenness(shape, points, 0 * force, area, gap) is None
