@@ -555,10 +555,12 @@ class ContactStage(Stage[ContactHistory]):
         every = np.arange(response.residual.shape[1])
         if not leaning(self.job):
             return Leaning(every[:0], every, None)
-        rolling, shape = self._states, np.zeros((2 * p, 0))
-        if Motion.known(rolling, response):
+        rolling, shape = self._states, self.greens.product.leaning
+        if shape is None and Motion.known(rolling, response):
             probes = leaning_loads(self.static.product, setup)
             shape = Basis.of(rolling).seen(probes)
+        if shape is None:
+            shape = np.zeros((2 * p, 0))
         return Leaning(every[p : 3 * p], np.r_[every[:p], every[3 * p :]], shape)
 
     def _shortest_period(self) -> float:

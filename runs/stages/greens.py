@@ -6,7 +6,7 @@ Stage greens: Green's functions between driven points, and between those of the 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import h5py
 import numpy as np
@@ -14,6 +14,7 @@ from scipy import sparse
 
 from tireroad.contact.setup import ContactSetup
 from tireroad.fem.static.state import StaticState
+from tireroad.greens.basis import Basis
 from tireroad.greens.coupling import Wheel
 from tireroad.greens.response import Response
 from tireroad.greens.responses import Made, Wanted, band, judged, make_response, selected
@@ -81,12 +82,14 @@ class Responses:
 
     `contact`: between the points of the patch, with the prescribed forces among its inputs;
     `force`: between the points of the prescribed forces. `attached`: the modes with their attachment
-    modes, whose states these are; None without the latter.
+    modes, whose states these are, without their fields; None without the latter. `leaning` (2 p, m)
+    kg^-1/2: their shapes at the forces of the road's slope.
     """
 
     contact: Response | None = None
     force: Response | None = None
     attached: RollingModes | None = None
+    leaning: np.ndarray | None = None
 
     @property
     def named(self) -> dict[str, Response]:
@@ -163,7 +166,9 @@ class GreensStage(Computed[Responses]):
         if rolling.basis.projection.moves:
             loads, top = points.loads[points.counted], band(rolling, wanted)
             corner.check_blocked(record, rolling, loads, top)
-        responses = replace(self._apart(points.name, response), attached=made.attached)
+        responses = self._apart(points.name, response)
+        if made.attached is not None:
+            responses = replace(responses, **self._of_attached(made.attached))
         self._describe(record, responses)
         return responses
 
@@ -185,6 +190,16 @@ class GreensStage(Computed[Responses]):
         record.indicators |= made.figures
         record.warnings += made.warnings
         return made
+
+    def _of_attached(self, attached: RollingModes) -> dict[str, Any]:
+        """What the contact needs of the modes with attachment modes: not their fields, which on
+        fine meshes take gigabytes."""
+        leaning = None
+        if self._leaning:
+            loads = leaning_loads(self.static.product, self.setup.product)
+            leaning = Basis.of(attached).seen(loads)
+        basis = replace(attached.basis, shape=attached.basis.shape[:0])
+        return {"attached": replace(attached, basis=basis), "leaning": leaning}
 
     def _apart(self, name: str, whole: Response) -> Responses:
         """The contact's response, with prescribed forces as inputs (contact.loop), and theirs."""
@@ -234,7 +249,8 @@ class GreensStage(Computed[Responses]):
             put(file, "contact/index", self.setup.product.patch.index, "-")
         if product.attached is not None:
             group, basis = file.create_group(_ATTACHED), product.attached.basis
-            put(group, "shape", basis.shape, "kg^-1/2")
+            if product.leaning is not None:
+                put(group, "leaning", product.leaning, "kg^-1/2")
             put(group, "frequency", basis.frequency, "Hz")
             fill_projection(group, basis.projection)
             rotating.fill(group.create_group("states"), product.attached)
@@ -246,14 +262,16 @@ class GreensStage(Computed[Responses]):
         if _ATTACHED not in file:
             return responses
         group = file[_ATTACHED]
-        shape, frequency = group["shape"][:], group["frequency"][:]
-        projection = read_projection(group, self.job.axle, shape.shape[1] - len(frequency))
+        frequency, own = group["frequency"][:], len(group["projected/squares"])
+        projection = read_projection(group, self.job.axle, own - len(frequency))
+        shape = np.zeros((0, own))
         attached = RollingModes(
             basis=ModalBasis(frequency=frequency, shape=shape, projection=projection),
             states=rotating.read(group["states"]),
             turning=turning_of(self.job),
         )
-        return replace(responses, attached=attached)
+        leaning = group["leaning"][:] if "leaning" in group else None
+        return replace(responses, attached=attached, leaning=leaning)
 
 
 def _share_of_residual(record, where: str, response: Response) -> None:

@@ -648,7 +648,7 @@ class PointForce:
     spread: tuple[float, float] = vector(
         (0.0, 0.0),
         "deg",
-        "half widths (angle, arc) of a uniform traction; 0, 0: one point",
+        "half widths (angle, arc) of a uniform traction; 0, 0: one point, whose own receptance holds a dent that depends on the elements",
         least=0,
         most=180,
     )
