@@ -101,7 +101,8 @@ def test_a_rolling_tire_loses_what_contact_and_drive_put_in(run, more: str) -> N
     assert work + drive - left - lost - beyond == pytest.approx(off, abs=1e-12)
     assert lost > 0.1 * abs(work)
     assert abs(off) < 0.002 * lost
-    assert abs(off) < 0.3 * abs(beyond)  # without that term it would not add up
+    # Without that term it would not add up; attachment modes leave little of it.
+    assert abs(off) < (0.3 if ATTACHED in more else 0.2) * abs(beyond)
     assert not any("add up" in text for text in warnings)
 
 
