@@ -35,6 +35,7 @@ from tireroad.fem.cavity.column import Column
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.compliance import (
     LoadedShapes,
+    add_part,
     compliance,
     on_own_rows,
     receptance,
@@ -43,7 +44,7 @@ from tireroad.fem.matrices.compliance import (
     static_shapes,
     statics,
 )
-from tireroad.fem.matrices.operators import Operators, Rotation
+from tireroad.fem.matrices.operators import Compound, Operators, Rotation
 from tireroad.fem.matrices.rim_motion import RimMotion
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.turning import Turning
@@ -59,7 +60,7 @@ from tireroad.greens.basis import (
 )
 from tireroad.greens.response import Response
 from tireroad.modal.basis import Projection, joined, project, same_fields, with_air, with_corner
-from tireroad.modal.damping import Damping, StrainEnergy, beyond, tail_loss
+from tireroad.modal.damping import Damping, StrainEnergy, beyond, tail_growth, tail_loss
 from tireroad.modal.rolling import decouple
 from tireroad.modal.rotating import held_matrices
 from tireroad.modal.solver.slicing import Modes
@@ -112,7 +113,7 @@ def dynamic(projection: Projection, speed: float, known: int) -> np.ndarray:
     `FASTEST` times the highest mode. One whose states would be faster than that is static as a
     coordinate, not as a state: what is left is a problem of second order with an energy of its own.
     """
-    squares = projection.squares
+    squares = projection.own_squares
     highest = np.sqrt(squares[projection.modes - 1])
     turning = np.zeros(len(squares))
     if projection.convective is not None:
@@ -169,7 +170,8 @@ def completed(
 class Wheel:
     """The full matrices of a rolling tire, or a standing one if `rotation` is None. `beyond`
     (gamma1 1/s, gamma2 s) damps motions outside the modes, and the full matrices: it is given if
-    `damping` (modal.damping) is by strain energy, which has no full matrices. `corner` adds a
+    `damping` (modal.damping) is by strain energy, which has no full matrices. `growth`, likewise, of
+    the stiffness of these motions over that of the operators. `corner` adds a
     wheel, held or not, to a projection; `rim`: motions of a held rim, for hub moments. Properties
     are collective at first use."""
 
@@ -180,13 +182,17 @@ class Wheel:
     inertia: str
     air: Column | None = None
     beyond: tuple[float, float] | None = None
+    growth: float | None = None
     corner: Callable[[Projection, Modes], Projection] | None = None
     rim: Callable[[], RimMotion | None] | None = None
 
     @cached_property
     def rotating_stiffness(self) -> PETSc.Mat:
-        """K_Omega."""
-        return rotating_stiffness(*self._given)
+        """K_Omega of motions beyond the modes."""
+        stiffness = rotating_stiffness(*self._given)
+        if self.growth is not None:
+            add_part(stiffness, self.growth - 1, self.operators.stiffness)
+        return stiffness
 
     @cached_property
     def rotating_damping(self) -> PETSc.Mat:
@@ -211,14 +217,20 @@ class Wheel:
         return self.damping
 
     @cached_property
-    def _loss(self) -> PETSc.Mat | None:
-        """sum_r eta_r K_r, or None."""
-        return self.operators.loss_stiffness()
+    def _compounds(self) -> list[Compound]:
+        """The compounds of the tire."""
+        return self.operators.compounds()
+
+    @property
+    def _apart(self) -> bool:
+        """Whether the modes are damped or stiffened otherwise than the full matrices."""
+        return self.beyond is not None or self.growth is not None
 
     def _pencils(self, projection: Projection) -> tuple[Pencil, Pencil]:
-        """Projected pencils with the rim held: damped as the modes, and as the full matrices."""
+        """Projected pencils with the rim held: of the modes, and of the full matrices."""
         true = held_matrices(projection, self.speed, self.damping, self.inertia)
-        return true, held_matrices(projection, self.speed, self._uniform, self.inertia)
+        full = projection.as_elements(self.growth or 1.0)
+        return true, held_matrices(full, self.speed, self._uniform, self.inertia)
 
     def respond(
         self,
@@ -275,9 +287,10 @@ class Wheel:
         shapes = static_shapes(self.operators, *full, face, self.air, self._beside(hub))
         moments = Moments(shapes.compliance, shapes.damping, shapes.inertia, shapes.momentum)
         poles, loss = basis.couple(face, face), None
-        if self.beyond is not None:
+        if self._apart:
             pencils = self._pencils(basis.projection)
             moments = moments.plus(regained(basis.held, *pencils, probes, probes))
+        if self.beyond is not None:
             loss = self.beyond[0], tail_loss(basis.projection)
         given = basis.states, basis.seen(face), basis.beside(hub), moments
         whole = second_order(poles, *given, loss, hub, basis.felt)
@@ -300,7 +313,7 @@ class Wheel:
         given = self.operators, self.rotating_stiffness, outputs, loads
         answers = compliance(*given, self.air, beside=self._beside(basis.of_hub(outputs)))
         flexibility, beside = answers[: outputs.shape[0]], answers[outputs.shape[0] :]
-        if self.beyond is not None:
+        if self._apart:
             lacking = regained(basis.held, *self._pencils(basis.projection), outputs, loads)
             flexibility, beside = flexibility + lacking.compliance, beside + lacking.momentum
         return self._completed(basis, outputs, loads, flexibility, beside)
@@ -337,7 +350,7 @@ class Wheel:
         grown_modes = joined(modes, columns, self.operators)
         del columns  # used up: what follows needs the memory
         grown, _ = self._grown(grown_modes, basis.projection)
-        if self.beyond is not None:
+        if self._apart:
             lacking = regained(grown.held, *self._pencils(grown.projection), probes, probes)
             flexibility, beside = flexibility + lacking.compliance, beside + lacking.momentum
         found = self._completed(grown, probes, probes, flexibility, beside)
@@ -377,9 +390,10 @@ class Wheel:
     def _grown(self, grown: Modes, known: Projection | None = None) -> tuple[Basis, Array]:
         """The basis of modes with attachment modes, and its fields; `known`: on the first of them,
         whose modes are reused. Of the shapes that join, only dynamic ones stay. Collective."""
-        operators, comm, loss = self.operators, self.operators.body.comm, self.beyond and self._loss
+        operators, comm = self.operators, self.operators.body.comm
+        compounds = self._compounds if self._apart else ()
         same = known and known.first(known.modes)
-        projection = project(grown, self.rotation, operators.carried, comm, same, loss)
+        projection = project(grown, self.rotation, operators.carried, comm, same, compounds)
         if known is not None:
             stays = dynamic(projection, self.speed, known.own)
             projection, grown = projection.among(stays), grown.among(stays)
@@ -403,9 +417,36 @@ class Wheel:
         return decouple(projection, self.turning, comm)
 
     def receptance(self, outputs: Probes, loads: Probes, frequency: np.ndarray) -> np.ndarray:
-        """H (f, r, k) m/N of the full matrices, at the frequencies in Hz. Collective."""
-        full = self.rotating_stiffness, self.rotating_damping
-        return receptance(self.operators, *full, outputs, loads, frequency, air=self.air)
+        """H (f, r, k) m/N of the full matrices, at the frequencies in Hz. Collective.
+
+        With losses by strain energy, or moduli that depend on frequency, those of a standing tire with
+        complex moduli at each frequency; there is no such problem for one that rolls, whose frequencies
+        in the rubber are others.
+        """
+        given = outputs, loads
+        if not self._apart:
+            full = self.rotating_stiffness, self.rotating_damping
+            return receptance(self.operators, *full, *given, frequency, air=self.air)
+        assert not self.speed, "the scene's rules refuse it"
+        parts = [
+            receptance(self.operators, *self._complex(f), *given, np.array([f]), air=self.air)
+            for f in frequency
+        ]
+        return np.concatenate(parts)
+
+    def _complex(self, frequency: float) -> tuple[PETSc.Mat, PETSc.Mat]:
+        """Real part of the stiffness at a frequency (Hz), imaginary part over omega. Collective."""
+        at = np.array([frequency])
+        stiffness = self.operators.stiffness.copy()
+        uniform = (0.0, 0.0) if self.beyond is not None else self._uniform
+        lost = rotating_damping(self.operators, None, 0.0, uniform)
+        for one in self._compounds:
+            growth = float(one.kind.spectrum.modulus(at)[0])
+            loss = one.kind.loss_factor * float(one.kind.spectrum.loss_factor(at)[0])
+            add_part(stiffness, growth - 1, one.stiffness)
+            if self.beyond is not None:
+                add_part(lost, growth * loss / (2 * np.pi * frequency), one.stiffness)
+        return stiffness, lost
 
 
 def _together(outputs: Probes, loads: Probes) -> Probes:
@@ -430,12 +471,13 @@ def wheel_of(
 ) -> Wheel:
     """The full matrices of a tire at its static state as the wheel rotates, with the `air` in it.
 
-    `projection` on the modes: only for damping by strain energy, which has no full matrices.
+    `projection` on the modes: for damping by strain energy, which has no full matrices, and for moduli
+    that depend on frequency.
     `axle`: the suspension of a wheel that moves; the full matrices are always those of a held rim.
     InputError if the static state was found for another speed or inertia, or the projection is
     missing. Collective.
     """
-    shape, tail = motions.static.rolling, None
+    shape, tail, growth = motions.static.rolling, None, None
     if shape.speed and (shape.speed, shape.inertia) != (turning.speed, turning.inertia):
         raise InputError(
             f"the static state rolls at {shape.speed:g} rad/s with {shape.inertia} inertia, its small motions at "
@@ -445,6 +487,9 @@ def wheel_of(
         if projection is None:
             raise InputError("damping by strain energy needs the modes: give their projection")
         tail = beyond(turning.damping, projection)
+    if projection is not None and projection.rise is not None:
+        # Inertia relief of a free rim is that of the operators.
+        growth = tail_growth(projection) if motions.operators.unknowns.rim is None else 1.0
     rotation = motions.rotation if turning.speed else None
 
     def rim() -> RimMotion | None:
@@ -462,6 +507,7 @@ def wheel_of(
         inertia=turning.inertia,
         air=air,
         beyond=tail,
+        growth=growth,
         corner=corner,
         rim=rim,
     )

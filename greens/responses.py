@@ -184,8 +184,7 @@ def make_response(
 def _attached(basis: Basis, rolling: RollingModes) -> RollingModes:
     """The modes with their attachment modes and the states of both, as the wheel rolls."""
     projection = basis.projection
-    frequency = np.sqrt(np.maximum(projection.squares[: projection.modes], 0.0)) / (2 * np.pi)
-    modes = ModalBasis(frequency=frequency, shape=basis.shape, projection=projection)
+    modes = ModalBasis(frequency=projection.frequency, shape=basis.shape, projection=projection)
     return RollingModes(basis=modes, states=basis.states, turning=rolling.turning)
 
 

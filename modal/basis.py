@@ -19,12 +19,12 @@ The rotating-frame matrices on the undamped modes: small, replicated, independen
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from petsc4py import PETSc
 from scipy import sparse
 
 from tireroad.fem.axle import Axle
@@ -32,10 +32,11 @@ from tireroad.fem.cavity.column import Column
 from tireroad.fem.cavity.duct import Duct
 from tireroad.fem.collective import summed
 from tireroad.fem.errors import InputError
-from tireroad.fem.matrices.operators import Operators, Rotation
+from tireroad.fem.matrices.operators import Compound, Operators, Rotation
 from tireroad.fem.matrices.rim_motion import RimMotion
+from tireroad.fem.tire.material import CONSTANT, own_moduli
 from tireroad.modal.corner import Corner, meeting
-from tireroad.modal.solver.fields import between, gram, loss_factors, projected
+from tireroad.modal.solver.fields import between, gram, projected, strain_energies
 from tireroad.modal.solver.slicing import Modes
 from tireroad.modal.waves import Labels
 
@@ -159,7 +160,10 @@ class Projection:
     `squares` (m,) omega^2; `gyroscopic`, `body` (m, m) 1/rad, skew; `convective`, `body_convective`
     (m, m) 1/rad2, symmetric; all four are None for a standing wheel. `momentum` (3, m) kg^1/2: int
     rho phi_k, the momentum per rate of each mode. `loss_factor` (m,) by strain energy
-    (modal.damping), None where no compound has one. The last `shapes` of the m coordinates are
+    (modal.damping), None where no compound has one. `squares` are those of the finite elements,
+    whose moduli are those of fem.tire.material.DYNAMIC_FREQUENCY; `rise` (m,) 1/s2 is what moduli at
+    each one's own frequency add, and `band_rise` (m,) what those in the middle of the band add, at half
+    the highest mode's frequency; None where none depends on frequency. The last `shapes` of the m coordinates are
     static shapes that joined the modes (modal.basis). Further coordinates: a of the `air` after
     the m, then c of a `corner`; a held wheel has c = 0, but its hub still carries moments.
     """
@@ -171,9 +175,25 @@ class Projection:
     body: np.ndarray | None = None
     body_convective: np.ndarray | None = None
     loss_factor: np.ndarray | None = None
+    rise: np.ndarray | None = None
+    band_rise: np.ndarray | None = None
     shapes: int = 0
     air: Air | None = None
     corner: Corner | None = None
+
+    @property
+    def own_squares(self) -> np.ndarray:
+        """omega^2 (m,) 1/s2 with the moduli at each one's own frequency."""
+        return self.squares if self.rise is None else self.squares + self.rise
+
+    @property
+    def frequency(self) -> np.ndarray:
+        """Natural frequencies of the modes, Hz; 0 for rigid ones."""
+        return np.sqrt(np.maximum(self.own_squares[: self.modes], 0.0)) / (2 * np.pi)
+
+    def as_elements(self, growth: float = 1.0) -> Projection:
+        """The projection with the stiffness of the finite elements, times a `growth`."""
+        return replace(self, squares=growth * self.squares, rise=None, band_rise=None)
 
     @property
     def carried(self) -> np.ndarray:
@@ -350,35 +370,67 @@ def project(
     carried: np.ndarray,
     comm: MPI.Comm,
     known: Projection | None = None,
-    loss: PETSc.Mat | None = None,
+    compounds: Sequence[Compound] = (),
     doppler: bool = True,
 ) -> Projection:
     """Project the rotation matrices (fem.matrices.operators.Rotation, or None) and the momentum.
 
     `doppler`: also the convective matrix that only this inertia needs.
 
-    `carried` (3, n) kg, own rows, and `loss`, the loss stiffness or None, are those of
-    fem.matrices.operators. `known`, the projection on the first of the modes, is reused: a basis
-    that grows costs only the products with what joins it. Collective.
+    `carried` (3, n) kg, own rows, and the `compounds` are those of fem.matrices.operators. `known`,
+    the projection on the first of the modes, is reused: a basis that grows costs only the products
+    with what joins it. Collective.
     """
-    moved = comm.allreduce(carried @ modes.vectors)
-    shapes = len(modes.squares) - modes.count
-    done = None if known is None else known.loss_factor
-    losing = None if loss is None else loss_factors(modes, loss, comm, done)
+    standing = Projection(
+        squares=modes.squares,
+        momentum=comm.allreduce(carried @ modes.vectors),
+        shapes=len(modes.squares) - modes.count,
+    )
+    if compounds:
+        standing = _of_compounds(standing, modes, compounds, comm, known)
     if rotation is None:
-        return Projection(squares=modes.squares, momentum=moved, loss_factor=losing, shapes=shapes)
+        return standing
 
     def reduced(name: str, sign: int) -> np.ndarray:
         old = None if known is None else getattr(known, name)
         return projected(comm, modes.vectors, getattr(rotation, name), sign, old)
 
-    return Projection(
-        squares=modes.squares,
-        momentum=moved,
+    return replace(
+        standing,
         gyroscopic=reduced("gyroscopic", -1),
         convective=reduced("convective", 1),
         body=reduced("body", -1),
         body_convective=reduced("body_convective", 1) if doppler else None,
-        loss_factor=losing,
-        shapes=shapes,
     )
+
+
+def _of_compounds(
+    projection: Projection,
+    modes: Modes,
+    compounds: Sequence[Compound],
+    comm: MPI.Comm,
+    known: Projection | None,
+) -> Projection:
+    """The projection with loss factors, and with the rise where a modulus depends on frequency. Static
+    shapes respond in the band: their moduli are those in its middle. Collective.
+    """
+    squares, m = modes.squares, modes.count
+    done = 0 if known is None else known.own
+    stored = strain_energies(modes.vectors[:, done:], compounds, comm)
+    kinds = [one.kind for one in compounds]
+
+    def before(name: str) -> np.ndarray:
+        values = None if known is None else getattr(known, name)
+        return np.zeros(done) if values is None else values
+
+    rise, loss = own_moduli(squares[done:m], stored[:, : max(m - done, 0)], kinds)
+    rise = np.concatenate([before("rise")[:m], rise])
+    middle = np.sqrt((squares[:m] + rise).max(initial=0.0)) / (4 * np.pi)
+    in_band, lost = own_moduli(squares[done:], stored, kinds, middle)
+    in_band = np.concatenate([before("band_rise"), in_band])
+    rise = np.concatenate([rise, in_band[m:]])
+    loss = np.concatenate([before("loss_factor"), loss, lost[max(m - done, 0) :]])
+    varies = any(kind.spectrum != CONSTANT for kind in kinds)
+    loses = any(kind.loss_factor for kind in kinds)
+    projection = replace(projection, loss_factor=loss if loses else None)
+    return replace(projection, rise=rise, band_rise=in_band) if varies else projection

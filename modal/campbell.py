@@ -112,10 +112,10 @@ def standing_wave(
     upper bound.
     """
     _, convective, _ = projection.rotating(inertia)
-    flexible = projection.squares > 0
+    flexible = projection.own_squares > 0
     wave = np.zeros(len(flexible))
     turn = np.eye(int(flexible.sum()))
-    squares = np.diag(projection.squares[flexible])
+    squares = np.diag(projection.own_squares[flexible])
     convective = convective[np.ix_(flexible, flexible)]
     if free_at is not None:
         values, motions = linalg.eigh(squares + free_at**2 * convective)

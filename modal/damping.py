@@ -14,7 +14,11 @@ uniform rate of the highest modes,
 
     D = M Phi diag(d_k - d_c) Phi^T M + d_c M,   d_c = eta_c omega_m,
 
-where eta_c is the mean loss factor of the upper quarter of the modes.
+where eta_c is the mean loss factor of the upper quarter of the modes. Their moduli, where these
+depend on frequency, are those in the middle of the band and grow as in the upper quarter: the
+stiffness is
+
+    K' = g_c K + M Phi diag(omega_k^2 - g_c squares_k) Phi^T M.
 """
 
 from __future__ import annotations
@@ -33,7 +37,7 @@ def rates(damping: Damping, projection: Projection) -> np.ndarray:
             raise InputError(
                 "damping: no compound of the tire has a loss_factor: give one, or a [damping] table"
             )
-        return projection.loss_factor * np.sqrt(np.maximum(projection.squares, 0.0))
+        return projection.loss_factor * np.sqrt(np.maximum(projection.own_squares, 0.0))
     mass, stiffness = damping
     return mass + stiffness * projection.squares
 
@@ -41,7 +45,7 @@ def rates(damping: Damping, projection: Projection) -> np.ndarray:
 def beyond(damping: Damping, projection: Projection) -> Proportional:
     """The damping of motions that the modes do not contain."""
     if isinstance(damping, StrainEnergy):
-        highest = np.sqrt(max(float(projection.squares[: projection.modes].max()), 0.0))
+        highest = np.sqrt(max(float(projection.own_squares[: projection.modes].max()), 0.0))
         return Proportional(tail_loss(projection) * highest, 0.0)
     return Proportional(*damping)
 
@@ -49,5 +53,17 @@ def beyond(damping: Damping, projection: Projection) -> Proportional:
 def tail_loss(projection: Projection) -> float:
     """Loss factor eta_c of motions beyond the modes: the mean over their upper quarter."""
     assert projection.loss_factor is not None, "rates() refuses modes without loss factors"
+    return float(projection.loss_factor[_upper(projection)].mean())
+
+
+def tail_growth(projection: Projection) -> float:
+    """g_c, growth of the stiffness of motions beyond the modes: the mean over their upper quarter."""
+    upper = _upper(projection)
+    if projection.band_rise is None or not (projection.squares[upper] > 0).all():
+        return 1.0
+    return float(1 + (projection.band_rise[upper] / projection.squares[upper]).mean())
+
+
+def _upper(projection: Projection) -> slice:
     count = projection.modes
-    return float(projection.loss_factor[count - max(count // 4, 1) : count].mean())
+    return slice(count - max(count // 4, 1), count)

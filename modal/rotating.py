@@ -168,7 +168,7 @@ def held_matrices(projection: Projection, speed: float, damping: Damping, inerti
 def _tire_matrices(projection: Projection, speed: float, damping: Damping, inertia: str) -> Pencil:
     """The same for the tire without its air."""
     rate = rates(damping, projection)
-    stiffness, drag = np.diag(projection.squares), np.diag(rate)
+    stiffness, drag = np.diag(projection.own_squares), np.diag(rate)
     if speed == 0:
         return drag, stiffness
     gyroscopic, convective, body = projection.rotating(inertia)
@@ -178,7 +178,7 @@ def _tire_matrices(projection: Projection, speed: float, damping: Damping, inert
 
 def standing(projection: Projection, damping: Damping) -> StateModes:
     """Uncoupled states without rotation: s = -d/2 +- sqrt(d^2/4 - omega^2), a = 2 s + d."""
-    squares = projection.squares
+    squares = projection.own_squares
     m = len(squares)
     half = rates(damping, projection) / 2
     root = np.sqrt(half.astype(complex) ** 2 - squares)

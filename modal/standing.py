@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
+from mpi4py import MPI
 
 from tireroad.fem.axle import Axle
 from tireroad.fem.cavity.column import Column
 from tireroad.fem.errors import ConvergenceError, InputError
-from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.matrices.operators import Compound, Operators
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.parameters import Limits, finite, whole
 from tireroad.fem.static.checkpoint import Journal
+from tireroad.fem.tire.material import CONSTANT, own_moduli
 from tireroad.fem.turning import Turning
 from tireroad.modal.basis import ModalBasis, project, with_air, with_corner
 from tireroad.modal.rotation_shapes import with_rotation_shapes
 from tireroad.modal.solver import undamped
+from tireroad.modal.solver.fields import strain_energies
 from tireroad.modal.solver.slicing import Modes
 from tireroad.modal.solver.symmetry import Sites
 
@@ -112,23 +118,41 @@ def projected(
     """
     operators = motions.operators
     matrices = motions.rotation if rotation else None
-    comm, loss = operators.body.comm, operators.loss_stiffness()
+    comm, compounds = operators.body.comm, operators.compounds()
     doppler = turning is None or turning.inertia == "doppler"
-    projection = project(modes, matrices, operators.carried, comm, loss=loss, doppler=doppler)
+    modes = _by_own_frequency(modes, compounds, comm)
+    given = matrices, operators.carried, comm
+    projection = project(modes, *given, compounds=compounds, doppler=doppler)
     if turning is not None and turning.speed:
         modes = with_rotation_shapes(modes, projection, operators, matrices, turning)
-        projection = project(modes, matrices, operators.carried, comm, projection, loss, doppler)
-    if loss is not None:
-        loss.destroy()
-    given = axle, motions.rim_motion(rotation), motions.static.positions, comm
-    joined = with_corner(with_air(projection, modes, air), modes, *given)
+        projection = project(modes, *given, projection, compounds, doppler)
+    for compound in compounds:
+        compound.stiffness.destroy()
+    wheel = axle, motions.rim_motion(rotation), motions.static.positions, comm
+    joined = with_corner(with_air(projection, modes, air), modes, *wheel)
     return ModalBasis(
-        frequency=modes.frequency,
+        frequency=joined.frequency,
         shape=operators.trace(modes.vectors),
         projection=joined,
         modes=modes,
         column=air,
     )
+
+
+_ALIKE = 1e-9  # relative difference of equal squares, which keep their order
+
+
+def _by_own_frequency(modes: Modes, compounds: Sequence[Compound], comm: MPI.Comm) -> Modes:
+    """The modes in the order of the frequencies that they have with moduli at these. Collective."""
+    kinds = [one.kind for one in compounds]
+    if all(kind.spectrum == CONSTANT for kind in kinds):
+        return modes
+    stored = strain_energies(modes.vectors, compounds, comm)
+    own = modes.squares + own_moduli(modes.squares, stored, kinds)[0]
+    order = np.argsort(own, kind="stable")
+    level = np.cumsum(np.diff(own[order], prepend=own[order[:1]]) > _ALIKE * np.abs(own[order]))
+    order = order[np.lexsort((order, level))]
+    return replace(modes.among(order), residual=modes.residual[order])
 
 
 def with_fields(

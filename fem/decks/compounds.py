@@ -1,6 +1,6 @@
 """Units of a deck: Abaqus has none, so a length unit stands for a consistent system.
 
-Dynamic modulus and loss factor from a Prony series.
+Small motions from a Prony series.
 
 Materials of decks as laws of the program, in SI units.
 """
@@ -18,7 +18,7 @@ from tireroad.fem.decks.deck import Compound, Place, number
 from tireroad.fem.decks.rubber_tests import TESTS, Fit, fitted
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections.construction import RADII
-from tireroad.fem.tire.material import MATERIALS
+from tireroad.fem.tire.material import DYNAMIC_FREQUENCY, MATERIALS, Spectrum, prony
 
 _SMALLEST, _LARGEST = RADII
 
@@ -56,23 +56,21 @@ def check_size(radius: float, unit: str, file: str) -> None:
     )
 
 
-PRONY_FREQUENCY = 100.0  # Hz at which a series is evaluated
-
-
 @dataclass(frozen=True)
 class Series:
     """A Prony series: what is left of instantaneous moduli of shear and bulk after long times, the
-    dynamic over the long-term modulus of shear, and the loss factor.
+    dynamic over the long-term modulus of shear, and the loss factor, with their spectrum.
     """
 
     shear: float = 1.0
     bulk: float = 1.0
     dynamic: float = 1.0
     loss: float = 0.0
+    spectrum: Spectrum | None = None
 
 
-def prony(parts: dict, notes: list[str]) -> Series:
-    """Of a *VISCOELASTIC, TIME=PRONY at 100 Hz; without one nothing is lost."""
+def _series(parts: dict, notes: list[str]) -> Series:
+    """Of a *VISCOELASTIC, TIME=PRONY; without one nothing is lost."""
     if "VISCOELASTIC" not in parts:
         return Series()
     given, table, place = parts["VISCOELASTIC"]
@@ -84,15 +82,12 @@ def prony(parts: dict, notes: list[str]) -> Series:
     for one in (share, of_bulk):
         if (one < 0).any() or one.sum() >= 1 or (times <= 0).any():
             raise place.error("a Prony series needs g and k ≥ 0 with sums below 1, and times > 0")
-    long_term = 1 - share.sum()
-    turn = 2 * np.pi * PRONY_FREQUENCY * times
-    storage = long_term + (share * turn**2 / (1 + turn**2)).sum()
-    loss = (share * turn / (1 + turn**2)).sum()
+    dynamic, loss, spectrum = prony(share, times)
     notes.append(
-        f"Prony series read at {PRONY_FREQUENCY:g} Hz: dynamic modulus {storage / long_term:.3g} times the "
-        f"long-term one, loss factor {loss / storage:.3g} ({place})"
+        f"Prony series: at {DYNAMIC_FREQUENCY:g} Hz the dynamic modulus is {dynamic:.3g} times the long-term one, the "
+        f"loss factor {loss:.3g}; modes have those at their own frequencies ({place})"
     )
-    return Series(long_term, 1 - of_bulk.sum(), storage / long_term, loss / storage)
+    return Series(1 - share.sum(), 1 - of_bulk.sum(), dynamic, loss, spectrum)
 
 
 _STIFF = 0.4999  # Poisson's ratio from which on a neo-Hookean law is taken for incompressible
@@ -105,8 +100,8 @@ _DENSITY = (100.0, 2e4)  # kg/m3
 class Rubber:
     """A compound: law of the long-term state and its coefficients by scene key, in SI units.
 
-    `density` is None if the deck has none; `dynamic` and `loss_factor` are those of a Prony series
-    at 100 Hz. `notes` list what was interpreted differently from what is written; `fit` is how
+    `density` is None if the deck has none; `dynamic`, `loss_factor` and `spectrum` are those of a
+    Prony series. `notes` list what was interpreted differently from what is written; `fit` is how
     the law follows test data.
     """
 
@@ -116,6 +111,7 @@ class Rubber:
     density: float | None = None
     dynamic: float = 1.0
     loss_factor: float = 0.0
+    spectrum: Spectrum | None = None
     notes: tuple[str, ...] = ()
     fit: Fit | None = field(default=None, repr=False)
 
@@ -195,7 +191,7 @@ def rubber(compound: Compound, units: Units) -> Rubber:
             f"material {compound.name} has no *HYPERELASTIC and no *ELASTIC that is read"
             + (f": *{other} is not among the laws" if other else "")
         )
-    series = prony(parts, notes)
+    series = _series(parts, notes)
     instant = options.get("MODULI", "LONG TERM").upper() == "INSTANTANEOUS"
     kept = series if instant else replace(series, shear=1.0, bulk=1.0)
     if not law.shear > 0:
@@ -219,6 +215,7 @@ def rubber(compound: Compound, units: Units) -> Rubber:
         density=_density(parts, units, compound),
         dynamic=series.dynamic,
         loss_factor=series.loss,
+        spectrum=series.spectrum,
         notes=tuple(notes),
         fit=law.fit,
     )

@@ -54,6 +54,7 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.sections import section_file
 from tireroad.fem.sections.construction import Construction, CordLine
 from tireroad.fem.sections.mesh2d import SectionMesh
+from tireroad.fem.tire.material import power_law
 
 
 def named_edges(deck: Deck, edges: DeckEdges, name: str, key: str) -> np.ndarray:
@@ -199,6 +200,7 @@ def _rubber(construction: Construction, name: str) -> Rubber:
         density=values["density"],
         dynamic=values["dynamic"],
         loss_factor=values["loss_factor"],
+        spectrum=power_law(values["exponent"]) if values["exponent"] else None,
     )
 
 

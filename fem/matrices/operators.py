@@ -18,7 +18,7 @@ Matrices of small motions about a static state, on the unknowns that its support
 
 For basis functions phi on the undeformed mesh and w = e_y x X (Omega factored out). K is the
 tangent stiffness with its geometric and follower-pressure parts, the rubber's material part with
-dynamic moduli:
+dynamic moduli at DYNAMIC_FREQUENCY:
 
     M_ij = int rho phi_i . phi_j                    G_ij = skew of int rho phi_i . (grad phi_j w)
     S_ij = -int rho (grad phi_i w) . (grad phi_j w) Q_ij = int rho phi_i . (e_y x phi_j),  B = G - Q
@@ -52,6 +52,7 @@ from tireroad.fem.static.virtual_work import (
     tangent,
 )
 from tireroad.fem.tire.body import Body
+from tireroad.fem.tire.material import Kind
 
 TURN = 3  # components 3, 4, 5 of an unknown: rotations about x, y, z
 
@@ -261,6 +262,18 @@ class Rotation:
         return self.convective if inertia == "full" else self.body_convective
 
 
+@dataclass(frozen=True)
+class Compound:
+    """The material part of the stiffness, N/m, of compounds of one kind.
+
+    At DYNAMIC_FREQUENCY, where the imaginary part of the stiffness for complex moduli is the sum of
+    `kind.loss_factor` times `stiffness` over the compounds.
+    """
+
+    kind: Kind
+    stiffness: PETSc.Mat
+
+
 class Operators:
     """Matrices on the unknowns of a body at its present displacement. Collective.
 
@@ -310,14 +323,12 @@ class Operators:
         here.x.array[:] = self.body.u.x.array
         return tangent(self.body, added_stress(self.body, share, here))
 
-    def loss_stiffness(self) -> PETSc.Mat | None:
-        """sum_r eta_r K_r, N/m, over the material tangents of the regions at dynamic moduli.
-
-        It is the imaginary part of the stiffness for a complex modulus; None without losses.
-        Collective.
-        """
-        wall = self.body.wall
-        return self._assemble(self._material(wall.losses())) if wall.loses else None
+    def compounds(self) -> list[Compound]:
+        """The compounds' own part of the stiffness, by kind. Collective."""
+        return [
+            Compound(kind, self._assemble(self._material(share)))
+            for kind, share in self.body.wall.kinds()
+        ]
 
     def rotation(self) -> Rotation:
         """The matrices of the rotating frame."""

@@ -52,14 +52,15 @@ POLYESTER = {
 }
 BELT_ANGLE = np.radians(22)
 
-# E Pa, Poisson's ratio, kg/m3, dynamic over static modulus, loss factor.
+# E Pa, Poisson's ratio, kg/m3, dynamic over static modulus, loss factor, both at 100 Hz, exponent of the
+# modulus over frequency.
 COMPOUNDS = {
-    "tread": (6.3e6, 0.49, 800.0, 1.15, 0.3),
-    "skim": (11.7e6, 0.49, 1200.0, 1.15, 0.2),
-    "ply": (7.0e6, 0.49, 1150.0, 1.15, 0.2),
-    "sidewall": (8.5e6, 0.49, 1120.0, 1.15, 0.2),
-    "apex": (52e6, 0.49, 1200.0, 1.15, 0.2),
-    "bead": (400e6, 0.49, 2200.0, 1.0, 0.05),
+    "tread": (6.3e6, 0.49, 800.0, 1.21, 0.3, 0.10),
+    "skim": (11.7e6, 0.49, 1200.0, 1.20, 0.2, 0.08),
+    "ply": (7.0e6, 0.49, 1150.0, 1.20, 0.2, 0.08),
+    "sidewall": (8.5e6, 0.49, 1120.0, 1.20, 0.2, 0.08),
+    "apex": (52e6, 0.49, 1200.0, 1.20, 0.2, 0.08),
+    "bead": (400e6, 0.49, 2200.0, 1.0, 0.05, 0.0),
 }
 
 FLANGE = 0.016  # m above the rim; below it the rim holds the tire
@@ -118,7 +119,7 @@ def radial(text: str) -> Construction:
 
 
 def _rubber(values: tuple[float, ...]) -> dict[str, float]:
-    names = ("youngs_modulus", "poisson_ratio", "density", "dynamic", "loss_factor")
+    names = ("youngs_modulus", "poisson_ratio", "density", "dynamic", "loss_factor", "exponent")
     return dict(zip(names, values, strict=True))
 
 

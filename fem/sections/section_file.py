@@ -29,6 +29,7 @@ _COMPOUND: dict[str, float | None] = {
     "density": None,
     "dynamic": 1.0,
     "loss_factor": 0.0,
+    "exponent": 0.0,
 }
 
 # As those of [tire.material] and [[tire.region]], but for densities in g/cm3, and of [[tire.cords]].
@@ -38,6 +39,7 @@ COMPOUND_RANGES = {
     "density": (100.0, 3e4),
     "dynamic": (0.01, 100.0),
     "loss_factor": (0.0, 2.0),
+    "exponent": (0.0, 0.5),
 }
 CORD_RANGES = {
     "youngs_modulus": (1e3, 1e13),

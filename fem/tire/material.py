@@ -5,13 +5,22 @@ range), the energy, and the two moduli at zero strain. The scene's keys, `check`
 and the range tests follow from it.
 
 A rubber: strain energy, density, and dynamic properties for small motions.
+
+The storage modulus of a filled rubber grows by a third to two thirds from 10 Hz to 1 kHz, its loss
+factor by less. A `Spectrum` gives both relative to those at DYNAMIC_FREQUENCY: a power law (a
+fractional element, E* ~ (i w)^b, whose own loss factor is tan(pi b / 2)), or a Prony series
+
+    E*(w) / E_0 = 1 - sum g_k + sum g_k i w t_k / (1 + i w t_k).
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+
+import numpy as np
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Parameters, Registry
@@ -61,18 +70,84 @@ MATERIALS: Registry[MaterialLaw] = Registry("material model", "tireroad.fem.tire
 material_law = MATERIALS.register
 
 
+DYNAMIC_FREQUENCY = (
+    100.0  # Hz, at which `dynamic` and `loss_factor` hold, in the middle of 10 Hz to 1 kHz
+)
+_SAMPLED = 0.1, 1e5, 20  # Hz, Hz, samples in a decade of a Prony series
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Storage modulus and loss factor of small motions over those at DYNAMIC_FREQUENCY.
+
+    `frequency` (k,) Hz ascending, `storage` and `loss` (k,), -. Between them power laws; beyond the
+    ends `exponent` goes on for the modulus, and the loss factor stays.
+    """
+
+    frequency: tuple[float, ...] = (DYNAMIC_FREQUENCY,)
+    storage: tuple[float, ...] = (1.0,)
+    loss: tuple[float, ...] = (1.0,)
+    exponent: float = 0.0
+
+    def modulus(self, frequency: np.ndarray) -> np.ndarray:
+        """Storage modulus over that at DYNAMIC_FREQUENCY, at frequencies in Hz."""
+        inside = np.clip(frequency, self.frequency[0], self.frequency[-1])
+        known = np.interp(np.log(inside), np.log(self.frequency), np.log(self.storage))
+        beyond = self.exponent * np.log(np.maximum(frequency, _SAMPLED[0]) / inside)
+        return np.exp(known + beyond)
+
+    def loss_factor(self, frequency: np.ndarray) -> np.ndarray:
+        """Loss factor over that at DYNAMIC_FREQUENCY, at frequencies in Hz."""
+        inside = np.clip(frequency, self.frequency[0], self.frequency[-1])
+        return np.interp(np.log(inside), np.log(self.frequency), self.loss)
+
+
+CONSTANT = Spectrum()
+
+
+def power_law(exponent: float) -> Spectrum:
+    """A modulus that grows with the frequency's power `exponent`, and a constant loss factor."""
+    return Spectrum(exponent=exponent) if exponent else CONSTANT
+
+
+def prony(
+    shares: Sequence[float] | np.ndarray, times: Sequence[float] | np.ndarray
+) -> tuple[float, float, Spectrum]:
+    """Dynamic over long-term modulus, loss factor, both at DYNAMIC_FREQUENCY, and the spectrum.
+
+    `shares` g_k of the instantaneous modulus that relax in the `times` t_k, s. InputError if they
+    are not as many, or no series of a rubber.
+    """
+    g, t = np.array(shares, float), np.array(times, float)
+    if len(g) != len(t) or (g < 0).any() or g.sum() >= 1 or (t <= 0).any():
+        raise InputError("a Prony series needs as many times > 0 as shares ≥ 0 with a sum below 1")
+    low, high, dense = _SAMPLED
+    sampled = np.geomspace(low, high, round(dense * math.log10(high / low)) + 1)
+    iw = 2j * np.pi * np.append(sampled, DYNAMIC_FREQUENCY)[:, None] * t
+    modulus = 1 - g.sum() + (g * iw / (1 + iw)).sum(axis=1)
+    storage, loss = modulus.real, modulus.imag / modulus.real
+    there = loss[-1] if loss[-1] > 0 else 1.0
+    spectrum = Spectrum(
+        tuple(sampled.tolist()),
+        tuple((storage[:-1] / storage[-1]).tolist()),
+        tuple((loss[:-1] / there).tolist()),
+    )
+    return float(storage[-1] / (1 - g.sum())), float(loss[-1]), spectrum
+
+
 @dataclass(frozen=True, kw_only=True)
 class Material:
     """A rubber with strain energy `law` and `density` (kg/m3).
 
-    `dynamic`: ratio of the moduli for small motions and for the static state; `loss_factor` for
-    small motions.
+    `dynamic`: ratio of the moduli for small motions at DYNAMIC_FREQUENCY and for the static state;
+    `loss_factor` there, and the `spectrum` of both over frequency.
     """
 
     law: MaterialLaw
     density: float
     dynamic: float = 1.0
     loss_factor: float = 0.0
+    spectrum: Spectrum = CONSTANT
 
     def __post_init__(self) -> None:
         if not (self.density > 0 and math.isfinite(self.density)):
@@ -85,6 +160,7 @@ def compound(
     *,
     dynamic: float = 1.0,
     loss_factor: float = 0.0,
+    spectrum: Spectrum = CONSTANT,
     **parameters: Any,
 ) -> Material:
     """Material of law `model` (fem.tire.laws); `parameters` (Pa, -) not given at their defaults.
@@ -97,5 +173,69 @@ def compound(
         known = ", ".join(law.__dataclass_fields__)
         raise InputError(f"material {model}: unknown parameter {wrong[0]}; valid: {known}")
     return Material(
-        law=law(**parameters), density=density, dynamic=dynamic, loss_factor=loss_factor
+        law=law(**parameters),
+        density=density,
+        dynamic=dynamic,
+        loss_factor=loss_factor,
+        spectrum=spectrum,
     )
+
+
+class Kind(NamedTuple):
+    """Compounds of one spectrum and one loss factor (at DYNAMIC_FREQUENCY)."""
+
+    spectrum: Spectrum
+    loss_factor: float
+
+
+def kinds(compounds: Sequence[tuple[Spectrum, float, float]]) -> dict[Kind, list[float]]:
+    """Kinds of the compounds with the part of each compound's static modulus that is theirs.
+
+    From spectrum, loss factor, dynamic over static modulus of each. Compounds without losses that are the
+    same at all frequencies are left out. Those whose moduli are constant are one kind with a loss factor
+    of 1 and the loss modulus in place of the storage modulus: nothing else is asked of them.
+    """
+    found: dict[Kind, list[float]] = {}
+    for number, (spectrum, loss, dynamic) in enumerate(compounds):
+        constant = spectrum == CONSTANT
+        if constant and not loss:
+            continue
+        kind = Kind(CONSTANT, 1.0) if constant else Kind(spectrum, loss)
+        share = found.setdefault(kind, [0.0] * len(compounds))
+        share[number] = dynamic * (loss if constant else 1.0)
+    return found
+
+
+_TURNS, _SETTLED = 50, 1e-12  # of the own frequencies; relative change of their squares
+
+
+def own_moduli(
+    squares: np.ndarray, stored: np.ndarray, kinds: Sequence[Kind], at: float | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """What moduli at their own frequencies add to the `squares` (m,) 1/s2 of modes, and their loss factors.
+
+    `stored` (c, m) 1/s2: phi_k . K_c phi_k of the kinds' part of the stiffness, for unit modal mass.
+
+        w_k^2 = squares_k + sum_c (g_c(w_k) - 1) stored_ck,
+        eta_k = sum_c eta_c(w_k) g_c(w_k) stored_ck / w_k^2,
+
+    of first order in the change of the moduli g_c: coupling of modes by it is left out. With the built-in
+    tire's compounds frequencies up to 1 kHz are within 0.1 % of those of K(w_k), within 0.4 % where
+    modes are close. `at`: a frequency (Hz) of all in place of their own. Rigid motions neither gain nor
+    lose.
+    """
+    own = squares.copy()
+    for _ in range(_TURNS):
+        frequency = (
+            np.sqrt(np.maximum(own, 0.0)) / (2 * np.pi) if at is None else np.full(len(own), at)
+        )
+        before, growth = own, [c.spectrum.modulus(frequency) for c in kinds]
+        rise = sum((g - 1) * part for g, part in zip(growth, stored, strict=True))
+        own = np.where(squares > 0, squares + rise, squares)
+        if np.abs(own - before).max(initial=0.0) <= _SETTLED * np.abs(own).max(initial=0.0):
+            break
+    lost = sum(
+        c.loss_factor * c.spectrum.loss_factor(frequency) * g * part
+        for c, g, part in zip(kinds, growth, stored, strict=True)
+    )
+    return own - squares, np.divide(lost, own, out=np.zeros(len(own)), where=own > 0)

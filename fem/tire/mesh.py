@@ -22,7 +22,7 @@ from tireroad.fem.sections import mesh2d
 from tireroad.fem.sections.grid import Patch
 from tireroad.fem.sections.ring import Ring
 from tireroad.fem.sections.torus import Torus
-from tireroad.fem.tire.material import MATERIALS, Material, MaterialLaw
+from tireroad.fem.tire.material import MATERIALS, Kind, Material, MaterialLaw, kinds
 
 __all__ = ["INNER", "RIM", "TREAD", "Lattice", "TireMesh", "Torus", "build", "field_lattice"]
 
@@ -226,7 +226,6 @@ class Wall:
         self._materials = [materials[name] for name in section.regions]
         self.density = self._by_cell([m.density for m in self._materials])
         self.stiffens = any(m.dynamic != 1 for m in self._materials)
-        self.loses = any(m.loss_factor for m in self._materials)
         self._laws = [
             (law.energy, [self._coefficient(name, law) for name in law.coefficients])
             for law in map(MATERIALS.__getitem__, MATERIALS)
@@ -247,9 +246,10 @@ class Wall:
         """Excess of the dynamic modulus over the static one, as a fraction of it: dynamic - 1."""
         return self._by_cell([m.dynamic - 1 for m in self._materials])
 
-    def losses(self) -> fem.Function:
-        """Loss modulus of small motions as a fraction of the static modulus."""
-        return self._by_cell([m.dynamic * m.loss_factor for m in self._materials])
+    def kinds(self) -> list[tuple[Kind, fem.Function]]:
+        """The kinds of compounds, each with its part of the static modulus by cell."""
+        given = [(m.spectrum, m.loss_factor, m.dynamic) for m in self._materials]
+        return [(kind, self._by_cell(share)) for kind, share in kinds(given).items()]
 
     def energy(self, C: Expr) -> tuple[Expr, Expr]:
         """Strain energy density as (distortion, dilatation), J/m3, in UFL."""

@@ -25,7 +25,8 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from tireroad.fem.collective import from_local_rows, summed
-from tireroad.modal.solver.slicing import Modes, Part, Slice, Team
+from tireroad.fem.matrices.operators import Compound
+from tireroad.modal.solver.slicing import Part, Slice, Team
 
 
 def congruent(matrix: PETSc.Mat, basis: sparse.csr_matrix) -> PETSc.Mat:
@@ -215,21 +216,16 @@ def projected(
     return upper
 
 
-def loss_factors(
-    modes: Modes, loss: PETSc.Mat, comm: MPI.Comm, known: np.ndarray | None
+def strain_energies(
+    vectors: np.ndarray, compounds: Sequence[Compound], comm: MPI.Comm
 ) -> np.ndarray:
-    """eta_k = phi . sum_r eta_r K_r phi / omega_k^2 (m,) of mass-normalised modes, rigid ones 0.
-
-    `known`: the values of the first modes, which are reused. Collective.
-    """
-    done = np.zeros(0) if known is None else known
-    lost = np.empty(modes.vectors.shape[1] - len(done))
-    for start in range(0, len(lost), CHUNK):
-        some = modes.vectors[:, len(done) + start : len(done) + start + CHUNK]
-        lost[start : start + CHUNK] = (some * multiply(loss, some)).sum(axis=0)
-    squares = modes.squares[len(done) :]
-    eta = np.divide(comm.allreduce(lost), squares, out=np.zeros(len(squares)), where=squares > 0)
-    return np.concatenate([done, eta])
+    """phi . K_c phi (c, m) 1/s2 of fields (n, m) of unit modal mass, own rows. Collective."""
+    stored = np.empty((len(compounds), vectors.shape[1]))
+    for start in range(0, vectors.shape[1], CHUNK):
+        some = vectors[:, start : start + CHUNK]
+        for row, compound in zip(stored, compounds, strict=True):
+            row[start : start + CHUNK] = (some * multiply(compound.stiffness, some)).sum(axis=0)
+    return summed(comm, stored)
 
 
 _SAME_LENGTH = 1e-3  # relative

@@ -227,6 +227,7 @@ class _AsRun:
                 "density": one.density,
                 "dynamic": one.dynamic,
                 "loss_factor": one.loss_factor,
+                "spectrum": one.spectrum,
             }
             for name, one in shape.rubbers(scene.tire).items()
         }

@@ -43,7 +43,7 @@ from tireroad.runs.scene.schema import (
 )
 from tireroad.runs.scene.source import Path_, Source, parts, shortened
 from tireroad.runs.scene.tables.scene import Damping, Modal, Road, Scene, filled
-from tireroad.runs.scene.tables.tire import SECTIONS
+from tireroad.runs.scene.tables.tire import SECTIONS, check_series
 
 LARGEST = 1_000_000
 
@@ -388,6 +388,7 @@ def load(
     scene = with_band(filled(scene), raw, say)
     scene = replace(scene, tire=scene.tire.with_elements(scene.static.on_road))
     if "tire" not in source.broken():
+        check_series(scene.tire, source)
         scene.tire.shape.check(scene.tire, source)
     if "tire" not in source.broken():
         scene = with_points(with_speed(with_damping(scene)), raw, say)

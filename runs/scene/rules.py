@@ -25,11 +25,14 @@ Where = Callable[[tuple[str, ...], str], InputError]
 
 
 def full_matrices(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    """Raise an error for a solution on the full matrices without [damping]."""
-    if scene.damping is not None:
+    """Raise an error for states of the full matrices without [damping] or with moduli that vary."""
+    if scene.rotation is None or scene.rotation.method != "full":
         return
-    advice = "needs a full damping matrix, which loss factors do not give: add [damping]"
-    if scene.rotation is not None and scene.rotation.method == "full":
+    if scene.damping is None:
+        advice = "needs a full damping matrix, which loss factors do not give: add [damping]"
+        raise error(("rotation", "method"), f'= "full" {advice}')
+    if scene.tire.shape.varies(scene.tire):
+        advice = "needs moduli that do not depend on frequency: set exponent = 0 in [[tire.region]]"
         raise error(("rotation", "method"), f'= "full" {advice}')
 
 
@@ -302,7 +305,7 @@ RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
     (("static",), _static),
     (("rotation",), _rotation),
     (("modal", "static", "rotation", "contact", "time", "damping", "greens"), _modal),
-    (("damping", "rotation", "output"), full_matrices),
+    (("damping", "rotation", "output", "tire"), full_matrices),
     (("contact", "static", "rotation"), _contact),
     (
         ("output", "force", "modal", "axle", "tire", "damping", "contact", "time", "static"),

@@ -53,6 +53,8 @@ _UNITS = {
     "body_convective": "1/rad2",
     "momentum": "kg^1/2",
     "loss_factor": "-",
+    "rise": "1/s2",
+    "band_rise": "1/s2",
 }
 
 
@@ -237,15 +239,15 @@ class ModesStage(Computed[ModalBasis]):
         with record.timing("projection and rotation shapes"):
             given = air, self.job.axle, shapes_of(self.job)
             basis = projected(motions, modes, self.job.speed != 0, *given)
-            labels = _labels(motions, modes.vectors)
-        _describe(record, modes)
+            labels = _labels(motions, basis.modes.first(modes.count).vectors)
+        _describe(record, modes, basis)
         if self._shapes:
             record.headline["rotation shapes that join them"] = (basis.projection.shapes, "-")
         record.headline["damping"] = (_damping(damping_of(self.job), basis.projection), "-")
         if air is not None:
             cavity.describe_air(record, basis.projection.air)
         if labels is not None:
-            _say_names(modes.frequency, labels)
+            _say_names(basis.frequency, labels)
         return replace(basis, labels=labels)
 
     def end(self, key: str, product: ModalBasis) -> None:
@@ -310,11 +312,11 @@ class Fields(Shared[ModalBasis]):
         return again
 
 
-def _describe(record: Record, modes: Modes) -> None:
+def _describe(record: Record, modes: Modes, basis: ModalBasis) -> None:
     record.headline |= {
         "modes": (modes.count, "-"),
-        "lowest": (float(modes.frequency[0]), "Hz"),
-        "highest": (float(modes.frequency[-1]), "Hz"),
+        "lowest": (float(basis.frequency[0]), "Hz"),
+        "highest": (float(basis.frequency[-1]), "Hz"),
     }
     if modes.segments > 1:
         record.headline["equal segments, solved by wave number"] = (modes.segments, "-")

@@ -29,7 +29,7 @@ from tireroad.modal.campbell import (
     standing_wave,
     sweep,
 )
-from tireroad.modal.damping import Proportional, StrainEnergy
+from tireroad.modal.damping import Proportional
 from tireroad.modal.rolling import RollingModes, full_states, rolling_modes
 from tireroad.modal.states import StateModes
 from tireroad.runs.files.store import put
@@ -97,9 +97,7 @@ class FullMatrices(Shared[Wheel]):
 
     def make(self) -> Wheel:
         """Assemble them. Collective."""
-        turning, projection = turning_of(self.job), None
-        if isinstance(turning.damping, StrainEnergy):
-            projection = self.modes.product.projection
+        turning, projection = turning_of(self.job), self.modes.product.projection
         given = self.motions.product, turning, self.air.product, projection
         return wheel_of(*given, self.job.axle)
 
@@ -245,8 +243,9 @@ CONVERGED = 0.03  # largest relative change by the modes above
 
 def _lower(projection: Projection) -> np.ndarray:
     """Mask (m,) of the modes up to `LOWER` of the highest, without rotation shapes."""
-    top = projection.squares[projection.modes - 1]
-    below = projection.squares <= LOWER**2 * top
+    squares = projection.own_squares
+    top = squares[projection.modes - 1]
+    below = squares <= LOWER**2 * top
     below[projection.modes :] = False
     return below
 

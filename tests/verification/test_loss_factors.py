@@ -58,10 +58,10 @@ def test_loss_factors_against_complex_eigenvalues(crown, side, within):
     body = tire({"loss_factor": crown}, {"loss_factor": side})
     operators = Operators(body, INFLATION)
     modes = undamped.solve(operators.stiffness, operators.mass, 24)
-    K_loss = operators.loss_stiffness()
-    projection = project(modes, None, operators.carried, MPI.COMM_SELF, loss=K_loss)
+    found = operators.compounds()
+    projection = project(modes, None, operators.carried, MPI.COMM_SELF, compounds=found)
     root = 1 / np.sqrt(operators.mass)
-    scaled = csr(operators.stiffness) + 1j * csr(K_loss)
+    scaled = csr(operators.stiffness) + 1j * csr(found[0].stiffness)
     scaled = sparse.diags(root) @ scaled @ sparse.diags(root)
     near = 0.9 * projection.squares[0]
     exact = linalg.eigs(scaled.tocsc(), 28, sigma=near, return_eigenvectors=False)
@@ -80,7 +80,7 @@ def test_one_compound_without_pressure_has_its_own_loss_factor():
     operators = Operators(body, 0.0)
     modes = undamped.solve(operators.stiffness, operators.mass, 10)
     projection = project(
-        modes, None, operators.carried, MPI.COMM_SELF, loss=operators.loss_stiffness()
+        modes, None, operators.carried, MPI.COMM_SELF, compounds=operators.compounds()
     )
     np.testing.assert_allclose(projection.loss_factor, 0.2, rtol=1e-8)
     drag, _ = matrices(projection, 0.0, StrainEnergy(), "full")
@@ -95,7 +95,7 @@ def test_dynamic_moduli_scale_the_rubber_alone():
     stiff = Operators(tire({"dynamic": 1.4}, {"dynamic": 1.4}), INFLATION)
     lossy = Operators(tire({"loss_factor": 1.0}, {"loss_factor": 1.0}), INFLATION)
     difference = csr(stiff.stiffness) - csr(bare.stiffness)
-    expected = 0.4 * csr(lossy.loss_stiffness())
+    expected = 0.4 * csr(lossy.compounds()[0].stiffness)
     assert abs(difference - expected).max() < 1e-9 * abs(expected).max()
     body = tire({}, {"dynamic": 1.4}, plies=False)
     body.u.x.array[:] = 0.0
@@ -110,17 +110,17 @@ def test_dynamic_moduli_scale_the_rubber_alone():
 
 @pytest.mark.slow
 def test_the_material_part_by_differences_of_the_stress():
-    """loss_stiffness against central differences of the virtual work of the added stress."""
+    """The compounds' stiffness against central differences of the virtual work of the added stress."""
     from tireroad.fem.static.virtual_work import added_energy, added_stress
 
     body = tire({"loss_factor": 0.3}, {"loss_factor": 0.1})
     before = fem.Function(body.space)
     before.x.array[:] = body.u.x.array
-    share = body.wall.losses()
+    ((_, share),) = body.wall.kinds()
     force = compat.form(added_stress(body, share, before))
     stored = compat.form(added_energy(body, share, before))
     operators = Operators(body, INFLATION)
-    K = csr(operators.loss_stiffness())
+    K = csr(operators.compounds()[0].stiffness)
     free = operators.unknowns.free
     rng = np.random.default_rng(2)
     step = np.zeros(len(body.u.x.array))
@@ -147,7 +147,7 @@ def test_damping_beyond_the_modes():
     operators = Operators(body, INFLATION)
     modes = undamped.solve(operators.stiffness, operators.mass, 16)
     projection = project(
-        modes, None, operators.carried, MPI.COMM_SELF, loss=operators.loss_stiffness()
+        modes, None, operators.carried, MPI.COMM_SELF, compounds=operators.compounds()
     )
     tail = beyond(StrainEnergy(), projection)
     expected = projection.loss_factor[-4:].mean() * np.sqrt(projection.squares[-1])
@@ -167,8 +167,8 @@ def test_any_number_of_processes_has_the_same_loss_factors():
         body = tire({"loss_factor": 0.3, "dynamic": 1.2}, {"loss_factor": 0.1}, comm=comm)
         operators = Operators(body, INFLATION)
         modes = undamped.solve(operators.stiffness, operators.mass, 8)
-        loss = operators.loss_stiffness()
-        found.append(project(modes, None, operators.carried, comm, loss=loss))
+        given = operators.compounds()
+        found.append(project(modes, None, operators.carried, comm, compounds=given))
     alone, shared = found
     np.testing.assert_allclose(shared.squares, alone.squares, rtol=1e-8)
     # Of a pair the sum: which two of its vectors are found is open.

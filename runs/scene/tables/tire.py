@@ -14,14 +14,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
 from tireroad.fem.errors import InputError
-from tireroad.fem.parameters import Parameters, Registry
+from tireroad.fem.parameters import Limits, Parameters, Registry, numbers
 from tireroad.fem.sections.ring import SIZE
-from tireroad.fem.tire.material import MATERIALS, MaterialLaw
+from tireroad.fem.tire.material import CONSTANT, MATERIALS, MaterialLaw, Spectrum, power_law, prony
 from tireroad.runs.scene.schema import (
     Variants,
     choice,
@@ -37,7 +37,6 @@ from tireroad.runs.scene.schema import (
 from tireroad.runs.scene.source import Source
 
 if TYPE_CHECKING:
-    from tireroad.fem.decks.compounds import Rubber
     from tireroad.fem.sections.mesh2d import SectionMesh
     from tireroad.fem.sections.ring import Ring
     from tireroad.fem.tire.cords import Cords as BodyCords
@@ -143,7 +142,11 @@ class SectionKind(Parameters):
 
     def has_losses(self, tire: Tire) -> bool:
         """Whether any compound has a loss factor."""
-        return any((tire.loss_factor, *(part.loss_factor for part in tire.region)))
+        return any(one.loss_factor for one in self.rubbers(tire).values())
+
+    def varies(self, tire: Tire) -> bool:
+        """Whether any modulus depends on frequency."""
+        return any(one.spectrum != CONSTANT for one in self.rubbers(tire).values())
 
     def fingerprint(self, tire: Tire) -> str | None:
         """Hash of what a run takes from the section's files; None without files."""
@@ -208,6 +211,26 @@ def _dynamic():
     )
 
 
+def _exponent(default: float | None = None):
+    return number(
+        default,
+        "-",
+        "growth of the dynamic modulus with the frequency's power; absent: that of the compound, 0 in a torus",
+        least=0,
+        most=0.5,
+    )
+
+
+def _shares():
+    limits = Limits(least=0, most=1)
+    return numbers("shares of the instantaneous modulus in a Prony series", "-", limits)
+
+
+def _times():
+    limits = Limits(least=1e-12, most=1e12)
+    return numbers("relaxation times of the shares", "s", limits)
+
+
 def _loss_factor():
     return number(0.0, "-", "loss factor tan δ of the rubber, used for the modes", least=0, most=2)
 
@@ -242,6 +265,9 @@ class Region:
     )
     dynamic: float = _dynamic()
     loss_factor: float = _loss_factor()
+    exponent: float | None = _exponent()
+    prony_shares: tuple[float, ...] = _shares()
+    prony_times: tuple[float, ...] = _times()
 
 
 @dataclass(frozen=True)
@@ -314,6 +340,9 @@ class Tire(Variants):
     material: Material = table(Material, "material of the wall")
     dynamic: float = _dynamic()
     loss_factor: float = _loss_factor()
+    exponent: float | None = _exponent()
+    prony_shares: tuple[float, ...] = _shares()
+    prony_times: tuple[float, ...] = _times()
     region: tuple[Region, ...] = tables(
         Region, "a part of the section that is made of another material"
     )
@@ -360,11 +389,36 @@ def region_of(tire: Tire, name: str) -> Region | None:
     return next((r for r in tire.region if r.name and r.name.upper() == name.upper()), None)
 
 
-def losses_of(part: Region | Rubber | None) -> dict[str, float]:
-    """Dynamic modulus and loss factor of a region or a file's compound, if not 1 and 0."""
-    given = {} if part is None else {"dynamic": part.dynamic, "loss_factor": part.loss_factor}
-    neutral = {"dynamic": 1.0, "loss_factor": 0.0}
+def stated(dynamic: float, loss_factor: float, spectrum: Spectrum | None) -> dict[str, Any]:
+    """Those of the properties in small motions that a part states: a ratio not 1, a loss factor not 0."""
+    given = {"dynamic": dynamic, "loss_factor": loss_factor, "spectrum": spectrum}
+    neutral = {"dynamic": 1.0, "loss_factor": 0.0, "spectrum": None}
     return {key: value for key, value in given.items() if value != neutral[key]}
+
+
+def losses_of(part: Tire | Region | None) -> dict[str, Any]:
+    """What [tire] or a region states of small motions. A Prony series gives all of it."""
+    if part is None:
+        return {}
+    if part.prony_shares or part.prony_times:
+        return stated(*prony(part.prony_shares, part.prony_times))
+    law = None if part.exponent is None else power_law(part.exponent)
+    return stated(part.dynamic, part.loss_factor, law)
+
+
+def check_series(tire: Tire, source: Source) -> None:
+    """Note Prony series that are none, or that stand beside an exponent."""
+    parts: list[tuple[tuple[str, ...], Tire | Region]] = [(("tire",), tire)]
+    parts += [(("tire", "region", str(n)), one) for n, one in enumerate(tire.region)]
+    for path, part in parts:
+        if not (part.prony_shares or part.prony_times):
+            continue
+        try:
+            prony(part.prony_shares, part.prony_times)
+        except InputError as wrong:
+            source.add((*path, "prony_shares"), f"with prony_times: {wrong}")
+        if part.exponent is not None:
+            source.add((*path, "exponent"), "and prony_shares exclude each other")
 
 
 def proportions_of(ring: Ring, drawn: SectionMesh) -> Proportions:

@@ -41,13 +41,26 @@ class Receptance(Output):
         check_steps(
             (*path, "step"), "frequencies", self.to, self.step, "Hz", error, most=MOST_FREQUENCIES
         )
-        if self.direct and scene.damping is None:
-            raise error(
-                (*path, "direct"),
-                f"= {self.direct} needs full matrices of damping, and loss factors make none: add [damping]",
-            )
+        rolls = scene.rotation is not None and scene.rotation.speed != 0
+        if self.direct and rolls:
+            self._check_rolling(scene, (*path, "direct"), error)
         if self.direct and scene.axle.kind != "fixed":
             raise error((*path, "direct"), "needs an [axle] that is fixed: take 0")
+
+    def _check_rolling(self, scene: Scene, path: tuple[str, ...], error: Where) -> None:
+        """Full matrices of a rolling tire need damping and stiffness that are the same everywhere."""
+        if scene.damping is None:
+            raise error(
+                path,
+                f"= {self.direct} needs full matrices of damping, and loss factors make none for a rolling tire: add "
+                "[damping]",
+            )
+        if scene.tire.shape.varies(scene.tire):
+            raise error(
+                path,
+                f"= {self.direct} needs moduli that do not depend on frequency in a rolling tire: set exponent = 0 in "
+                "[[tire.region]]",
+            )
 
     def frequencies(self) -> int:
         """Number of frequencies above 0."""

@@ -92,6 +92,9 @@ def test_unknowns_are_those_of_the_section(tmp_path, given):
         ('section = "radial"\n[tire.material]\ndensity = 1.0', "follow from its size"),
         ('section = "radial"\norder = 1', "take 2 or 3"),
         ('size = "205/60 R15"', "is only valid for section = radial"),
+        ("prony_shares = [0.3, 0.8]\nprony_times = [1e-3, 1e-2]", "prony_shares.*sum below 1"),
+        ("[[tire.region]]\nprony_shares = [0.3]", "region.*prony_shares.*as many times"),
+        ("exponent = 0.1\nprony_shares = [0.3]\nprony_times = [1e-3]", "exclude each other"),
     ],
 )
 def test_a_radial_tire_says_what_it_does_not_take(tmp_path, text, message):

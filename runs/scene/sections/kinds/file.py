@@ -24,6 +24,7 @@ from tireroad.runs.scene.tables.tire import (
     region_of,
     section_kind,
     spelt,
+    stated,
 )
 
 if TYPE_CHECKING:
@@ -145,14 +146,16 @@ def own_materials(tire: Tire) -> dict[str, Material]:
 def _material(tire: Tire, name: str, rubber: Rubber | None) -> Material:
     """The material of one region.
 
-    Dynamic modulus and loss factor are those of the [[tire.region]] if not 1 and 0, else likewise
+    Its properties in small motions are those that the [[tire.region]] states, else likewise
     those of the file's compound, else those of [tire].
     """
     from tireroad.fem.tire.material import Material, compound
 
     region = region_of(tire, name)
-    change = {"dynamic": tire.dynamic, "loss_factor": tire.loss_factor}
-    change |= losses_of(rubber) | losses_of(region)
+    change = losses_of(tire)
+    if rubber is not None:
+        change |= stated(rubber.dynamic, rubber.loss_factor, rubber.spectrum)
+    change |= losses_of(region)
     if region is not None and region.material is not None:
         return Material(law=region.material.law, density=region.material.density, **change)
     if rubber is None:
@@ -288,9 +291,6 @@ class FileSection(SectionKind):
     def coarser(self, tire: Tire) -> FileSection:
         """The file's own elements: there are no others."""
         return self
-
-    def has_losses(self, tire: Tire) -> bool:
-        return any(one.loss_factor for one in self.rubbers(tire).values())
 
     def fingerprint(self, tire: Tire) -> str:
         return fingerprint(tire)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -152,11 +152,11 @@ def _everywhere(tire: Tire) -> Region | None:
     return next((region for region in tire.region if region.name is None), None)
 
 
-def _compound(regions: Iterable[Region | None], values: dict[str, float]) -> Material:
+def _compound(regions: Iterable[Region | None], values: dict[str, Any]) -> Material:
     """A built-in compound, modified by the regions that it lies in, the last before the others."""
-    from tireroad.fem.tire.material import Material, compound
+    from tireroad.fem.tire.material import Material, compound, power_law
 
-    material = None
+    material, values["spectrum"] = None, power_law(values.pop("exponent"))
     for region in regions:
         values |= losses_of(region)
         material = (region and region.material) or material
@@ -165,8 +165,7 @@ def _compound(regions: Iterable[Region | None], values: dict[str, float]) -> Mat
     return Material(
         law=material.law,
         density=material.density,
-        dynamic=values["dynamic"],
-        loss_factor=values["loss_factor"],
+        **{key: values[key] for key in ("dynamic", "loss_factor", "spectrum")},
     )
 
 

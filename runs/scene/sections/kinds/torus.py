@@ -247,5 +247,5 @@ def rubber(tire: Tire, region: Region | None = None) -> Material:
 
     own = None if region is None else region.material
     table = own or tire.material or Table()
-    losses = {"dynamic": tire.dynamic, "loss_factor": tire.loss_factor} | losses_of(region)
+    losses = losses_of(tire) | losses_of(region)
     return Material(law=table.law, density=table.density, **losses)
