@@ -31,6 +31,7 @@ from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.sections import mesh2d
 from tireroad.fem.sections.construction import CordLine
 from tireroad.fem.sections.mesh2d import SectionMesh
+from tireroad.fem.tire.material import Spectrum, kinds, own_moduli, power_law
 
 STEPS = (0.02, 0.1, 0.3, 0.6, 1.0)  # shares of the inflation pressure
 _SMALL = 1e-10  # m: size of the last Newton step
@@ -159,8 +160,8 @@ class Wall(Protocol):
     """What a ring is made of, as a Construction."""
 
     @property
-    def compounds(self) -> Mapping[str, Mapping[str, float]]:
-        """E, nu, density, dynamic over static modulus, loss factor by region."""
+    def compounds(self) -> Mapping[str, Mapping[str, Any]]:
+        """E, nu, density, dynamic over static modulus, loss factor, exponent or spectrum, by region."""
 
     @property
     def cords(self) -> Sequence[Any]:
@@ -180,6 +181,10 @@ class RigidMode:
     inertia: float
 
 
+def _spectrum(compound: Mapping[str, Any]) -> Spectrum:
+    return compound.get("spectrum") or power_law(compound.get("exponent", 0.0))
+
+
 class InflatedRing:
     """A construction with `elements` from bead to bead, inflated to a pressure (Pa), turning at a speed (rad/s).
 
@@ -192,9 +197,10 @@ class InflatedRing:
         rubber = [tire.compounds[name] for name in mesh.regions]
         by_cell = {
             key: np.array([c[key] for c in rubber])[mesh.region]
-            for key in ("youngs_modulus", "poisson_ratio", "density", "dynamic", "loss_factor")
+            for key in ("youngs_modulus", "poisson_ratio", "density", "dynamic")
         }
-        self._loss = by_cell["loss_factor"]
+        small = [(_spectrum(c), c["loss_factor"], c["dynamic"]) for c in rubber]
+        self._kinds = {k: np.array(share)[mesh.region] for k, share in kinds(small).items()}
         modulus, poisson = by_cell["youngs_modulus"], by_cell["poisson_ratio"]
         self._density, self._dynamic = by_cell["density"], by_cell["dynamic"]
         cellwise = (slice(None), None, None, None)
@@ -233,7 +239,7 @@ class InflatedRing:
 
     def frequencies(self, wave: int, count: int) -> np.ndarray:
         """The `count` lowest frequencies (Hz) of a wave, rim held, dynamic moduli; pairs once."""
-        squares = self._lowest(wave, count, self.mass)[0]
+        squares, _, _ = self._lowest(wave, count, self.mass)
         return np.sqrt(np.sort(squares)) / (2 * np.pi)
 
     def rigid_modes(self) -> list[RigidMode]:
@@ -253,7 +259,7 @@ class InflatedRing:
         }
         found = []
         for wave in (0, 1):
-            squares, fields = self._lowest(wave, 3, self.mass)
+            squares, loss, fields = self._lowest(wave, 3, self.mass)
             whole = np.zeros((self._size, fields.shape[1]), complex)
             whole[self._free] = fields
             heavy = self.mass @ whole
@@ -264,44 +270,99 @@ class InflatedRing:
                 around = np.pi if wave else 2 * np.pi
                 parts = np.abs(motion.ravel().conj() @ heavy) ** 2 / sizes * around
                 k = int(parts.argmax())
-                lost = whole[:, k].conj() @ (self._losses(wave) @ whole[:, k])
-                ratio = float((lost / (squares[k] * sizes[k])).real / 2)
                 frequency = float(np.sqrt(squares[k]) / (2 * np.pi))
-                found.append(RigidMode(name, frequency, ratio, float(parts[k])))
+                found.append(RigidMode(name, frequency, float(loss[k] / 2), float(parts[k])))
         return found
 
-    def _losses(self, wave: int) -> sparse.csr_matrix:
-        """Loss factor times the dynamic stiffness of the wall itself, at a wave number."""
+    def _of_kind(self, wave: int, share: np.ndarray) -> sparse.csr_matrix:
+        """The wall's own stiffness at a wave number, times a `share` of each cell."""
         out: sparse.spmatrix = sparse.csr_matrix((self._size, self._size), dtype=complex)
         for rule, stress in self._parts:
             F = _deformation(rule.gradient(0), self.displacement.ravel()[dofs(self.section.cells)])
-            G, share = rule.gradient(wave), (self._loss * self._dynamic)[:, None, None, None]
-            A = share * _own(stress, F, _moduli(stress, F))
+            G = rule.gradient(wave)
+            A = share[:, None, None, None] * _own(stress, F, _moduli(stress, F))
             blocks = np.einsum("cqhi,cqhk,cqkj,cq->cij", G.conj(), A, G, rule.volume, optimize=True)
             out = out + self._assembled(self.section.cells, blocks)
         return sparse.csr_matrix(out)
 
     def standing(self, wave: int) -> tuple[float, float]:
-        """The lowest speed (rad/s) at which a wave stands on the road, and y (m) where it is largest."""
+        """The lowest speed (rad/s) at which a wave stands on the road, and y (m) where it is largest.
+
+        The rubber feels it at the wave number times the wheel's frequency.
+        """
         along = 2j * wave
         turn = [[wave**2 + 1, along, 0], [-along, wave**2 + 1, 0], [0, 0, wave**2]]
         carried = self.mass @ sparse.kron(sparse.eye(len(self.section.nodes)), np.array(turn))
-        squares, fields = self._lowest(wave, 1, carried)
+        squares, _, fields = self._lowest(wave, 1, carried, per_turn=wave)
         whole = np.zeros(self._size, complex)
         whole[self._free] = fields[:, 0]
         largest = int(np.linalg.norm(whole.reshape(-1, 3), axis=1).argmax())
         return float(np.sqrt(squares[0])), float(self.section.nodes[largest, 1])
 
+    def patch(self, y: float, half_width: float) -> np.ndarray:
+        """Weights (n,) of the nodes in the mean over a strip of the outer face about `y`, m."""
+        chain = self.section.chain(self.section.outer)
+        places = self.section.nodes[chain, 1] + self.displacement[chain, 2]
+        order = np.argsort(places)
+        inside = y + half_width * np.linspace(-1, 1, 401)
+        weights = np.zeros(len(self.section.nodes))
+        for node, unit in zip(chain[order], np.eye(len(chain)), strict=True):
+            weights[node] += np.interp(inside, places[order], unit).mean()
+        return weights
+
+    def receptance(
+        self,
+        weights: np.ndarray,
+        half_angle: float,
+        frequency: np.ndarray,
+        angles: np.ndarray,
+        waves: int = 80,
+    ) -> np.ndarray:
+        """Radial motion over a radial force spread on a patch (f, a), m/N, standing, at angles from it.
+
+        The patch has `weights` (n,) across (`patch`) and a `half_angle` (rad) around. By direct solution for every
+        wave number up to `waves`, with complex moduli at every `frequency` (Hz):
+
+            H = sum_n cos(n angle) sinc(n half_angle)^2 w . (K_n*(omega) - omega^2 M)^-1 w / 2 pi.
+        """
+        load = np.zeros(self._size)
+        load[::3] = weights
+        load, mass = load[self._free].astype(complex), self._inside(self.mass)
+        out = np.zeros((len(frequency), len(angles)), complex)
+        for wave in range(waves + 1):
+            whole = self._inside(self._tangent(wave, self.pressure, dynamic=True))
+            parts = [(k, self._inside(self._of_kind(wave, s))) for k, s in self._kinds.items()]
+            around = (2 if wave else 1) * np.sinc(wave * half_angle / np.pi) ** 2 / (2 * np.pi)
+            for row, f in zip(out, frequency, strict=True):
+                at, matrix = np.array([f]), whole - (2 * np.pi * f) ** 2 * mass
+                for kind, part in parts:
+                    growth = kind.spectrum.modulus(at)[0]
+                    lost = 1j * growth * kind.loss_factor * kind.spectrum.loss_factor(at)[0]
+                    matrix = matrix + (growth - 1 + lost) * part
+                answer = load @ splu(matrix.tocsc()).solve(load)
+                row += around * answer * np.cos(wave * angles)
+        return out
+
     def _lowest(
-        self, wave: int, count: int, mass: sparse.spmatrix
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Eigenvalues and fields nearest to zero of the dynamic stiffness of a wave and a Hermitian `mass`."""
+        self, wave: int, count: int, mass: sparse.spmatrix, per_turn: int = 1
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Eigenvalues nearest to zero of the dynamic stiffness of a wave and a Hermitian `mass`.
+
+        At the moduli of their own frequencies (`own_moduli`), which are `per_turn` times their roots; with
+        loss factors and fields.
+        """
         stiffness, mass = (
             self._inside(sparse.csr_matrix(matrix))
             for matrix in (self._tangent(wave, self.pressure, dynamic=True), mass)
         )
         both = [(matrix + matrix.getH()) / 2 for matrix in (stiffness, mass)]
-        return eigsh(both[0], count, M=both[1], sigma=0.0, which="LM")
+        squares, fields = eigsh(both[0], count, M=both[1], sigma=0.0, which="LM")
+        sizes = np.einsum("ik,ik->k", fields.conj(), both[1] @ fields).real
+        own = [self._inside(self._of_kind(wave, share)) @ fields for share in self._kinds.values()]
+        stored = [np.einsum("ik,ik->k", fields.conj(), part).real / sizes for part in own]
+        known = np.array(stored).reshape(-1, count)
+        rise, loss = own_moduli(per_turn**2 * squares, per_turn**2 * known, list(self._kinds))
+        return squares + rise / per_turn**2, loss, fields
 
     @property
     def weight(self) -> float:

@@ -1,0 +1,44 @@
+"""Mobility of the built-in tire: direct solution by Fourier series against three-dimensional modes, and a plate."""
+
+import numpy as np
+import pytest
+
+from tireroad.fem.sections.inflated import InflatedRing
+from tireroad.fem.sections.radial import radial
+from tireroad.runs.validation import mobility
+
+FREQUENCY = np.array([20.0, 63.0, 100.0, 125.0])
+
+
+@pytest.mark.long
+def test_modes_against_complex_moduli_by_fourier_series(monkeypatch):
+    """Two codes, two ways to lose energy, moduli of every frequency: 1 dB at the patch and a quarter turn from it."""
+    small = {"FREQUENCY": FREQUENCY, "AROUND": 24, "ALONG": 12, "UP_TO": 300.0}
+    for name, value in small.items():
+        monkeypatch.setattr(mobility, name, value)
+    ring = InflatedRing(radial(mobility.SIZE), 12, 2, mobility.PRESSURE)
+    chain, (across, around) = mobility._Chain(), mobility.HALF
+    for y in mobility.PLACES.values():
+        exact = ring.receptance(ring.patch(y, across), around, FREQUENCY, mobility.ANGLES)
+        found = mobility._level(chain.receptance(y)) - mobility._level(exact)
+        assert np.abs(found[:, 0]).max() < 1.2
+        assert np.abs(found[:, 2]).max() < 1.2
+
+
+def test_a_patch_is_the_mean_over_its_strip():
+    """Weights of sum 1 whose mean place is the strip's middle."""
+    ring = InflatedRing(radial(mobility.SIZE), 12, 2, mobility.PRESSURE)
+    weights = ring.patch(0.02, 0.01)
+    places = ring.section.nodes[:, 1] + ring.displacement[:, 2]
+    assert weights.sum() == pytest.approx(1.0)
+    assert weights @ places == pytest.approx(0.02, abs=2e-4)
+
+
+def test_the_plate_by_hand():
+    """Belts of 37.4 MN/m at +-22 degrees, 1.3 mm apart, 12.8 mm of rubber and cords of 15 kg/m2: 34.6 and 4.2 N m."""
+    ((mass, around, across, level),) = mobility._plate_table().rows
+    assert mass == pytest.approx(15.1, rel=0.01)
+    cords = 37.4e6 * np.cos(np.radians(22)) ** 4
+    assert cords * 2 * 0.75e-3**2 < around < cords * 2 * 0.75e-3**2 + 10
+    by_hand = 1 / (8 * np.sqrt(mass * np.sqrt(around * across)))
+    assert level == pytest.approx(20 * np.log10(by_hand), abs=0.06)
