@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from mpi4py import MPI
 
 from tireroad.fem.axle import Axle
 from tireroad.fem.cavity.column import Column
 from tireroad.fem.errors import ConvergenceError, InputError
-from tireroad.fem.matrices.operators import Compound, Operators
+from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.parameters import Limits, finite, whole
 from tireroad.fem.static.checkpoint import Journal
@@ -79,7 +77,7 @@ def solved(
     `up_to` (Hz) is given, within its range. Collective.
     """
     _check_wanted(count, up_to)
-    return undamped.solve(
+    found = undamped.solve(
         operators.stiffness,
         operators.mass,
         count,
@@ -89,6 +87,7 @@ def solved(
         journal=journal,
         solver=solver,
     )
+    return _by_own_frequency(found, operators, up_to)
 
 
 def _check_wanted(count: int | None, up_to: float | None) -> None:
@@ -120,7 +119,6 @@ def projected(
     matrices = motions.rotation if rotation else None
     comm, compounds = operators.body.comm, operators.compounds()
     doppler = turning is None or turning.inertia == "doppler"
-    modes = _by_own_frequency(modes, compounds, comm)
     given = matrices, operators.carried, comm
     projection = project(modes, *given, compounds=compounds, doppler=doppler)
     if turning is not None and turning.speed:
@@ -142,16 +140,28 @@ def projected(
 _ALIKE = 1e-9  # relative difference of equal squares, which keep their order
 
 
-def _by_own_frequency(modes: Modes, compounds: Sequence[Compound], comm: MPI.Comm) -> Modes:
-    """The modes in the order of the frequencies that they have with moduli at these. Collective."""
-    kinds = [one.kind for one in compounds]
+def _by_own_frequency(modes: Modes, operators: Operators, up_to: float | None) -> Modes:
+    """The modes in the order of the frequencies that they have with moduli at these, to `up_to` Hz.
+    Collective.
+
+    The finite elements, by which they were counted, have the moduli of 100 Hz: above that frequency no
+    mode that was not found comes to lie below `up_to`, and of those that come to lie above it others
+    may be missing.
+    """
+    kinds = [kind for kind, _ in operators.body.wall.kinds()]
     if all(kind.spectrum == CONSTANT for kind in kinds):
         return modes
-    stored = strain_energies(modes.vectors, compounds, comm)
+    compounds = operators.compounds()
+    stored = strain_energies(modes.vectors, compounds, operators.body.comm)
+    for compound in compounds:
+        compound.stiffness.destroy()
     own = modes.squares + own_moduli(modes.squares, stored, kinds)[0]
     order = np.argsort(own, kind="stable")
     level = np.cumsum(np.diff(own[order], prepend=own[order[:1]]) > _ALIKE * np.abs(own[order]))
     order = order[np.lexsort((order, level))]
+    if up_to is not None:
+        below = own[order] <= (2 * np.pi * up_to) ** 2
+        order = order[below] if below.any() else order
     return replace(modes.among(order), residual=modes.residual[order])
 
 

@@ -20,6 +20,7 @@ from tireroad.fem.tire.material import CONSTANT, compound, power_law, prony
 from tireroad.fem.tire.mesh import Region, compounds
 from tireroad.modal.basis import project
 from tireroad.modal.solver import undamped
+from tireroad.modal.standing import solved
 from tireroad.runs.validation.cases import thesis_torus
 
 INFLATION = 1.0e5
@@ -198,3 +199,19 @@ def test_any_number_of_processes_has_the_same_rise():
     shared = modes_of(tire(*laws, comm=MPI.COMM_WORLD), 8, MPI.COMM_WORLD)[1]
     np.testing.assert_allclose(shared.rise.sum(), alone.rise.sum(), rtol=1e-6)
     np.testing.assert_allclose(shared.loss_factor.sum(), alone.loss_factor.sum(), rtol=1e-6)
+
+
+@pytest.mark.slow
+def test_modes_up_to_a_frequency_are_all_and_none_above():
+    """By own frequencies, ascending: what the elements have below the limit and comes to lie above it is left out."""
+    laws = {"spectrum": power_law(0.2)}, {"spectrum": power_law(0.2)}
+    operators = tire(*laws, youngs=60e6)
+    found = solved(operators, up_to=300.0)
+    projection = project(
+        found, None, operators.carried, MPI.COMM_SELF, compounds=operators.compounds()
+    )
+    every = modes_of(operators, found.count + 20)[1].own_squares
+    assert (np.diff(projection.frequency) > -1e-6).all()
+    assert projection.frequency[-1] <= 300.0
+    assert found.count == np.count_nonzero(every <= (2 * PI * 300.0) ** 2)
+    assert found.count < found.inertia_count
