@@ -436,16 +436,14 @@ class Wheel:
 
     def _complex(self, frequency: float) -> tuple[PETSc.Mat, PETSc.Mat]:
         """Real part of the stiffness at a frequency (Hz), imaginary part over omega. Collective."""
-        at = np.array([frequency])
         stiffness = self.operators.stiffness.copy()
         uniform = (0.0, 0.0) if self.beyond is not None else self._uniform
         lost = rotating_damping(self.operators, None, 0.0, uniform)
         for one in self._compounds:
-            growth = float(one.kind.spectrum.modulus(at)[0])
-            loss = one.kind.loss_factor * float(one.kind.spectrum.loss_factor(at)[0])
-            add_part(stiffness, growth - 1, one.stiffness)
+            modulus = one.kind.modulus(frequency)
+            add_part(stiffness, modulus.real - 1, one.stiffness)
             if self.beyond is not None:
-                add_part(lost, growth * loss / (2 * np.pi * frequency), one.stiffness)
+                add_part(lost, modulus.imag / (2 * np.pi * frequency), one.stiffness)
         return stiffness, lost
 
 

@@ -334,11 +334,9 @@ class InflatedRing:
             parts = [(k, self._inside(self._of_kind(wave, s))) for k, s in self._kinds.items()]
             around = (2 if wave else 1) * np.sinc(wave * half_angle / np.pi) ** 2 / (2 * np.pi)
             for row, f in zip(out, frequency, strict=True):
-                at, matrix = np.array([f]), whole - (2 * np.pi * f) ** 2 * mass
+                matrix = whole - (2 * np.pi * f) ** 2 * mass
                 for kind, part in parts:
-                    growth = kind.spectrum.modulus(at)[0]
-                    lost = 1j * growth * kind.loss_factor * kind.spectrum.loss_factor(at)[0]
-                    matrix = matrix + (growth - 1 + lost) * part
+                    matrix = matrix + (kind.modulus(f) - 1) * part
                 answer = load @ splu(matrix.tocsc()).solve(load)
                 row += around * answer * np.cos(wave * angles)
         return out

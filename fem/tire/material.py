@@ -187,6 +187,12 @@ class Kind(NamedTuple):
     spectrum: Spectrum
     loss_factor: float
 
+    def modulus(self, frequency: float) -> complex:
+        """Complex modulus over the storage modulus at DYNAMIC_FREQUENCY, at a frequency in Hz."""
+        at = np.array([frequency])
+        loss = self.loss_factor * self.spectrum.loss_factor(at)[0]
+        return complex(self.spectrum.modulus(at)[0] * (1 + 1j * loss))
+
 
 def kinds(compounds: Sequence[tuple[Spectrum, float, float]]) -> dict[Kind, list[float]]:
     """Kinds of the compounds with the part of each compound's static modulus that is theirs.
