@@ -181,6 +181,18 @@ class RigidMode:
     inertia: float
 
 
+def mean_over(
+    places: np.ndarray, middle: float, half: float, period: float | None = None
+) -> np.ndarray:
+    """Weights (n,) of values at `places` (n,), linear between them, in the mean over middle +- half."""
+    inside, order = middle + half * np.linspace(-1, 1, 401), np.argsort(places)
+    weights = np.empty(len(places))
+    weights[order] = [
+        np.interp(inside, places[order], unit, period=period).mean() for unit in np.eye(len(places))
+    ]
+    return weights
+
+
 def _spectrum(compound: Mapping[str, Any]) -> Spectrum:
     return compound.get("spectrum") or power_law(compound.get("exponent", 0.0))
 
@@ -303,11 +315,8 @@ class InflatedRing:
         """Weights (n,) of the nodes in the mean over a strip of the outer face about `y`, m."""
         chain = self.section.chain(self.section.outer)
         places = self.section.nodes[chain, 1] + self.displacement[chain, 2]
-        order = np.argsort(places)
-        inside = y + half_width * np.linspace(-1, 1, 401)
         weights = np.zeros(len(self.section.nodes))
-        for node, unit in zip(chain[order], np.eye(len(chain)), strict=True):
-            weights[node] += np.interp(inside, places[order], unit).mean()
+        weights[chain] = mean_over(places, y, half_width)
         return weights
 
     def receptance(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from tireroad.fem.sections.inflated import InflatedRing
+from tireroad.fem.sections.inflated import InflatedRing, mean_over
 from tireroad.fem.sections.radial import BELT_ANGLE, COMPOUNDS, STEEL, radial
 from tireroad.fem.turning import StrainEnergy, Turning
 from tireroad.runs import library
@@ -62,17 +62,9 @@ class _Chain:
         points = self._points.reshape(*self._shape, 3)
         turn = np.arctan2(points[:, :, 0], -points[:, :, 2])
         out, row = np.zeros((*self._shape, 3)), points[0, :, 1]
-        inside = y + HALF[0] * np.linspace(-1, 1, 401)
-        order = np.argsort(row)
-        across = [np.interp(inside, row[order], unit).mean() for unit in np.eye(len(row))]
-        middle = len(row) // 2
-        ring = turn[:, middle] % (2 * np.pi)
-        start = np.argsort(ring)
-        spots = (angle + HALF[1] * np.linspace(-1, 1, 401)) % (2 * np.pi)
-        units = np.eye(len(ring))
-        around = [np.interp(spots, ring[start], unit, period=2 * np.pi).mean() for unit in units]
-        weight = np.empty((len(ring), len(row)))
-        weight[np.ix_(start, order)] = np.outer(around, across)
+        ring = turn[:, len(row) // 2] % (2 * np.pi)
+        around = mean_over(ring, angle, HALF[1], 2 * np.pi)
+        weight = np.outer(around, mean_over(row, y, HALF[0]))
         out[..., 0], out[..., 2] = weight * np.sin(turn), -weight * np.cos(turn)
         return out.ravel()
 
