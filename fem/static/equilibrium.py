@@ -177,8 +177,8 @@ class Step:
 class Forces:
     """All forces except those of the road. Forms and matrix are created once. Collective.
 
-    `pressure` (Pa) may be changed; `cost`: seconds by part; `drag`: springs that slow the body
-    during a snap.
+    `pressure` (Pa) may be changed, and `rolls`, the share of the inertial forces of rolling; `cost`:
+    seconds by part; `drag`: springs that slow the body during a snap.
     """
 
     def __init__(self, body: Body, rolling: Rolling) -> None:
@@ -186,8 +186,9 @@ class Forces:
         self.cost = Timing()
         self.drag: Drag | None = None
         self.pressure = fem.Constant(body.mesh, 0.0)
+        self.rolls = fem.Constant(body.mesh, 1.0)
         self._before = fem.Function(body.space)
-        residual = static_residual(body, self.pressure, rolling)
+        residual = static_residual(body, self.pressure, rolling, self.rolls)
         self._damping: ShapeDamping | None = None
         if rolling.speed * rolling.stiffness_damping:
             self._damping = ShapeDamping(body, self.pressure, rolling)

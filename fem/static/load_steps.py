@@ -44,6 +44,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from dolfinx import fem
 from mpi4py import MPI
 
 from tireroad.fem.errors import ConvergenceError, InputError, LoadingStopped
@@ -53,7 +54,6 @@ from tireroad.fem.static.footprint import TreadSurface
 from tireroad.fem.static.symmetric import (
     HalfTurnEquilibrium,
     RoundEquilibrium,
-    inflated,
     looks_the_same,
 )
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
@@ -439,25 +439,27 @@ class Loader:
         self._half_ring: _Half | None = None
 
     def inflate(self, pressure: float, near: np.ndarray | None = None) -> None:
-        """Inflate to `pressure` (Pa) without a road, with the steady-rolling loads.
+        """Inflate to `pressure` (Pa) without a road, then let it roll at its speed.
 
         From a `u` that is `near`, else from 0: with cords from the axisymmetric shape of one
-        section if close enough, otherwise in steps.
+        section; in steps if that is not close enough.
         """
         if near is not None:
             self.body.u.x.array[:] = near
-        if near is not None or not (self.body.plies.cords and self._start_round(pressure)):
+            begun = self._begin(pressure)
+        else:
+            begun = bool(self.body.plies.cords) and self._start_round(pressure)
+        if not begun:
             self._inflate_in_steps(pressure)
         self.inflated, self._touch = self.body.u.x.array.copy(), self.lowest()
 
     def _start_round(self, pressure: float) -> bool:
         """Solve from the axisymmetric shape; on failure False and the old state. Collective."""
 
-        def inflate(section: RoundEquilibrium) -> None:
-            Loader(section, self.report)._inflate_in_steps(pressure)
-
         def shape() -> np.ndarray:
-            return inflated(self.body, self.equilibrium.rolling, inflate).on(self.body.lattice)
+            section = RoundEquilibrium(self.body, self.equilibrium.rolling)
+            Loader(section, self.report)._inflate_in_steps(pressure)
+            return section.on(self.body.lattice)
 
         before = self.body.u.x.array.copy()
         self.body.set_displacement(on_root(self.body.comm, shape))
@@ -466,12 +468,17 @@ class Loader:
             half.loader.newton_steps += half.loader._solve_at(pressure).iterations
             self._count(half)
             self.body.set_displacement(half.equilibrium.on(self.body.lattice)[0])
+        begun = self._begin(pressure)
+        if not begun:
+            self.body.u.x.array[:] = before
+        return begun
+
+    def _begin(self, pressure: float) -> bool:
+        """Whether the present shape leads to that at the pressure in one solution. Collective."""
         step = self._solve_at(pressure)
         self.newton_steps += step.iterations
         if step.converged:
             self.tell("inflation", pressure, "Pa", step)
-        else:
-            self.body.u.x.array[:] = before
         return step.converged
 
     def begin_at(self, other: Loader) -> None:
@@ -479,15 +486,26 @@ class Loader:
         self._touch, self.newton_steps = other.touch, other.newton_steps
 
     def _inflate_in_steps(self, pressure: float) -> None:
+        """To the pressure at rest, then to the speed: cords without tension give way under centrifugal
+        forces. The radial tire's section turning at 71.9 rad/s stopped at 13 Pa."""
+        problem = self.equilibrium
+        if problem.rolling.speed:
+            problem.rolls.value = 0.0
         show = Show("inflation", pressure, "Pa")
         self.march(lambda part: self._solve_at(part * pressure), 1.0, 1.0, show)
+        if problem.rolling.speed:
+            show = Show("speed", problem.rolling.speed, "rad/s")
+            self.march(lambda part: self._solve_with(problem.rolls, part**2), 1.0, 1.0, show)
 
     def _solve_at(self, pressure: float) -> Step:
-        before = float(self.equilibrium.pressure.value)
-        self.equilibrium.pressure.value = pressure
+        return self._solve_with(self.equilibrium.pressure, pressure)
+
+    def _solve_with(self, constant: fem.Constant, value: float) -> Step:
+        before = float(constant.value)
+        constant.value = value
         step = self.equilibrium.solve()
         if not step.converged:
-            self.equilibrium.pressure.value = before  # as the displacement is restored
+            constant.value = before  # as the displacement is restored
         return step
 
     @property

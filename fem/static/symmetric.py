@@ -28,7 +28,6 @@ Angled belts keep this symmetry, although they break both mirror symmetries. Dam
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -38,11 +37,10 @@ from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 from scipy.spatial import cKDTree
 
-from tireroad.fem.errors import LoadingStopped
 from tireroad.fem.sections.ring import Ring
 from tireroad.fem.static.equilibrium import Equilibrium, Step
 from tireroad.fem.static.tangent import HeldSystem, Moved
-from tireroad.fem.static.virtual_work import AT_REST, Rolling
+from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.timing import Timing
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.mesh import Lattice
@@ -79,29 +77,6 @@ class RoundEquilibrium(Equilibrium):
         sine, cosine = np.sin(lattice.ring)[:, None], np.cos(lattice.ring)[:, None]
         parts = cosine * along - sine * down, np.tile(across, (len(sine), 1))
         return np.stack([*parts, sine * along + cosine * down], axis=-1).reshape(-1, 3)
-
-
-def inflated(
-    whole: Body, rolling: Rolling, inflate: Callable[[RoundEquilibrium], None]
-) -> RoundEquilibrium:
-    """The axisymmetric shape inflated by `inflate`; if rotation prevents it, via that at rest.
-
-    Cords not yet tensioned by the pressure give way under centrifugal forces. The radial tire's
-    section of 34 elements from bead to bead at 71.9 rad/s stops at 13 Pa, but converges in two
-    tangents from the inflated state at rest. On the calling process only. Raises LoadingStopped if
-    the state at rest does not help either.
-    """
-    section = RoundEquilibrium(whole, rolling)
-    try:
-        inflate(section)
-    except LoadingStopped:
-        if not rolling.speed:
-            raise
-        still = RoundEquilibrium(whole, AT_REST)
-        inflate(still)
-        section.body.u.x.array[:] = still.body.u.x.array
-        inflate(section)
-    return section
 
 
 class RoundSystem:

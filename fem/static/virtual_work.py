@@ -30,10 +30,15 @@ class Rolling:
 AT_REST = Rolling()
 
 
-def static_residual(body: Body, pressure: Expr, rolling: Rolling) -> ufl.Form:
-    """Virtual work of everything except the road, a UFL form in the body's displacement."""
+def static_residual(
+    body: Body, pressure: Expr, rolling: Rolling, share: Expr | float = 1.0
+) -> ufl.Form:
+    """Virtual work of everything except the road, a UFL form in the body's displacement.
+
+    `share`: of the forces of rolling, inertia and mass-proportional damping.
+    """
     work = elastic_work(body, pressure)
-    return work + _rolling_work(body, rolling) if rolling.speed else work
+    return work + share * _rolling_work(body, rolling) if rolling.speed else work
 
 
 def elastic_work(body: Body, pressure: Expr) -> ufl.Form:
