@@ -13,7 +13,12 @@ the road while the tire turns through it at Omega has the accelerations Omega^2 
 
     K_n v = Omega^2 M C_n v,   C_n = [[n^2 + 1, 2 i n, 0], [-2 i n, n^2 + 1, 0], [0, 0, n^2]]  in (r, theta, y).
 
-The lowest Omega over all n is the critical speed.
+The lowest Omega over all n is the critical speed, of a tire without losses.  With the moduli that the rubber
+has at n Omega, a load that rests on the turning tire makes at every speed
+
+    (K_n*(n Omega) - Omega^2 M C_n) v_n = q_n,
+
+and the losses of those waves are its rolling resistance.
 """
 
 from __future__ import annotations
@@ -288,24 +293,30 @@ class InflatedRing:
 
     def _of_kind(self, wave: int, share: np.ndarray) -> sparse.csr_matrix:
         """The wall's own stiffness at a wave number, times a `share` of each cell."""
-        out: sparse.spmatrix = sparse.csr_matrix((self._size, self._size), dtype=complex)
-        for rule, stress in self._parts:
-            F = _deformation(rule.gradient(0), self.displacement.ravel()[dofs(self.section.cells)])
-            G = rule.gradient(wave)
-            A = share[:, None, None, None] * _own(stress, F, _moduli(stress, F))
-            blocks = np.einsum("cqhi,cqhk,cqkj,cq->cij", G.conj(), A, G, rule.volume, optimize=True)
-            out = out + self._assembled(self.section.cells, blocks)
-        return sparse.csr_matrix(out)
+        return self._wall(wave, [share[:, None, None, None] * own for _, own in self._moduli])
+
+    def _dynamic_stiffness(self, wave: int) -> Callable[[float], sparse.csc_matrix]:
+        """The complex stiffness of small motions of a wave, free unknowns, by frequency (Hz)."""
+        whole = self._inside(self._tangent(wave, self.pressure, dynamic=True))
+        parts = [(k, self._inside(self._of_kind(wave, s))) for k, s in self._kinds.items()]
+
+        def at(frequency: float) -> sparse.csc_matrix:
+            return whole + sum((kind.modulus(frequency) - 1) * part for kind, part in parts)
+
+        return at
+
+    def _carried(self, wave: int) -> sparse.csr_matrix:
+        """M C_n of a wave that rests in space while the tire turns through it."""
+        along = 2j * wave
+        turn = [[wave**2 + 1, along, 0], [-along, wave**2 + 1, 0], [0, 0, wave**2]]
+        return self.mass @ sparse.kron(sparse.eye(len(self.section.nodes)), np.array(turn))
 
     def standing(self, wave: int) -> tuple[float, float]:
         """The lowest speed (rad/s) at which a wave stands on the road, and y (m) where it is largest.
 
         The rubber feels it at the wave number times the wheel's frequency.
         """
-        along = 2j * wave
-        turn = [[wave**2 + 1, along, 0], [-along, wave**2 + 1, 0], [0, 0, wave**2]]
-        carried = self.mass @ sparse.kron(sparse.eye(len(self.section.nodes)), np.array(turn))
-        squares, _, fields = self._lowest(wave, 1, carried, per_turn=wave)
+        squares, _, fields = self._lowest(wave, 1, self._carried(wave), per_turn=wave)
         whole = np.zeros(self._size, complex)
         whole[self._free] = fields[:, 0]
         largest = int(np.linalg.norm(whole.reshape(-1, 3), axis=1).argmax())
@@ -334,21 +345,40 @@ class InflatedRing:
 
             H = sum_n cos(n angle) sinc(n half_angle)^2 w . (K_n*(omega) - omega^2 M)^-1 w / 2 pi.
         """
-        load = np.zeros(self._size)
-        load[::3] = weights
-        load, mass = load[self._free].astype(complex), self._inside(self.mass)
+        load, mass = self._radial(weights), self._inside(self.mass)
         out = np.zeros((len(frequency), len(angles)), complex)
         for wave in range(waves + 1):
-            whole = self._inside(self._tangent(wave, self.pressure, dynamic=True))
-            parts = [(k, self._inside(self._of_kind(wave, s))) for k, s in self._kinds.items()]
-            around = (2 if wave else 1) * np.sinc(wave * half_angle / np.pi) ** 2 / (2 * np.pi)
+            stiffness, share = self._dynamic_stiffness(wave), _share(wave, half_angle)
             for row, f in zip(out, frequency, strict=True):
-                matrix = whole - (2 * np.pi * f) ** 2 * mass
-                for kind, part in parts:
-                    matrix = matrix + (kind.modulus(f) - 1) * part
-                answer = load @ splu(matrix.tocsc()).solve(load)
-                row += around * answer * np.cos(wave * angles)
+                answer = load @ splu(stiffness(f) - (2 * np.pi * f) ** 2 * mass).solve(load)
+                row += share * answer * np.cos(wave * angles)
         return out
+
+    def rolling(
+        self, weights: np.ndarray, half_angle: float, waves: int = 60
+    ) -> tuple[float, float]:
+        """Deflection over a radial load on a patch, m/N, and braking moment over its square, N m/N2.
+
+        The load, spread as in `receptance`, rests in space while the tire turns through it at its `speed` W:
+
+            a_n = w . (K_n*(n W) - W^2 M C_n)^-1 w,  u / F = sum_n s_n Re a_n,  T / F^2 = -sum_n n s_n Im a_n
+
+        with s_n = (2 or 1) sinc(n half_angle)^2 / 2 pi.  Linear about the inflated tire; friction and the
+        shear that it makes in the tread are left out.
+        """
+        load, deflection, moment = self._radial(weights), 0.0, 0.0
+        for wave in range(waves + 1):
+            stiffness = self._dynamic_stiffness(wave)(wave * self.speed / (2 * np.pi))
+            inertia = self.speed**2 * self._inside(self._carried(wave))
+            answer = load @ splu((stiffness - inertia).tocsc()).solve(load)
+            deflection += _share(wave, half_angle) * answer.real
+            moment -= wave * _share(wave, half_angle) * answer.imag
+        return float(deflection), float(moment)
+
+    def _radial(self, weights: np.ndarray) -> np.ndarray:
+        load = np.zeros(self._size, complex)
+        load[::3] = weights
+        return load[self._free]
 
     def _lowest(
         self, wave: int, count: int, mass: sparse.spmatrix, per_turn: int = 1
@@ -406,16 +436,37 @@ class InflatedRing:
         np.add.at(out, dofs(face.nodes), pressure * face.force())
         return out
 
-    def _tangent(self, wave: int, pressure: float, dynamic: bool = False) -> sparse.csr_matrix:
-        face, u = Face(self.section, self.displacement), self.displacement
-        out = pressure * self._assembled(face.nodes, face.tangent(wave))
+    def _strained(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Moduli (c, q, 9, 9) Pa of both parts in the present state, whole and without those of the tension."""
+        u, found = self.displacement.ravel()[dofs(self.section.cells)], []
         for rule, stress in self._parts:
-            F = _deformation(rule.gradient(0), u.ravel()[dofs(self.section.cells)])
-            A, G = _moduli(stress, F), rule.gradient(wave)
-            if dynamic:
-                A = A + (self._dynamic - 1)[:, None, None, None] * _own(stress, F, A)
+            F = _deformation(rule.gradient(0), u)
+            A = _moduli(stress, F)
+            found.append((A, _own(stress, F, A)))
+        return found
+
+    @cached_property
+    def _moduli(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Those of the inflated state."""
+        return self._strained()
+
+    def _wall(self, wave: int, moduli: Sequence[np.ndarray]) -> sparse.csr_matrix:
+        out: sparse.spmatrix = sparse.csr_matrix((self._size, self._size))
+        for (rule, _), A in zip(self._parts, moduli, strict=True):
+            G = rule.gradient(wave)
             blocks = np.einsum("cqhi,cqhk,cqkj,cq->cij", G.conj(), A, G, rule.volume, optimize=True)
             out = out + self._assembled(self.section.cells, blocks)
+        return sparse.csr_matrix(out)
+
+    def _tangent(self, wave: int, pressure: float, dynamic: bool = False) -> sparse.csr_matrix:
+        """Of the present state; `dynamic`: of small motions about the inflated one."""
+        face, u = Face(self.section, self.displacement), self.displacement
+        if dynamic:
+            excess = (self._dynamic - 1)[:, None, None, None]
+            moduli = [A + excess * own for A, own in self._moduli]
+        else:
+            moduli = [A for A, _ in self._strained()]
+        out = self._wall(wave, moduli) + pressure * self._assembled(face.nodes, face.tangent(wave))
         for cords, edges in self._cords:
             line = Line(self.section, edges, cords, self.section.order)
             _, _, B = line.state(u)
@@ -432,6 +483,11 @@ class InflatedRing:
 
     def _inside(self, matrix: sparse.csr_matrix) -> sparse.csc_matrix:
         return matrix[self._free][:, self._free].tocsc()
+
+
+def _share(wave: int, half_angle: float) -> float:
+    """Share of a wave in the mean over a patch of a load on it, 1/rad."""
+    return float((2 if wave else 1) * np.sinc(wave * half_angle / np.pi) ** 2 / (2 * np.pi))
 
 
 def _each_component(blocks: np.ndarray) -> np.ndarray:

@@ -40,10 +40,31 @@ NOTE = (
 )
 
 
+ROLLED = "205/60 R15", "205/55 R16", "225/45 R17"
+SPEEDS = 30.0, 60.0, 100.0, 140.0, 160.0, 180.0, 200.0, 220.0, 240.0  # rad/s
+LOAD = 4000.0  # N
+PATCH = 0.06, 0.2  # m, rad: half width and half angle of the footprint
+LOSS_NOTE = (
+    f"{LOAD:g} N spread over {2e3 * PATCH[0]:g} mm by {2 * PATCH[1]:g} rad on the inflated tire that turns (InflatedRing.rolling): "
+    "the moment of the compounds' losses over load and radius, in the state at each speed. Linear, without friction."
+)
+
+
 def run() -> list[Table]:
-    """One row per size. Not collective."""
+    """One row per size; rolling resistance of three of them over the speed. Not collective."""
     table = Table("The built-in radial tire", COLUMNS, [row(size) for size in SIZES], [NOTE])
-    return [table]
+    columns = [("size", ""), *((f"{speed:g} rad/s", "%") for speed in SPEEDS)]
+    rows = [[size, *(rolling_resistance(size, speed) for speed in SPEEDS)] for size in ROLLED]
+    return [table, Table("Rolling resistance", columns, rows, [LOSS_NOTE])]
+
+
+def rolling_resistance(size: str, speed: float) -> float:
+    """Rolling resistance over the load, %, by the losses of the compounds."""
+    tire = InflatedRing(radial(size), ELEMENTS, ORDER, PRESSURE, speed)
+    width, angle = PATCH
+    deflection, moment = tire.rolling(tire.patch(0.0, width), angle)
+    radius = tire.section.nodes[:, 0].max() - LOAD * deflection
+    return float(100 * LOAD * moment / radius)
 
 
 def row(size: str) -> list:

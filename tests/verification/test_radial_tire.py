@@ -1,5 +1,7 @@
 """The built-in radial tire: its first modes beside public ones, and two more sizes inflated."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -67,6 +69,30 @@ def test_three_dimensional_elements_against_fourier_series(tmp_path):
     lateral, turning, yaw, vertical = lowest(InflatedRing(radial("205/60 R15"), 14, 2, PRESSURE))
     wanted = np.sort([lateral, yaw, yaw, turning, vertical, vertical])
     np.testing.assert_allclose(projection.frequency, wanted, rtol=1e-3)
+
+
+@pytest.mark.slow
+def test_losses_of_a_rolling_tire_take_off_at_its_critical_speed():
+    """At rest the load sinks as by the receptance at 0 Hz; moments are those of a rolling resistance of 0.5 to
+    1.2 % up to the speed symbol (H: 190 rad/s), beyond which they take off, and none without losses.
+    """
+
+    made = radial("205/60 R15")
+
+    def rolled(speed, wall=made):
+        tire = InflatedRing(wall, 12, 2, PRESSURE, speed)
+        return tire, *tire.rolling(tire.patch(0.0, 0.06), 0.2)
+
+    tire, deflection, _ = rolled(0.0)
+    at_rest = tire.receptance(tire.patch(0.0, 0.06), 0.2, np.zeros(1), np.zeros(1), 60)
+    assert deflection == pytest.approx(at_rest.real.item(), rel=1e-9)
+    share = {speed: 4000 * rolled(speed)[2] / 0.305 for speed in (60.0, 150.0, 240.0)}
+    assert 0.005 < share[60.0] < 0.012
+    assert share[150.0] == pytest.approx(share[60.0], rel=0.1)
+    assert share[240.0] > 1.5 * share[60.0]
+    lossless = {name: {**values, "loss_factor": 0.0} for name, values in made.compounds.items()}
+    _, _, moment = rolled(60.0, replace(made, compounds=lossless))
+    assert abs(moment) < 1e-6 * share[60.0] / 4000
 
 
 @pytest.mark.slow
