@@ -160,6 +160,7 @@ def torus(
 def radial(
     size: str = "205/60 R15",
     *,
+    grooves: int = 4,
     segments: int = 40,
     elements_arc: int = 26,
     footprint_size: float = NEAR_ROAD,
@@ -168,11 +169,11 @@ def radial(
     """The built-in radial passenger tire of a size, without loads (docs/radial-tire.md).
 
     `segments` elements around and `elements_arc` from bead to bead, quadratic; those near the road
-    are `footprint_size` of the others. Its rubbers have loss factors: with damping =
+    are `footprint_size` of the others; `grooves` around its tread. Its rubbers have loss factors: with damping =
     tireroad.StrainEnergy() the rotating tire loses by them. Raises InputError for a size that is
     none, or a value out of the range that it has in a scene.
     """
-    shape = RadialSection(size=size, elements_arc=elements_arc)
+    shape = RadialSection(size=size, grooves=grooves, elements_arc=elements_arc)
     tire = Tire(
         section="radial", shape=shape, segments=segments, order=2, footprint_size=footprint_size
     )

@@ -17,6 +17,9 @@ from tireroad.fem.sections.construction import Construction, CordLine, Layer, Ou
 _SIZE = re.compile(r"\s*(\d{3})\s*/\s*(\d{2})\s*Z?R\s*(\d{2})\s*", re.IGNORECASE)
 
 
+RATED_PRESSURE = 2.5e5  # Pa
+
+
 @dataclass(frozen=True)
 class Size:
     """Section `width`, section `height` and `rim` radius, all in m."""
@@ -24,6 +27,21 @@ class Size:
     width: float
     height: float
     rim: float
+
+    def rated_load(self, inflation: float = RATED_PRESSURE) -> float:
+        """Load (N) that the size is rated for at an `inflation` (Pa), as a standard, not a reinforced tire.
+
+        1.95e-3 width^0.86 height^0.89 rim diameter^0.63 kg, in mm, at 250 kPa: within 4.3 % (standard
+        deviation 1.7 %) of the load indices of 41 sizes from 145/80 R13 to 275/40 R19.  Below that pressure
+        its 0.8th power, as in the tables of tire standards; above, no more.
+        """
+        width, height, diameter = 1e3 * self.width, 1e3 * self.height, 2e3 * self.rim
+        index = 1.950e-3 * width**0.8634 * height**0.8949 * diameter**0.6315
+        return 9.81 * index * min(inflation / RATED_PRESSURE, 1.0) ** 0.8
+
+    def inflation_for(self, load: float) -> float:
+        """Least inflation (Pa) at which a `load` (N) is rated; at most 250 kPa."""
+        return RATED_PRESSURE * min(load / self.rated_load(), 1.0) ** 1.25
 
 
 def size(text: str) -> Size:
@@ -53,9 +71,9 @@ POLYESTER = {
 BELT_ANGLE = np.radians(22)
 
 # E Pa, Poisson's ratio, kg/m3, dynamic over static modulus, loss factor, both at 100 Hz, exponent of the
-# modulus over frequency.
+# modulus over frequency.  That of the tread is the rubber between its grooves.
 COMPOUNDS = {
-    "tread": (6.3e6, 0.49, 800.0, 1.21, 0.3, 0.10),
+    "tread": (4.4e6, 0.49, 1110.0, 1.8, 0.3, 0.10),
     "skim": (11.7e6, 0.49, 1200.0, 1.20, 0.2, 0.08),
     "ply": (7.0e6, 0.49, 1150.0, 1.20, 0.2, 0.08),
     "sidewall": (8.5e6, 0.49, 1120.0, 1.20, 0.2, 0.08),
@@ -76,6 +94,8 @@ LOWEST = (
     0.6,
 )  # largest drop of the crown and of the shoulder over the height above the widest point
 BELT_2 = 0.9  # its width over that of belt 1, which ends at the edge of the crown
+GROOVES, MOST_GROOVES = 4, 8  # around the tread
+GROOVE = 0.07  # width of each over that of the crown: 9.3 mm for 205/60 R15
 LEAST_HEIGHT = 0.055  # m of a section; less leaves no sidewall above the flange
 
 
@@ -91,9 +111,16 @@ class _Stations(NamedTuple):
     end: float
 
 
-def radial(text: str) -> Construction:
-    """The construction for a size. Raises InputError for an invalid size or too low a section."""
+def radial(text: str, grooves: int = GROOVES) -> Construction:
+    """The construction for a size. Raises InputError for an invalid size or too low a section.
+
+    The circumferential `grooves`, as deep as the tread, take the share 1 - l = 0.07 `grooves` of it, which
+    is spread over its width: E and density times l. That is exact for stretch and shear along ribs. Across
+    them ribs resist less than that, but there the belts carry.
+    """
     tire = size(text)
+    if not 0 <= grooves <= MOST_GROOVES:
+        raise InputError(f"tire.grooves = {grooves}: must lie from 0 to {MOST_GROOVES}")
     if tire.height < LEAST_HEIGHT:
         raise InputError(
             f'tire.size = "{text[:40]}": its section is {1e3 * tire.height:.0f} mm high; the built-in '
@@ -112,15 +139,20 @@ def radial(text: str) -> Construction:
             Part("belt base", "bead", (at.held, at.end)),
         ),
         cords=_cords(at),
-        compounds={name: _rubber(values) for name, values in COMPOUNDS.items()},
+        compounds={
+            name: _rubber(values, 1 - GROOVE * grooves if name == "tread" else 1.0)
+            for name, values in COMPOUNDS.items()
+        },
         tread=at.shoulder,
         held=at.held,
     )
 
 
-def _rubber(values: tuple[float, ...]) -> dict[str, float]:
+def _rubber(values: tuple[float, ...], land: float) -> dict[str, float]:
+    """Values by name of a compound that fills the share `land` of its layer."""
     names = ("youngs_modulus", "poisson_ratio", "density", "dynamic", "loss_factor", "exponent")
-    return dict(zip(names, values, strict=True))
+    found = dict(zip(names, values, strict=True))
+    return found | {key: land * found[key] for key in ("youngs_modulus", "density")}
 
 
 def _layers(at: _Stations) -> tuple[Layer, ...]:

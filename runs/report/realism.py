@@ -11,9 +11,11 @@ from collections.abc import Callable, Iterator, Mapping
 import numpy as np
 
 from tireroad.fem.errors import InputError
+from tireroad.fem.sections.radial import RATED_PRESSURE, size
 from tireroad.runs.report.read import Absent, Results, digits, quantity
 
 _LOWEST = 6  # modes whose damping is checked
+_OVERLOAD = 1.1  # times the rated load, which the size gives within 4 %
 _PEAK = 2.5  # largest contact pressure over the mean, with some room for coarse elements
 _DIFFERS = 0.05  # relative to the static load; above it the mean force while rolling is explained
 _OBSTACLES = ("step", "cleat", "iso8608")  # roads with heights of their own
@@ -107,6 +109,24 @@ def _stiffness(results: Results) -> Iterator[str]:
         )
 
 
+def _rating(results: Results) -> Iterator[str]:
+    """Load over that which the built-in tire's size is rated for at its inflation."""
+    tire = results.scene.get("tire", {})
+    load, inflation = (_number(results, "static.h5", name) for name in ("load", "inflation"))
+    if tire.get("section") != "radial" or "size" not in tire or load <= 0 or inflation <= 0:
+        return
+    own = size(tire["size"])
+    if load > _OVERLOAD * own.rated_load(inflation):
+        needed = own.inflation_for(load)
+        remedy = (
+            f"{quantity(needed, 'Pa')} would do" if needed < RATED_PRESSURE else "too much for it"
+        )
+        yield (
+            f"load {quantity(load, 'N')} on {tire['size']} at {quantity(inflation, 'Pa')}, rated for "
+            f"{quantity(own.rated_load(inflation), 'N')} there ({remedy})"
+        )
+
+
 def _mass(results: Results) -> Iterator[str]:
     mass = _number(results, "static.h5", "mass")
     if mass > 0 and _outside(mass, 3.0, 90.0):
@@ -155,7 +175,7 @@ def _road(results: Results) -> Iterator[str]:
         )
 
 
-_CHECKS = (_pressure, _peak, _footprint, _stiffness, _mass, _tread, _damping, _road)
+_CHECKS = (_pressure, _peak, _footprint, _stiffness, _rating, _mass, _tread, _damping, _road)
 
 
 def mean_load(results: Results) -> str | None:

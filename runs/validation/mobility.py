@@ -6,7 +6,7 @@ import numpy as np
 from scipy import sparse
 
 from tireroad.fem.sections.inflated import InflatedRing, mean_over
-from tireroad.fem.sections.radial import BELT_ANGLE, COMPOUNDS, STEEL, radial
+from tireroad.fem.sections.radial import BELT_ANGLE, STEEL, radial
 from tireroad.fem.turning import StrainEnergy, Turning
 from tireroad.runs import library
 from tireroad.runs.validation.tables import Table
@@ -93,12 +93,15 @@ def _table(name: str, exact: np.ndarray, modes: np.ndarray) -> Table:
 def _plate_table() -> Table:
     """The mobility 1 / (8 sqrt(m sqrt(B_x B_y))) of an endless plate like the belt, with the tread on it."""
     layers = (("tread", 8.0e-3), ("skim", 1.3e-3), ("skim", 1.5e-3), ("ply", 2.0e-3))
-    modulus = np.array([COMPOUNDS[name][0] * COMPOUNDS[name][3] for name, _ in layers])
+    compounds = radial(SIZE).compounds
+    modulus = np.array(
+        [compounds[n]["youngs_modulus"] * compounds[n]["dynamic"] for n, _ in layers]
+    )
     thick = np.array([height for _, height in layers])
     middle = np.cumsum(thick) - thick / 2
     cords = STEEL["youngs_modulus"] * STEEL["area"] / STEEL["spacing"]
     heavy = STEEL["density"] * STEEL["area"] / STEEL["spacing"]
-    mass = float(sum(COMPOUNDS[name][2] * height for name, height in layers)) + 2 * heavy
+    mass = float(sum(compounds[name]["density"] * height for name, height in layers)) + 2 * heavy
     plies = np.array([thick[:2].sum(), thick[:3].sum()])
     stiffness = []
     for direction in (np.cos(BELT_ANGLE), np.sin(BELT_ANGLE)):

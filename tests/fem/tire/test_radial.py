@@ -8,8 +8,10 @@ from scipy.spatial import cKDTree
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections.construction import Outline, arcs
-from tireroad.fem.sections.radial import radial, size
+from tireroad.fem.sections.radial import GROOVES, MOST_GROOVES, radial, size
 from tireroad.fem.sections.section_file import read
+from tireroad.runs.scene.schema import key_of
+from tireroad.runs.scene.sections.kinds.radial import RadialSection
 
 FILE = """
 unit = "mm"
@@ -126,7 +128,6 @@ def test_two_lines_of_cords_of_one_name_are_refused(tmp_path):
 def test_ranges_are_those_of_a_scene():
     """But for the density of a compound, which a scene knows in kg/m3."""
     from tireroad.fem.sections.section_file import COMPOUND_RANGES, CORD_RANGES
-    from tireroad.runs.scene.schema import key_of
     from tireroad.runs.scene.tables.tire import Cords
 
     keys = {name: key_of(item) for name, item in Cords.__dataclass_fields__.items()}
@@ -177,6 +178,41 @@ def test_the_flange_holds_the_outer_face_down_to_the_heel():
 def test_a_section_too_low_for_the_flange_is_told():
     with pytest.raises(InputError, match=r"tire\.size = \"145/30 R14\": its section is 44 mm high"):
         radial("145/30 R14")
+
+
+def test_grooves_take_their_share_of_the_tread():
+    """Of its stiffness and mass, and of nothing else; the scene's key has the number and range of here."""
+    slick, four = (radial("205/60 R15", grooves).compounds for grooves in (0, 4))
+    for key in ("youngs_modulus", "density"):
+        assert four["tread"][key] == pytest.approx(0.72 * slick["tread"][key])
+    assert {k: v for k, v in four.items() if k != "tread"} == {
+        k: v for k, v in slick.items() if k != "tread"
+    }
+    key = RadialSection.__dataclass_fields__["grooves"]
+    assert (key.default, key_of(key).limits.most) == (GROOVES, MOST_GROOVES)
+    with pytest.raises(InputError, match=r"tire\.grooves = 9: must lie from 0 to 8"):
+        radial("205/60 R15", 9)
+
+
+@pytest.mark.parametrize(
+    ("text", "index"),
+    [
+        ("155/65 R14", 387),
+        ("175/65 R14", 475),
+        ("195/65 R15", 615),
+        ("205/60 R15", 615),
+        ("225/45 R17", 615),
+        ("225/40 R18", 560),
+        ("255/35 R20", 650),
+    ],
+)
+def test_the_size_says_its_rated_load(text, index):
+    """Kilograms of the load indices of standard tires (75, 82, 91, 91, 91, 88, 93)."""
+    tire = size(text)
+    assert tire.rated_load() == pytest.approx(9.81 * index, rel=0.045)
+    assert tire.rated_load(2.0e5) == pytest.approx(0.8**0.8 * tire.rated_load())
+    assert tire.inflation_for(tire.rated_load(2.0e5)) == pytest.approx(2.0e5)
+    assert tire.inflation_for(2 * tire.rated_load()) == 2.5e5
 
 
 @pytest.mark.parametrize("text", ["", "205", "205/60 15", "999/99 R99", "205/60 R15 extra"])

@@ -40,6 +40,18 @@ def test_a_tire_is_not_remarked_on(folder: Path) -> None:
     assert told(folder, tire={"thickness": 0.014}, road={"kind": "texture"}) is None
 
 
+def test_an_overloaded_size_is_told_the_inflation_that_it_needs(folder: Path) -> None:
+    """4000 N are no load for 205/60 R15, but above what 155/65 R14 is rated for (387 kg at 250 kPa)."""
+    usual, small = ({"section": "radial", "size": text} for text in ("205/60 R15", "155/65 R14"))
+    assert told(folder, tire=usual) is None
+    assert "on 155/65 R14 at 220" in told(folder, tire=small)
+    assert "(too much for it)" in told(folder, tire=small)
+    with sealed(folder / "static.h5", "a") as file:
+        file.attrs["inflation"] = 1.2e5
+        file.attrs["footprint_area"] = 4000.0 / 1.5e5
+    assert "kPa would do" in told(folder, tire=usual)
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from tireroad.runs.scene.tables.tire import Cords as Line
     from tireroad.runs.scene.tables.tire import Region, Tire
 
+_GROOVES, _MOST_GROOVES = 4, 8  # those of fem.sections.radial, whose import needs scipy
 # (elements around, along) available to a search.
 FINER = ((16, 14), (20, 18), (24, 22), (30, 26), (36, 32), (44, 38), (52, 46), (64, 56))
 
@@ -46,6 +47,12 @@ class RadialSection(SectionKind):
     without = ("material",)
 
     size: str = text("205/60 R15", "size of the built-in passenger tire (docs/radial-tire.md)")
+    grooves: int = integer(
+        _GROOVES,
+        "circumferential grooves of the tread, each 0.07 of its width, spread over it; 0: a slick tread",
+        least=0,
+        most=_MOST_GROOVES,
+    )
     elements_arc: int | None = integer(
         None, "number of elements from bead to bead; absent: 26", least=2, most=1000
     )
@@ -62,7 +69,7 @@ class RadialSection(SectionKind):
             text = "= 1: linear elements between cords cannot bend, so no static state is found: take 2 or 3"
             source.add(("tire", "order"), text)
         try:
-            construction = built(self.size)
+            construction = built(self.size, self.grooves)
         except InputError as problem:
             source.add(("tire", "size"), str(problem).removeprefix("tire.size "))
             return
@@ -80,12 +87,12 @@ class RadialSection(SectionKind):
     def rubbers(self, tire: Tire) -> dict[str, Material]:
         return {
             name: _compound((_everywhere(tire), region_of(tire, name)), dict(values))
-            for name, values in built(self.size).compounds.items()
+            for name, values in built(self.size, self.grooves).compounds.items()
         }
 
     def rubber(self, tire: Tire) -> tuple[float, float, float]:
         """Values of the softest compound, in which the wall bends most."""
-        compounds = built(self.size).compounds.values()
+        compounds = built(self.size, self.grooves).compounds.values()
         soft = min(compounds, key=lambda one: one["youngs_modulus"])
         return soft["dynamic"] * soft["youngs_modulus"], soft["poisson_ratio"], soft["density"]
 
@@ -95,16 +102,19 @@ class RadialSection(SectionKind):
         changed = {line.name: cords_of(line) for line in self._changed(tire)}
         own = (
             Cords(**{key: value for key, value in vars(line).items() if key not in ("under", "to")})
-            for line in built(self.size).cords
+            for line in built(self.size, self.grooves).cords
         )
         return [changed.get(line.name, line) for line in own]
 
     def angles(self, tire: Tire) -> dict[str, float]:
-        own = {line.name: float(np.degrees(line.angle)) for line in built(self.size).cords}
+        own = {
+            line.name: float(np.degrees(line.angle))
+            for line in built(self.size, self.grooves).cords
+        }
         return own | {line.name: line.angle for line in self._changed(tire)}
 
     def _changed(self, tire: Tire) -> list[Line]:
-        return spelt(tire.cords, [line.name for line in built(self.size).cords])
+        return spelt(tire.cords, [line.name for line in built(self.size, self.grooves).cords])
 
     def meshes(self, tire: Tire) -> tuple[tuple[int, int], ...]:
         return FINER
@@ -114,6 +124,15 @@ class RadialSection(SectionKind):
 
     def coarser(self, tire: Tire) -> RadialSection:
         return replace(self, elements_arc=self.elements_arc // 2)
+
+    def described(self, tire: Tire) -> list[str]:
+        from tireroad.fem.sections.radial import RATED_PRESSURE, size
+
+        rated = size(self.size).rated_load()
+        return [
+            f"{self.size}: rated for about {rated:.0f} N at {1e-3 * RATED_PRESSURE:.0f} kPa (by the load indices of such "
+            "sizes, within 4 %)"
+        ]
 
     def has_losses(self, tire: Tire) -> bool:
         """All compounds of the built-in tire have a loss factor."""
@@ -170,11 +189,11 @@ def _compound(regions: Iterable[Region | None], values: dict[str, Any]) -> Mater
 
 
 @lru_cache(maxsize=4)
-def built(size: str) -> Construction:
-    """The construction of a tire of that size."""
+def built(size: str, grooves: int = _GROOVES) -> Construction:
+    """The construction of a tire of that size and number of grooves."""
     from tireroad.fem.sections.radial import radial
 
-    return radial(size)
+    return radial(size, grooves)
 
 
 @lru_cache(maxsize=4)
