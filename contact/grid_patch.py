@@ -39,7 +39,7 @@ LOAD_TOLERANCE = 1e-7
 MOST_DENSE = 1000
 
 
-class Surface(Protocol):
+class DeformedTread(Protocol):
     """The deformed tread (fem.tread_surface.TreadSurface)."""
 
     def weights(self, ring: np.ndarray, arc: np.ndarray) -> sparse.csr_matrix: ...
@@ -50,7 +50,7 @@ class Surface(Protocol):
 
 
 def make_grid_patch(
-    surface: Surface,
+    surface: DeformedTread,
     road_height: float,
     nodes: Patch,
     spacing: tuple[float, float],
@@ -100,7 +100,7 @@ def make_grid_patch(
 
 
 def over_cells(
-    surface: Surface,
+    surface: DeformedTread,
     points: np.ndarray,
     spacing: tuple[float, float],
     ring: np.ndarray,
@@ -196,7 +196,7 @@ def _bracket(excess: Callable[[float], float], step: float) -> tuple[float, floa
     )
 
 
-class OnPoints:
+class PointTire:
     """A tire given at nodes, as seen at the points of a patch: W u from it, W^T f into it.
 
     `components` of the displacements, and of the forces if those are more: 1: vertical only; 3: z,
@@ -245,7 +245,7 @@ def on_points(tire: Any, patch: Patch) -> tuple[Any, RoadNormal | None]:
     components."""
     seen, pushed = (count // len(patch.index) for count in tire.same_step.shape)
     if patch.weights is not None:
-        tire = OnPoints(tire, patch.weights, seen, pushed)
+        tire = PointTire(tire, patch.weights, seen, pushed)
     return tire, RoadNormal(len(patch.points)) if pushed == 3 else None
 
 
@@ -301,7 +301,7 @@ def thinned(patch: Patch) -> Patch:
     )
 
 
-def halved(patch: Patch, surface: Surface, road_height: float, reach: float) -> Patch:
+def halved(patch: Patch, surface: DeformedTread, road_height: float, reach: float) -> Patch:
     """Points at multiples of half the spacing, on the same nodes; not settled.
 
     For a patch on a grid over a plane, as in `thinned`; `surface`, `road_height` and `reach` (m)

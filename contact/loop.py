@@ -17,8 +17,8 @@ from mpi4py import MPI
 
 from tireroad.contact.patch import Patch
 from tireroad.contact.solver.conditions import Array, ContactSolver
-from tireroad.contact.solver.stick_slip import Friction
-from tireroad.contact.tread.creep import TreadMemory
+from tireroad.contact.solver.stick_slip import BrushFriction
+from tireroad.contact.tread.memory import TreadMemory
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.greens.recursion import LoadedColumns, ahead_of_mean
 
@@ -79,7 +79,7 @@ class Ahead(Protocol):
     def exchange(self) -> None: ...
 
 
-class Together:
+class RootSolve:
     """The root process of `comm` solves for `count` points and sends the result to the others.
 
     Meanwhile the others look `ahead` if the tire can. A single process sends nothing and does not
@@ -138,7 +138,7 @@ def _packed(found: Solved) -> Array:
 _POINTS_AHEAD, _STEPS_AHEAD = 200_000, 64
 
 
-class Tire(Protocol):
+class LinearTire(Protocol):
     """A linear tire between the forces and displacements of the patch.
 
     greens.recursion or greens.convolution; the processes of `comm` advance it together.
@@ -161,7 +161,7 @@ class Tire(Protocol):
 
 
 @runtime_checkable
-class NonlinearTire(Tire, Protocol):
+class IteratedTire(LinearTire, Protocol):
     """A tire whose response is known approximately (fem.nonlinear_transient).
 
     `settle` returns None if its motion under a force is in balance, else the free displacement for
@@ -252,9 +252,9 @@ class RoadNormal:
 class Loop:
     """The parts of a time loop that have a history, which a checkpoint must keep."""
 
-    tire: Tire
+    tire: LinearTire
     solver: ContactSolver
-    friction: Friction | None = None
+    friction: BrushFriction | None = None
     memory: TreadMemory | None = None
     normal: RoadNormal | None = None
 
@@ -278,13 +278,13 @@ class Loop:
 
 
 def roll(
-    tire: Tire,
+    tire: LinearTire,
     solver: ContactSolver,
     patch: Patch,
     drive: Drive,
     step: float,
     steps: int,
-    friction: Friction | None = None,
+    friction: BrushFriction | None = None,
     done: int = 0,
     memory: TreadMemory | None = None,
     motion: bool = True,
@@ -307,8 +307,8 @@ def roll(
     # The first step starts from the static contact set, later ones from the solver's last one.
     touching = None if done else patch.force > 0
     answer = LoadedColumns.of(tire.same_step, tire.comm)
-    settle = tire.settle if isinstance(tire, NonlinearTire) else None
-    together = Together(tire.comm, count, looking_ahead(tire))
+    settle = tire.settle if isinstance(tire, IteratedTire) else None
+    together = RootSolve(tire.comm, count, looking_ahead(tire))
     for time, road, slope in _roads(drive, patch, step, steps, done, normal is not None):
         predict = tire.predict
         tread = memory.predict() if memory else np.zeros((1, count))
@@ -361,7 +361,7 @@ def looking_ahead(tire: object) -> Ahead | None:
 
 def _contact(
     solver: ContactSolver,
-    friction: Friction | None,
+    friction: BrushFriction | None,
     patch: Patch,
     tread: np.ndarray,
     road: np.ndarray,
@@ -405,7 +405,7 @@ def _roads(
                 yield time, heights[k - first] + drive.motion(time), slope
 
 
-class Driven:
+class DrivenTire:
     """The tire as the contact sees it, including its motion under prescribed forces.
 
     `seen`: displacements that the contact follows, by default as many as its forces.
@@ -417,7 +417,7 @@ class Driven:
 
     def __init__(
         self,
-        tire: Tire,
+        tire: LinearTire,
         history: np.ndarray,
         directions: np.ndarray,
         scheme: str = "linear",

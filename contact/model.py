@@ -9,9 +9,9 @@ from tireroad.contact.patch import Patch
 from tireroad.contact.solver.active_set import make_solver
 from tireroad.contact.solver.conditions import ContactSolver
 from tireroad.contact.solver.projected_cg import Compliance, SpreadCompliance
-from tireroad.contact.tread.creep import TreadMemory, steady
 from tireroad.contact.tread.kernel import KernelTread
 from tireroad.contact.tread.law import TreadLaw
+from tireroad.contact.tread.memory import TreadMemory, steady
 from tireroad.contact.tread.shear import KernelShear, MatrixShear, Shear
 from tireroad.fem.errors import InputError, UnsuitedSettings
 
@@ -41,7 +41,7 @@ class Spec(Protocol):
         """Its name, or "auto"."""
 
     @property
-    def sheared(self) -> bool:
+    def has_shear(self) -> bool:
         """Whether the tread deforms under horizontal forces."""
 
 
@@ -57,7 +57,7 @@ def static_solver(spec: Spec, patch: Patch, tire: Array, speed: float) -> Contac
     """The solver for the static state of a patch that rolls at `speed` m/s.
 
     As `step_solver`; a viscoelastic tread has all of its past, C~ (1 + sum c_k F_k)
-    (contact.tread.creep).
+    (contact.tread.memory).
     """
     if spec.law.creep is None:
         return step_solver(spec, patch, tire)
@@ -85,7 +85,7 @@ def tread_memory(spec: Spec, patch: Patch, speed: float, step: float) -> TreadMe
         return None
     check_creeps(patch)
     farthest = _farthest(patch)
-    shear = spec.law.shear(farthest) if spec.sheared else None
+    shear = spec.law.shear(farthest) if spec.has_shear else None
     return TreadMemory(
         spec.law.creep, spec.law.influence(farthest), patch, speed, step, shear=shear
     )
@@ -93,7 +93,7 @@ def tread_memory(spec: Spec, patch: Patch, speed: float, step: float) -> TreadMe
 
 def tread_shear(spec: Spec, patch: Patch, at_once: float = 1.0) -> Shear | None:
     """The tread's shear compliance between the points, times `at_once`; None if it is rigid."""
-    if not spec.sheared:
+    if not spec.has_shear:
         return None
     plain = spec.law.shear(_farthest(patch))
 

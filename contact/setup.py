@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from tireroad.contact.grid_patch import Surface, make_grid_patch, settle, spread_pull
+from tireroad.contact.grid_patch import DeformedTread, make_grid_patch, settle, spread_pull
 from tireroad.contact.loop import Drive
 from tireroad.contact.model import Spec, static_solver
 from tireroad.contact.patch import LEAST_REACH, Patch, make_patch
@@ -193,7 +193,7 @@ def contact_setup(
     spacing: tuple[float, float] | None = None,
     reach: float | None = None,
     pattern: Pattern | None = None,
-    surface: Surface | None = None,
+    surface: DeformedTread | None = None,
 ) -> ContactSetup:
     """Patch and road of a run: points at the nodes, or on a grid of the `spacing` (m).
 

@@ -11,7 +11,7 @@ _HOMES = {
     "Equilibrium": "static.equilibrium",
     "FullTire": "transient.linear",
     "InputError": "errors",
-    "Loader": "static.load_steps",
+    "LoadStepper": "static.load_steps",
     "Material": "tire.material",
     "MaterialLaw": "tire.material",
     "NonlinearTire": "transient.nonlinear",

@@ -100,7 +100,7 @@ class Axle:
         return out
 
     @property
-    def adrift(self) -> np.ndarray:
+    def free_motions(self) -> np.ndarray:
         """Motions (7, r) of wheel and body, one per column, that neither spring nor damper resists.
 
         Translations without spring and damper; with a body, wheel and body together in height.
@@ -116,7 +116,7 @@ class Axle:
                 columns.append(column)
         return np.array(columns).reshape(-1, 7).T
 
-    def joined(self, matrix: np.ndarray) -> np.ndarray:
+    def between_wheel_and_body(self, matrix: np.ndarray) -> np.ndarray:
         """The matrix (6, 6) of springs or dampers in terms of wheel and body (7, 7): their
         elongation is wheel minus body in height."""
         apart = np.hstack([np.eye(6), -np.eye(6)[:, [_VERTICAL]]])

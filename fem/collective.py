@@ -40,7 +40,7 @@ def summed(comm: MPI.Comm, values: np.ndarray) -> np.ndarray:
     return total
 
 
-def joined(comm: MPI.Comm, values: np.ndarray) -> np.ndarray:
+def allgather_rows(comm: MPI.Comm, values: np.ndarray) -> np.ndarray:
     """The arrays (n, ...) of all processes concatenated, on every process. Collective."""
     if comm.size == 1:
         return values
@@ -57,7 +57,7 @@ def joined(comm: MPI.Comm, values: np.ndarray) -> np.ndarray:
     return every
 
 
-def alike(comm: MPI.Comm, value: object) -> bool:
+def same_on_all(comm: MPI.Comm, value: object) -> bool:
     """Whether a small object is equal on all processes. Collective."""
     return comm.size == 1 or len(set(comm.allgather(value))) == 1
 

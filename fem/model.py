@@ -17,7 +17,7 @@ from tireroad.fem.matrices.rim_motion import RimMotion, rim_motion
 from tireroad.fem.sections.ring import Ring
 from tireroad.fem.static.state import StaticState
 from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.mesh import Lattice, field_lattice
+from tireroad.fem.tire.mesh import NodeGrid, field_lattice
 
 RIMS, ROADS = ("fixed", "free"), ("forces", "held")
 
@@ -29,7 +29,7 @@ class TireModel:
         self.section, self._make_body = section, make_body
 
     @cached_property
-    def lattice(self) -> Lattice:
+    def lattice(self) -> NodeGrid:
         """The nodes of the displacement field; needs no mesh."""
         return field_lattice(self.section)
 
@@ -56,7 +56,7 @@ class SmallMotions:
         self._rim_motions: dict[bool, RimMotion] = {}
 
     @property
-    def lattice(self) -> Lattice:
+    def lattice(self) -> NodeGrid:
         """The nodes of the displacement field."""
         return self.tire.lattice
 

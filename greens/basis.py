@@ -123,7 +123,7 @@ def second_order(
     beside = missing.momentum @ basis
     extra = couple(states, output, forces.T, felt(beside[:3]))
     extra = reading(extra, states, hub, beside[3:])
-    whole = whole.joined(extra.keeping_where(lambda s: ~growing(s)))
+    whole = whole.and_states_of(extra.keeping_where(lambda s: ~growing(s)))
     return replace(whole, residual=answers - whole.static())
 
 

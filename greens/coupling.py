@@ -59,7 +59,7 @@ from tireroad.greens.basis import (
     second_order,
 )
 from tireroad.greens.response import Response
-from tireroad.modal.basis import Projection, joined, project, same_fields, with_air, with_corner
+from tireroad.modal.basis import Projection, extended, project, same_fields, with_air, with_corner
 from tireroad.modal.damping import Damping, StrainEnergy, beyond, tail_growth, tail_loss
 from tireroad.modal.rolling import decouple
 from tireroad.modal.rotating import held_matrices
@@ -130,7 +130,7 @@ def with_left_out(response: Response, whole: Array) -> Response:
     return replace(response, left_out=whole - response.static_moment())
 
 
-def completed(
+def with_static_correction(
     basis: Basis,
     turning: Turning,
     outputs: Probes,
@@ -322,7 +322,7 @@ class Wheel:
         self, basis: Basis, outputs: Probes, loads: Probes, flexibility: Array, beside: Array
     ) -> Response:
         """The states completed by what they lack."""
-        made = completed(basis, self.turning, outputs, loads, flexibility, beside)
+        made = with_static_correction(basis, self.turning, outputs, loads, flexibility, beside)
         return made if self.air is None else replace(made, left_out=None)
 
     def _attached(
@@ -347,7 +347,7 @@ class Wheel:
         # Few shapes join the basis: solving for them again is cheaper than storing all.
         columns = shapes.whole(loads @ (weights.T @ self._foremost(basis, probes, flexibility)))
         shapes.destroy()
-        grown_modes = joined(modes, columns, self.operators)
+        grown_modes = extended(modes, columns, self.operators)
         del columns  # used up: what follows needs the memory
         grown, _ = self._grown(grown_modes, basis.projection)
         if self._apart:
@@ -385,7 +385,7 @@ class Wheel:
         """Modes with static shapes of K (inertia relief if free), and own fields. Collective."""
         operators = self.operators
         columns = statics(operators, operators.stiffness, on_own_rows(operators, probes))
-        return self._grown(joined(modes, columns, operators))
+        return self._grown(extended(modes, columns, operators))
 
     def _grown(self, grown: Modes, known: Projection | None = None) -> tuple[Basis, Array]:
         """The basis of modes with attachment modes, and its fields; `known`: on the first of them,

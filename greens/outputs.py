@@ -176,7 +176,7 @@ def substituted(
             _of_rim(corner, basis.projection.air_mass, s, turning.speed)
             - back @ moved[:, push.shape[1] :]
         )
-        springs = axle.joined(axle.stiffness + s * axle.damping)
+        springs = axle.between_wheel_and_body(axle.stiffness + s * axle.damping)
         z_hub = springs + s**2 * _wheel(axle)
         z_hub[:BODY, :BODY] += s * turning.speed * axle.gyroscopic
         xi = np.zeros((SEEN, loads.shape[0]), complex)

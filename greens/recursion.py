@@ -54,7 +54,7 @@ from scipy import linalg, sparse
 from scipy.sparse.linalg import LinearOperator
 from threadpoolctl import threadpool_info
 
-from tireroad.fem.collective import alike, joined
+from tireroad.fem.collective import allgather_rows, same_on_all
 from tireroad.greens.response import Response
 
 DAMPED = 1 / 16
@@ -214,7 +214,7 @@ class Spread:
         """All states (q, ...) from those of each process. Collective."""
         if self.comm.size == 1:
             return own
-        every = joined(self.comm, np.ascontiguousarray(own))
+        every = allgather_rows(self.comm, np.ascontiguousarray(own))
         out, first = np.empty_like(every), 0
         for rank in range(self.comm.size):
             share = self._of(rank, out)
@@ -242,7 +242,7 @@ def sharers(response: Response, comm: MPI.Comm) -> MPI.Comm:
     could decide differently and wait for ever, so they do not share.
     """
     size = response.output.nbytes + response.input.nbytes
-    return comm if size >= SHARED_FROM and alike(comm, _kernels()) else MPI.COMM_SELF
+    return comm if size >= SHARED_FROM and same_on_all(comm, _kernels()) else MPI.COMM_SELF
 
 
 def _kernels() -> str:

@@ -51,7 +51,7 @@ from tireroad.modal.states import StateModes, growing
 
 
 @dataclass(frozen=True)
-class Parted:
+class SplitStates:
     """y' = A y + b f as two decoupled blocks: y = right z + lagging r.
 
     z' = block z + left b f and r' = faster r + lagging_left b f. Shapes: `block` (p, p), `right`
@@ -73,7 +73,7 @@ class Parted:
         return self.lagging @ np.linalg.solve(self.faster, self.lagging_left @ push)
 
 
-def parted(block: np.ndarray, values: np.ndarray, stays: np.ndarray) -> Parted:
+def split_states(block: np.ndarray, values: np.ndarray, stays: np.ndarray) -> SplitStates:
     """Split the block (n, n) by its eigenvalues (n,), those that stay first; pairs together.
 
     Its real Schur form is divided between the two, and the coupling C removed by the solution of
@@ -88,7 +88,7 @@ def parted(block: np.ndarray, values: np.ndarray, stays: np.ndarray) -> Parted:
     right, left = turn.copy(), turn.T.copy()
     right[:, p:] += turn[:, :p] @ X
     left[:p] -= X @ turn.T[p:]
-    return Parted(schur[:p, :p], right[:, :p], left[:p], schur[p:, p:], right[:, p:], left[p:])
+    return SplitStates(schur[:p, :p], right[:, :p], left[:p], schur[p:, p:], right[:, p:], left[p:])
 
 
 # Radians a state may rotate in a step and stay dynamic. Undamped, bouncing on a stiff tread, up to
@@ -276,7 +276,7 @@ class Response:
         r = len(self.residual)
         return np.append(np.arange(r)[outputs], [r, r + 1, r + 2])
 
-    def joined(self, other: Response) -> Response:
+    def and_states_of(self, other: Response) -> Response:
         """Both sets of states between the same outputs and forces; no rigid `other`."""
         return Response(
             eigenvalue=np.concatenate([self.eigenvalue, other.eigenvalue]),
@@ -403,7 +403,7 @@ def block_made_static(response: Response, values: np.ndarray, stays: np.ndarray)
     held, output, push = response.held_block()
     k = len(held)
     momentum, rates = response.block_momentum[:, :k], response.inertia[1][:, :k]
-    kept = parted(held, values, stays)
+    kept = split_states(held, values, stays)
     following = kept.following(push)
     left_out = response.left_out
     if left_out is not None:

@@ -73,7 +73,7 @@ def radiate(
     inside it, under the road or nearer to an element than its size, and for frequencies that are
     not positive or whose waves are shorter than three edges.
     """
-    body = Body.of(points, quads, road)
+    body = SoundBody.of(points, quads, road)
     velocity = np.atleast_2d(np.asarray(normal_velocity, complex))
     hertz = np.atleast_1d(np.asarray(frequency, float))
     listeners = np.atleast_2d(np.asarray(microphones, float))
@@ -91,7 +91,9 @@ def radiate(
     return 2j * np.pi * hertz * density * np.einsum("fjk,jf->kf", g, moved)
 
 
-def transfer(body: Body, frequency: Array, microphones: Array, speed_of_sound: float) -> Complex:
+def transfer(
+    body: SoundBody, frequency: Array, microphones: Array, speed_of_sound: float
+) -> Complex:
     """g (f, e, k) 1/m of the e elements for the microphones (k, 3), at frequencies (f,) Hz.
 
     Where more are asked for than one in `APART` Hz, g is solved that far apart and interpolated by
@@ -110,7 +112,7 @@ def transfer(body: Body, frequency: Array, microphones: Array, speed_of_sound: f
 
 
 @dataclass(frozen=True)
-class Body:
+class SoundBody:
     """A closed surface of e quadrilaterals with `corners` (e, 4, 3) m, over a `road` or in free air.
 
     `kept` (e,): their numbers among the elements given, of which those on the road are left out.
@@ -121,7 +123,7 @@ class Body:
     road: bool
 
     @staticmethod
-    def of(points: Array, quads: NDArray[np.intp], road: bool) -> Body:
+    def of(points: Array, quads: NDArray[np.intp], road: bool) -> SoundBody:
         """The body of `radiate`; InputError where it is not closed or faces inwards."""
         points, quads = np.asarray(points, float), np.asarray(quads)
         if points.ndim != 2 or points.shape[1] != 3 or quads.ndim != 2 or quads.shape[1] != 4:
@@ -131,7 +133,7 @@ class Body:
         corners = points[quads]
         size = float(np.ptp(points[np.unique(quads)], axis=0).max())
         if not road:
-            body = Body(corners, np.arange(len(quads)), False)
+            body = SoundBody(corners, np.arange(len(quads)), False)
         else:
             if corners[..., 2].min() < -ON_ROAD * size:
                 raise InputError(
@@ -139,10 +141,10 @@ class Body:
                     "road at z = 0: move it up, or take road = False"
                 )
             lies = (corners[..., 2] <= ON_ROAD * size).all(axis=1)
-            body = Body(corners[~lies], np.flatnonzero(~lies), True)
+            body = SoundBody(corners[~lies], np.flatnonzero(~lies), True)
         return body.checked("radiate")
 
-    def checked(self, owner: str) -> Body:
+    def checked(self, owner: str) -> SoundBody:
         """The body itself; InputError, which names the `owner`, where it is not closed or faces inwards."""
         size = float(np.ptp(self.corners, axis=(0, 1)).max())
         if not (self.area > 1e-12 * size**2).all():

@@ -25,7 +25,7 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.static.state import StaticState
 from tireroad.fem.tire.mesh import ring_quads
 from tireroad.greens.outputs import Surface
-from tireroad.greens.sound import APART, MIRROR, ON_ROAD, Body
+from tireroad.greens.sound import APART, MIRROR, ON_ROAD, SoundBody
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -42,16 +42,16 @@ ELEVATIONS, AZIMUTHS = 9, 24  # directions of a hemisphere: waves of up to 12 ar
 
 
 @dataclass(frozen=True, kw_only=True)
-class Air:
+class SoundAir:
     """Speed of sound, m/s, and density, kg/m3."""
 
     speed: float
     density: float
 
     @staticmethod
-    def at(temperature: float) -> Air:
+    def at(temperature: float) -> SoundAir:
         """Dry air at 1013.25 hPa and a `temperature` in K: 343.2 m/s and 1.204 kg/m3 at 293.15 K."""
-        return Air(
+        return SoundAir(
             speed=float(np.sqrt(1.4 * 287.05 * temperature)),
             density=101325 / (287.05 * temperature),
         )
@@ -62,7 +62,7 @@ class Air:
         return self.speed * self.density
 
 
-def elements_for(frequency: float, air: Air) -> float:
+def elements_for(frequency: float, air: SoundAir) -> float:
     """Largest size (m) of the elements for sound up to a frequency (Hz)."""
     return float(np.clip(air.speed / (WAVES * frequency), LEAST, MOST))
 
@@ -79,7 +79,7 @@ class SoundingTire:
     against the order of the grid; `slopes`: of g on the elements of the face (`_slopes`).
     """
 
-    body: Body
+    body: SoundBody
     face: NDArray[np.bool_]
     nodes: sparse.csr_matrix
     area: Array
@@ -133,7 +133,7 @@ class SoundingTire:
             closing = np.concatenate(
                 [_disc(left, disc, -wheel_depth), _disc(right, disc, wheel_depth)[:, ::-1]]
             )
-        body = Body(
+        body = SoundBody(
             np.concatenate([corners[open_to], closing]),
             np.arange(open_to.sum() + len(closing)),
             True,
@@ -351,7 +351,9 @@ def _between(outer: list[Array], inner: list[Array], kept: range | list[int]) ->
     return found
 
 
-def _slopes(body: Body, grid: NDArray[np.intp], rows: int) -> tuple[Array, list[sparse.csr_matrix]]:
+def _slopes(
+    body: SoundBody, grid: NDArray[np.intp], rows: int
+) -> tuple[Array, list[sparse.csr_matrix]]:
     """Tangents (e, 2, 3), and (e, e) twice: the slope of g along each, by least squares over neighbours.
 
     Neighbours are the elements beside and diagonal on the face, across no edge and not across the
@@ -388,7 +390,7 @@ def _slopes(body: Body, grid: NDArray[np.intp], rows: int) -> tuple[Array, list[
 
 
 def _to_nodes(
-    body: Body,
+    body: SoundBody,
     grid: NDArray[np.intp],
     lines: tuple[Array, Array],
     place: Array,
@@ -442,7 +444,7 @@ def solved_frequencies(up_to: float) -> Array:
 
 
 def transfer(
-    tire: SoundingTire, microphones: Array, frequency: Array, air: Air, comm: MPI.Comm
+    tire: SoundingTire, microphones: Array, frequency: Array, air: SoundAir, comm: MPI.Comm
 ) -> NDArray[np.complex64]:
     """g e^{ikR} (f, k, e) 1/m, single precision, at the solved frequencies, on every process. Collective.
 
@@ -464,7 +466,7 @@ class Transfer:
     frequency: Array
     ahead: NDArray[np.complex64]
     distance: Array
-    air: Air
+    air: SoundAir
 
     def pressure(self, volume: Complex, lines: Array) -> Complex:
         """Pressure (k, l) Pa, e^{+iwt}, of the displaced volumes U (e, l) m3 at lines (l,) Hz.

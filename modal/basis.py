@@ -53,11 +53,11 @@ class Air:
         """Number of coordinates of the air, a."""
         return len(self.duct.circular)
 
-    def joined(
+    def with_tire(
         self, drag: np.ndarray, stiffness: np.ndarray, speed: float
     ) -> tuple[np.ndarray, np.ndarray]:
         """D~ (1/s) and K~ (1/s2) of tire and air, (m + a, m + a), from those of the tire (m, m)."""
-        return self.duct.joined(drag, stiffness, speed, self.coupling)
+        return self.duct.with_tire(drag, stiffness, speed, self.coupling)
 
     def share(self, right: np.ndarray) -> np.ndarray:
         """The air's share (q,) of the states' kinetic energy, from their vectors (m + a ..., q)."""
@@ -75,7 +75,7 @@ _CLEAN = 1e-4
 _ROWS = 4096  # of all fields at a time, when they are changed in place
 
 
-def joined(modes: Modes, columns: Array, operators: Operators) -> Modes:
+def extended(modes: Modes, columns: Array, operators: Operators) -> Modes:
     """Modes of K and M (not K_Omega) followed by pseudo-modes, earlier ones among them, ascending.
     Collective.
 
@@ -217,8 +217,8 @@ class Projection:
         """D~ (1/s), K~ (1/s2) of all coordinates, unit mass, from tire and air (m + a, m + a)."""
         if not self.moves:
             return drag, stiffness
-        turn, joined = self._change, self.wheel.joined(drag, stiffness, speed)
-        return turn.T @ joined[0] @ turn, turn.T @ joined[1] @ turn
+        turn, whole = self._change, self.wheel.with_tire(drag, stiffness, speed)
+        return turn.T @ whole[0] @ turn, turn.T @ whole[1] @ turn
 
     def hub_damping(self) -> tuple[np.ndarray, np.ndarray]:
         """Of a wheel that moves: tire and air relative to it (m + a, all), and its dampers (all, all) 1/s.
@@ -227,7 +227,9 @@ class Projection:
         """
         turn, n = self._change, self.inside.shape[1]
         part = self.wheel.taking_part
-        dampers = self.wheel.axle.joined(self.wheel.axle.damping)[np.ix_(part, part)]
+        dampers = self.wheel.axle.between_wheel_and_body(self.wheel.axle.damping)[
+            np.ix_(part, part)
+        ]
         return turn[:n], turn[n:].T @ dampers @ turn[n:]
 
     def seen(self, shapes: np.ndarray, probes: sparse.csr_matrix) -> np.ndarray:
@@ -255,11 +257,11 @@ class Projection:
         return self.corner
 
     @property
-    def adrift(self) -> np.ndarray:
+    def free_motions(self) -> np.ndarray:
         """Orthonormal motions (m + a + c, r) of a corner without stiffness and damping."""
         if not self.moves:
             return np.zeros((self.inside.shape[1], 0))
-        return self.wheel.adrift(*self._moved)
+        return self.wheel.free_motions(*self._moved)
 
     @property
     def air_mass(self) -> float:

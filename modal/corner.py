@@ -100,7 +100,7 @@ class Corner:
         out[:n, n:], out[n:, n:] = -p.T @ upper, upper
         return out
 
-    def joined(
+    def with_tire(
         self, drag: np.ndarray, stiffness: np.ndarray, speed: float
     ) -> tuple[np.ndarray, np.ndarray]:
         """Damping and stiffness (n + c, n + c) in (eta, xi), from those of tire and air (n, n)."""
@@ -128,10 +128,10 @@ class Corner:
                 f"springs must be stiffer than (N m/rad): {worst}; or lock these directions"
             )
 
-    def adrift(self, momentum: np.ndarray, air_mass: float = 0.0) -> np.ndarray:
+    def free_motions(self, momentum: np.ndarray, air_mass: float = 0.0) -> np.ndarray:
         """Orthonormal motions (n + c, r), in (q, x), that no spring or damper acts on."""
         part = self.taking_part
-        drifts = self.axle.adrift[part]
+        drifts = self.axle.free_motions[part]
         p = momentum[part]
         lower = np.linalg.cholesky(self.inertia(air_mass)[np.ix_(part, part)] - p @ p.T)
         return linalg.qr(np.vstack([p.T @ drifts, lower.T @ drifts]), mode="economic")[0]
@@ -173,7 +173,7 @@ class Corner:
             gyroscopic=gyroscopic,
             convective=convective,
         )
-        drag, stiffness = held.joined(zero, zero, speed)
+        drag, stiffness = held.with_tire(zero, zero, speed)
         mass = np.zeros((3, n + SEEN))
         mass[:, :m] = self.mass.T[MOMENTS]
         mass[:, n:] = self.inertia()[MOMENTS]

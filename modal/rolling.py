@@ -25,7 +25,14 @@ from tireroad.modal.basis import ModalBasis, Projection
 from tireroad.modal.campbell import Campbell
 from tireroad.modal.corner import meeting
 from tireroad.modal.damping import beyond
-from tireroad.modal.rotating import DEFECTIVE, beside, checks, matrices, rotating, standing
+from tireroad.modal.rotating import (
+    DEFECTIVE,
+    checks,
+    matrices,
+    rotating,
+    standing,
+    with_free_motions,
+)
 from tireroad.modal.solver import quadratic
 from tireroad.modal.solver.fields import gram
 from tireroad.modal.solver.quadratic import FullModes
@@ -230,11 +237,11 @@ def _decoupled(projection: Projection, turning: Turning, comm: MPI.Comm) -> tupl
         )
     if projection.moves:
         projection.wheel.check(turning.speed)
-    given, adrift = pencil(projection, turning), projection.adrift
+    given, free_motions = pencil(projection, turning), projection.free_motions
 
     def solve() -> tuple[StateModes, dict]:
-        if adrift.shape[1]:
-            states = beside(*given, adrift)
+        if free_motions.shape[1]:
+            states = with_free_motions(*given, free_motions)
             return states, checks(states, *given)
         for condition in _CONDITIONS:
             states = rotating(*given, condition)

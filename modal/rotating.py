@@ -162,7 +162,7 @@ def matrices(projection: Projection, speed: float, damping: Damping, inertia: st
 def held_matrices(projection: Projection, speed: float, damping: Damping, inertia: str) -> Pencil:
     """The same for tire and air with the rim held, without a corner."""
     pencil = _tire_matrices(projection, speed, damping, inertia)
-    return pencil if projection.air is None else projection.air.joined(*pencil, speed)
+    return pencil if projection.air is None else projection.air.with_tire(*pencil, speed)
 
 
 def _tire_matrices(projection: Projection, speed: float, damping: Damping, inertia: str) -> Pencil:
@@ -378,13 +378,15 @@ def _invariant(companion: Array, values: Array, good: Array) -> tuple[Array, Arr
 # of three).
 
 
-def beside(drag: np.ndarray, stiffness: np.ndarray, adrift: np.ndarray) -> StateModes:
+def with_free_motions(
+    drag: np.ndarray, stiffness: np.ndarray, free_motions: np.ndarray
+) -> StateModes:
     """`rotating` where the orthonormal motions `adrift` (m, r) meet no stiffness or damping.
 
     They are split off exactly and drift in a block of their own.
     """
-    m, r = adrift.shape
-    others = linalg.qr(adrift)[0][:, r:]
+    m, r = free_motions.shape
+    others = linalg.qr(free_motions)[0][:, r:]
     found = rotating(others.T @ drag @ others, others.T @ stiffness @ others)
     block, right, left = companion_blocks(np.arange(r), np.zeros(r), np.zeros(r), r)
     return replace(
@@ -392,7 +394,7 @@ def beside(drag: np.ndarray, stiffness: np.ndarray, adrift: np.ndarray) -> State
         right=others @ found.right,
         left=found.left @ others.T,
         block=linalg.block_diag(found.block, block),
-        block_right=np.hstack([others @ found.block_right, adrift @ right]),
-        block_left=np.vstack([found.block_left @ others.T, left @ adrift.T]),
+        block_right=np.hstack([others @ found.block_right, free_motions @ right]),
+        block_left=np.vstack([found.block_left @ others.T, left @ free_motions.T]),
         rigid=2 * r,
     )

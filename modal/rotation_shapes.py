@@ -32,7 +32,7 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.compliance import LoadedShapes
 from tireroad.fem.matrices.operators import Operators, Rotation
 from tireroad.fem.turning import Turning
-from tireroad.modal.basis import Projection, combined, joined, take_off
+from tireroad.modal.basis import Projection, combined, extended, take_off
 from tireroad.modal.solver.fields import gram, multiply
 from tireroad.modal.solver.slicing import Modes
 
@@ -69,7 +69,7 @@ def with_rotation_shapes(
         raise InputError("rotation shapes: the matrices of the rotating frame are needed")
     found = _Found(modes, projection, operators, rotation, turning)
     columns = found.foremost(_uncoupled(projection, turning.inertia))
-    return joined(modes, columns, operators) if columns.shape[1] else modes
+    return extended(modes, columns, operators) if columns.shape[1] else modes
 
 
 class _Found:

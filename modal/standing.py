@@ -20,7 +20,7 @@ from tireroad.modal.rotation_shapes import with_rotation_shapes
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.fields import strain_energies
 from tireroad.modal.solver.slicing import Modes
-from tireroad.modal.solver.symmetry import Sites
+from tireroad.modal.solver.symmetry import DofPositions
 
 _COUNT, _UP_TO = Limits(least=1), Limits(least=1e-3)  # -, Hz
 _SAME = 1e-6  # relative difference of the frequencies of one mode in two solutions
@@ -205,6 +205,6 @@ def with_fields(
     return again
 
 
-def sites(operators: Operators) -> Sites:
+def sites(operators: Operators) -> DofPositions:
     """The sites of this process's unknowns, where symmetries are sought."""
-    return Sites(operators.unknowns.place, operators.unknowns.component)
+    return DofPositions(operators.unknowns.place, operators.unknowns.component)

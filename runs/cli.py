@@ -17,7 +17,7 @@ from typing import Any
 
 from tireroad.fem import form_cache
 from tireroad.fem.errors import ConvergenceError, InputError
-from tireroad.runs.process import mpi, observe, signals
+from tireroad.runs.process import console, mpi, signals
 from tireroad.runs.process.signals import DONE, INPUT, handed_over, processes_here, rank_before_mpi
 from tireroad.runs.process.surroundings import check_surroundings, crowded
 from tireroad.runs.scene.plan import STAGES
@@ -338,7 +338,7 @@ def _together(function: Callable[[Any], None]) -> int:
     from mpi4py import MPI
 
     comm = MPI.COMM_WORLD
-    observe.set_root(comm.rank == 0)
+    console.set_root(comm.rank == 0)
     _only_warnings()
     signals.stop_on_signals()
     return mpi.guarded(comm, partial(function, comm))
@@ -369,16 +369,16 @@ def _run_inside(args: argparse.Namespace, petsc_options: list[str], comm) -> Non
     scene = load(args.scene, args.set, remarks.append, args.until)
     directory = args.out if args.out is not None else Path("results") / scene.name
     mpi.start_petsc(petsc_options)
-    form_cache.announce = observe.say
+    form_cache.announce = console.say
     with ExitStack() as stack:
 
         def claim() -> None:
             stack.enter_context(claimed(directory, scene.name))
 
         mpi.on_root(comm, claim)
-        stack.enter_context(observe.log_to(directory / "log.txt"))
+        stack.enter_context(console.log_to(directory / "log.txt"))
         for remark in remarks:
-            observe.say(f"note: {remark}")
+            console.say(f"note: {remark}")
         from tireroad.runs.search.search import run
 
         try:
@@ -392,7 +392,7 @@ def _run_inside(args: argparse.Namespace, petsc_options: list[str], comm) -> Non
                 cache=Cache.of_user(),
             )
         except (InputError, ConvergenceError) as error:
-            observe.log(f"error: {error}")
+            console.log(f"error: {error}")
             raise
 
 

@@ -58,7 +58,7 @@ from tireroad.modal.standing import standing_modes
 from tireroad.runs.scene.rules import barred_from_contact
 from tireroad.runs.scene.sections.kinds.radial import RadialSection, built
 from tireroad.runs.scene.sections.kinds.torus import TorusSection
-from tireroad.runs.scene.tables.tire import NEAR_ROAD, Tire
+from tireroad.runs.scene.tables.tire import NEAR_ROAD, TireTable
 from tireroad.runs.stages.rolling import grown, make_loop
 from tireroad.runs.stages.stage import make_tire, rolling_shape
 
@@ -174,7 +174,7 @@ def radial(
     none, or a value out of the range that it has in a scene.
     """
     shape = RadialSection(size=size, grooves=grooves, elements_arc=elements_arc)
-    tire = Tire(
+    tire = TireTable(
         section="radial", shape=shape, segments=segments, order=2, footprint_size=footprint_size
     )
     try:
@@ -190,7 +190,7 @@ def _check_ranges(torus: Torus) -> None:
     shape = TorusSection(
         half_angle=math.degrees(torus.half_angle), **{name: getattr(torus, name) for name in same}
     )
-    Tire(
+    TireTable(
         shape=shape,
         segments=torus.segments,
         order=torus.order,
@@ -399,8 +399,8 @@ class History:
 class _Spec:
     law: TreadLaw
     solver: str = "auto"
-    rubs: bool = False
-    sheared: bool = False
+    has_friction: bool = False
+    has_shear: bool = False
 
 
 @typed

@@ -205,7 +205,7 @@ def springs(response: Response, force: np.ndarray, own: np.ndarray | None = None
     return float(0.5 * force[own] @ response.residual[: len(own), own] @ force[own])
 
 
-class Motion:
+class StateMotion:
     """Coordinates and rates from the states of a time loop, and their dissipation.
 
     For a tire that rolls on its own states only. Its air loses energy as it does, at the rate relative to
@@ -272,7 +272,7 @@ RUNAWAY = 100.0
 
 
 @dataclass
-class Figures:
+class StepScalars:
     """The scalars that a checkpoint keeps: N, the complementarity residual, m.
 
     `excursion`: the largest displacement of a contact point from the static state relative to the
@@ -300,7 +300,7 @@ class Totals:
     patch: Patch
     reach: float
     limit: float = np.inf
-    figures: Figures = field(default_factory=Figures)
+    figures: StepScalars = field(default_factory=StepScalars)
     work: Work = field(default_factory=Work)
     alternation: Alternation = field(default_factory=Alternation)
 
@@ -316,7 +316,7 @@ class Totals:
         self.patch.check_edge(steps["normal_force"], steps["time"], self.reach)
         self.work.add(steps["change"], steps["moved"])
         old, load = self.figures, steps["total_force"][:, 2]
-        self.figures = Figures(
+        self.figures = StepScalars(
             steps=old.steps + len(load),
             # Step by step: the same bits however steps are blocked.
             sum=float(np.cumsum([old.sum, *load])[-1]),
@@ -358,6 +358,6 @@ class Totals:
 
     def set_state(self, kept: dict[str, np.ndarray]) -> None:
         """Continue from `state`."""
-        self.figures = Figures(**{name: kept[name].item() for name in vars(self.figures)})
+        self.figures = StepScalars(**{name: kept[name].item() for name in vars(self.figures)})
         self.work.set_state(kept)
         self.alternation.set_state(kept)

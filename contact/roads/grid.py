@@ -65,7 +65,7 @@ class ArrayRows:
         return self._values[i0:i1]
 
 
-class Columns:
+class GridColumns:
     """Selected columns of rows, reordered."""
 
     def __init__(self, rows: Rows, columns: list[int]) -> None:

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.contact.roads.grid import Columns, FileRows, Grid, Packed, Rows, Spool, pieces
+from tireroad.contact.roads.grid import FileRows, Grid, GridColumns, Packed, Rows, Spool, pieces
 from tireroad.fem.errors import InputError
 
 # Line number and text, by the block's name in capitals.
@@ -282,7 +282,7 @@ def read_opencrg(file: Path | str, holes: str = "refuse", end: str = "refuse") -
     _check_line(file, channels, parameters, table, step)
     v, columns = _sections(file, channels, parameters)
     u = step * np.arange(count, dtype=float)
-    road = Grid(u, v, Columns(table, columns), holes=holes, end=end, source=f"road.file {file}")
+    road = Grid(u, v, GridColumns(table, columns), holes=holes, end=end, source=f"road.file {file}")
     if unused:
         road.notes = (
             f"not used, as they act beyond the road or where it has holes: {', '.join(unused)}",

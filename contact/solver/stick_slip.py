@@ -138,7 +138,7 @@ class Carcass:
         return float(np.linalg.norm(self._matrix, 2)) * weights**2
 
 
-class Stiffness:
+class SlidingStiffness:
     """B = W A W^T + diag(spring), plus S of the `tread`, between the points.
 
     `spring` (a,) m/N. Forces and displacements in the plane are complex, x + iy.
@@ -176,7 +176,7 @@ class StickSlip:
     solved by GMRES, preconditioned where the tread knows its inverse.
     """
 
-    def __init__(self, stiffness: Stiffness, constant: Array, bound: Array) -> None:
+    def __init__(self, stiffness: SlidingStiffness, constant: Array, bound: Array) -> None:
         self._stiffness, self._bound = stiffness, bound
         self._constant = _complex(constant)
 
@@ -282,7 +282,7 @@ def _onto_discs(force: Plane, bound: Array) -> Plane:
     return np.where(outside, bound / np.where(outside, length, 1.0), 1.0) * force
 
 
-def stick_slip(stiffness: Stiffness, constant: Array, bound: Array, guess: Array) -> Array:
+def stick_slip(stiffness: SlidingStiffness, constant: Array, bound: Array, guess: Array) -> Array:
     """Tangential forces t (a, 2) N of the problem StickSlip from a `guess` (a, 2), to rounding."""
     problem = StickSlip(stiffness, constant, bound)
     problem.begin(guess)
@@ -298,7 +298,7 @@ PATIENCE = 10  # turns after which a point that still comes and goes is lifted o
 TOLERANCE = 1e-4
 
 
-class Friction:
+class BrushFriction:
     """The brush on a tire with same-step response `tire` (3p, 3p) m/N in z, x, y of the nodes.
 
     `weights` W (c, p) interpolates from nodes to points (None: they are the same). `shear` of the
@@ -429,7 +429,7 @@ class Friction:
         tread = None
         if self._shear is not None and len(index):
             tread = self._shear.between(index, self._soft)
-        stiffness = Stiffness(self._carcass.between(index), 1.0 / springs, tread)
+        stiffness = SlidingStiffness(self._carcass.between(index), 1.0 / springs, tread)
         constant = moved[index] + past[index] / share[index, None]
         bound = np.full(len(index), np.inf)
         if law.friction is not None:

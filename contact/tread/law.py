@@ -26,7 +26,7 @@ class TreadLaw(Parameters):
 
     @property
     def creep(self) -> tuple[Array, Array] | None:
-        """Shares and times (k,), - and s, of its creep (contact.tread.creep), or None."""
+        """Shares and times (k,), - and s, of its creep (contact.tread.memory), or None."""
         return None
 
     def influence(self, farthest: float) -> Influence:

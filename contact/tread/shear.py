@@ -41,7 +41,7 @@ Index = NDArray[np.intp]
 MARGIN = 4  # points beyond the grid, over which the kernel of the preconditioner has fallen off
 
 
-class Convolution:
+class ShearConvolution:
     """Convolution by FFT over twice a grid of `shape`, with kernels (3 or 5, ...) of a larger one.
 
     `place` (a,): flat indices of the points on the grid. `beside` m/N: compliance of each point in
@@ -73,7 +73,7 @@ class Convolution:
         self._inverse = np.stack([yy, -xy, xx]) / np.maximum(determinant, least)
         self.set_points(place)
 
-    def at(self, place: Index) -> Convolution:
+    def at(self, place: Index) -> ShearConvolution:
         """The same between other points of the grid."""
         other = copy(self)
         other.set_points(place)
@@ -288,8 +288,8 @@ class KernelShear:
         _, x, y = doubled(grid)
         self._kernels = influence(x, y, *(np.full(x.shape, d / 2) for d in grid.spacing))
         self.coupled = bool(self._kernels[3:].any())
-        self._whole = Convolution(self._kernels, grid.shape, grid.place)
-        self._rectangles: dict[tuple[int, int, float], Convolution] = {}
+        self._whole = ShearConvolution(self._kernels, grid.shape, grid.place)
+        self._rectangles: dict[tuple[int, int, float], ShearConvolution] = {}
 
     def spread(self, force: Plane) -> Plane:
         """Displacements (c,) m in the plane under forces (c,) N in the plane."""
@@ -321,7 +321,7 @@ class KernelShear:
         if (*shape, beside) not in self._rectangles:
             if len(self._rectangles) >= MOST_RECTANGLES:
                 self._rectangles.clear()
-            one = Convolution(self._kernels[:3], shape, place, beside)
+            one = ShearConvolution(self._kernels[:3], shape, place, beside)
             self._rectangles[(*shape, beside)] = one
         part = self._rectangles[(*shape, beside)].at(place)
         return Between(part.spread, part.own, part.bound, part.precondition)

@@ -30,7 +30,7 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from tireroad.fem import compat, kinematics
-from tireroad.fem.cavity.duct import Duct, Profile, inflated, modes, waves
+from tireroad.fem.cavity.duct import Duct, DuctProfile, inflated, modes, waves
 from tireroad.fem.collective import summed
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.operators import Unknowns
@@ -67,14 +67,14 @@ class CavityTrace:
         pushed = kinematics.pressure_virtual_work(u, v, ufl.FacetNormal(body.mesh))
         self._flux = compat.form(-chi * pushed * inner)
 
-    def profile(self) -> Profile:
+    def profile(self) -> DuctProfile:
         """The cavity's section around the ring. InputError if it is no closed tube. Collective."""
         moments = np.array([self._scalars() for _ in self._each_wave()])
         moments = self._body.comm.allreduce(moments)
         around = 2 * np.pi  # the rim is axisymmetric: it contributes to the mean only
         (r1, y1), (r2, y2) = self._ends
         moments[0] -= around * (y2 - y1) * np.array([(r1**2 + r1 * r2 + r2**2) / 6, (r1 + r2) / 2])
-        found = Profile(*moments.T)
+        found = DuctProfile(*moments.T)
         volume, area = found.at(np.linspace(0, 2 * np.pi, 8 * self.count))
         if min(volume.min(), area.min()) <= 0:
             raise InputError(

@@ -76,7 +76,7 @@ _STATIONS = 16  # per wave: integrals of triple products are exact, others to 1e
 
 
 @dataclass(frozen=True)
-class Profile:
+class DuctProfile:
     """The cavity around the ring, by Fourier moments over the angle.
 
     `volume` (f,) m3: int chi_f dV; `area` (f,) m2: int chi_f dA dtheta, A being the section in the
@@ -161,7 +161,7 @@ class Duct:
         turning = speed * self.loss[:, None] * self.gyroscopic
         return drag, np.diag(self.circular**2) + speed**2 * self.convective + turning
 
-    def joined(
+    def with_tire(
         self, drag: np.ndarray, stiffness: np.ndarray, speed: float, coupling: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Damping and stiffness (m + a, m + a) of a tire of unit mass with its air.
@@ -189,7 +189,7 @@ class Duct:
 
 
 def modes(
-    profile: Profile, gas: Gas, up_to: float | None, loss_factor: float | None = None
+    profile: DuctProfile, gas: Gas, up_to: float | None, loss_factor: float | None = None
 ) -> Duct:
     """The duct's modes below `up_to` Hz, at least the lowest pair; None: up to `WAVES` waves.
 
@@ -235,7 +235,7 @@ def modes(
     )
 
 
-def momentum_of_waves(profile: Profile) -> np.ndarray:
+def momentum_of_waves(profile: DuctProfile) -> np.ndarray:
     """int (dchi_f/dtheta) e_theta A dtheta = closed int chi_f n dS, (3, f) m2.
 
     The first, times density, is the momentum of a potential chi_f, the second the force of a
@@ -252,7 +252,7 @@ def _stations(count: int) -> tuple[np.ndarray, float]:
     return width * np.arange(count), width
 
 
-def _stretch(profile: Profile, angle: np.ndarray) -> np.ndarray:
+def _stretch(profile: DuctProfile, angle: np.ndarray) -> np.ndarray:
     """ds/dtheta (t,) m of the line of centroids."""
     volume, area = profile.at(angle)
     radius = volume / area

@@ -17,9 +17,9 @@ import numpy as np
 from tireroad.fem.decks import rebar
 from tireroad.fem.decks.abaqus_generation import (
     Generator,
+    InstancePlacement,
     KnownElements,
     KnownNodes,
-    Placement,
     SetReader,
     data_lines,
     turned,
@@ -27,13 +27,13 @@ from tireroad.fem.decks.abaqus_generation import (
 from tireroad.fem.decks.deck import (
     LABEL,
     SCOPE,
-    Block,
     Card,
-    Compound,
+    CardBlock,
+    CordLayer,
     Data,
     Deck,
+    DeckCompound,
     Embedded,
-    Layer,
     Orientation,
     Place,
     Sets,
@@ -119,7 +119,7 @@ class SectionReader:
     def __init__(self, sets: SetReader) -> None:
         self._sets = sets
         self.solids: list[Solid] = []
-        self.layers: list[Layer] = []
+        self.layers: list[CordLayer] = []
         self.embedded: list[Embedded] = []
         self.held: list = []
         self.orientations: dict[str, Orientation] = {}
@@ -184,7 +184,7 @@ class SectionReader:
             if numbers[1] <= 0 or numbers[2] <= 0:
                 raise place.error(f"cords of layer {parts[0]}: area and spacing must be > 0")
             self.layers.append(
-                Layer(
+                CordLayer(
                     name=parts[0],
                     elements=skin.elements,
                     area=numbers[1],
@@ -211,7 +211,7 @@ class SectionReader:
             self._old.append(len(self.layers))
             self.layers.append(replace(layer, elements=name, line=line, orientation=orientation))
 
-    def _one(self, layer: Layer, element: int, scope: int) -> tuple[str, str]:
+    def _one(self, layer: CordLayer, element: int, scope: int) -> tuple[str, str]:
         """Names of the sets of a single element, and of those whose cords are one line with it."""
         if len(self._single) >= 2 * _SINGLE:
             raise layer.place.error(
@@ -278,7 +278,7 @@ class SectionReader:
             card.place,
         )
 
-    def place(self, of: dict[str, Orientation], placement: Placement) -> None:
+    def place(self, of: dict[str, Orientation], placement: InstancePlacement) -> None:
         """Bring the orientations `of` an instance to where it is placed."""
         for name, one in of.items():
             points = np.array(one.points).reshape(2, 3)
@@ -311,9 +311,9 @@ class SectionReader:
         part = (card.keyword, card.options, table, card.place)
         self._materials[self._material][0].append(part)
 
-    def materials(self) -> dict[str, Compound]:
+    def materials(self) -> dict[str, DeckCompound]:
         return {
-            name: Compound(name, tuple(parts), place)
+            name: DeckCompound(name, tuple(parts), place)
             for name, (parts, place) in self._materials.items()
         }
 
@@ -397,7 +397,7 @@ class _Instance:
     name: str
     part: _Part
     place: Place
-    placement: Placement | None = None
+    placement: InstancePlacement | None = None
 
 
 class _Reader:
@@ -412,7 +412,7 @@ class _Reader:
         self.step: Place | None = None
         self.part: _Part | None = None
         self.instance: _Instance | None = None
-        self.system: Placement | None = None
+        self.system: InstancePlacement | None = None
         self.nodes, self.elements = KnownNodes(), KnownElements()
         self.sets = SetReader()
         self.sections = SectionReader(self.sets)
@@ -516,7 +516,7 @@ class _Reader:
 
     def _placed(self, card: Card, lines: list[Data], _: int) -> None:
         assert self.instance is not None
-        self.instance.placement = Placement.read(lines)
+        self.instance.placement = InstancePlacement.read(lines)
 
     def _end_instance(self, card: Card) -> None:
         if self.instance is None:
@@ -544,7 +544,7 @@ class _Reader:
             return
         origin, first, second = np.array((table + [0.0] * 9)[:9]).reshape(3, 3)
         if len(table) <= 3:
-            self.system = Placement(origin, np.zeros(3), np.array([1.0, 0, 0]), 0.0)
+            self.system = InstancePlacement(origin, np.zeros(3), np.array([1.0, 0, 0]), 0.0)
             return
         if len(table) <= 6:  # x and y stay in the plane z = 0
             second = origin + np.cross([0.0, 0.0, 1.0], first - origin)
@@ -554,7 +554,7 @@ class _Reader:
             raise card.place.error("*SYSTEM: its points give no axes")
         x, z = x / np.linalg.norm(x), z / np.linalg.norm(z)
         turn = np.column_stack([x, np.cross(z, x), z])
-        self.system = Placement.turned_to(origin, turn)
+        self.system = InstancePlacement.turned_to(origin, turn)
 
     def _node(self, card: Card, lines: list[Data], scope: int) -> None:
         system = card.options.get("SYSTEM", "R").upper()
@@ -589,7 +589,7 @@ class _Reader:
         if not len(table):
             raise card.place.error(f"*ELEMENT, TYPE={name}: no elements follow")
         table = table + scope * SCOPE
-        self.elements.add(Block(name, shape, table[:, 0], table[:, 1:], card.place))
+        self.elements.add(CardBlock(name, shape, table[:, 0], table[:, 1:], card.place))
         self.sets.add_elements(card, table[:, 0], scope)
 
     def _node_set(self, card: Card, lines: list[Data], scope: int) -> None:
@@ -664,7 +664,7 @@ class _Reader:
         names = {layer.elements for layer in self.sections.layers}
         return np.concatenate([np.empty(0, np.int64), *map(sets.labels, names)])
 
-    def _takes_part(self, block: Block) -> bool:
+    def _takes_part(self, block: CardBlock) -> bool:
         """Whether the elements are the tire's: shells are where one of them has cords."""
         return block.kind.role != "shell" or bool(np.isin(block.labels, self._corded).any())
 

@@ -24,8 +24,8 @@ from tireroad.fem.decks.deck import (
     BOTH_SIDES,
     LABEL,
     SCOPE,
-    Block,
     Card,
+    CardBlock,
     Data,
     Members,
     Place,
@@ -337,7 +337,7 @@ class SetReader:
 
 
 @dataclass(frozen=True)
-class Placement:
+class InstancePlacement:
     """Where an instance is: moved by `shift` (3,), then turned by `angle` rad about a line.
 
     The line goes through `start` (3,) along the unit vector `axis` (3,).
@@ -349,7 +349,7 @@ class Placement:
     angle: float
 
     @classmethod
-    def read(cls, lines: list[Data]) -> Placement | None:
+    def read(cls, lines: list[Data]) -> InstancePlacement | None:
         """Of the data lines of *INSTANCE: a shift, then two points of a line and degrees."""
         table = [
             (place, [number(part, place) for part in parts]) for place, parts in data_lines(lines)
@@ -376,7 +376,7 @@ class Placement:
         return cls(moved, start, line / length, math.radians(turn[6]))
 
     @classmethod
-    def turned_to(cls, origin: np.ndarray, axes: np.ndarray) -> Placement:
+    def turned_to(cls, origin: np.ndarray, axes: np.ndarray) -> InstancePlacement:
         """With the columns of `axes` (3, 3) as axes and an origin (3,)."""
         from scipy.spatial.transform import Rotation
 
@@ -430,7 +430,7 @@ class KnownNodes:
             raise asked.error(f"node {labels[missing][0] % SCOPE} is not defined before this line")
         return found
 
-    def move(self, scope: int, placement: Placement, file: str) -> None:
+    def move(self, scope: int, placement: InstancePlacement, file: str) -> None:
         """Bring the nodes of a scope to where their instance is placed."""
         labels, points = self.table(file)
         mine = labels // SCOPE == scope
@@ -474,12 +474,12 @@ class KnownElements:
     """Blocks of used elements; `others`: whether elements of unused types occurred."""
 
     def __init__(self) -> None:
-        self.blocks: list[Block] = []
+        self.blocks: list[CardBlock] = []
         self.others = False
         self._place: dict[int, tuple[int, int]] = {}  # block and row
         self._indexed = 0
 
-    def add(self, block: Block) -> None:
+    def add(self, block: CardBlock) -> None:
         """Add elements of one type."""
         self.blocks.append(block)
 
@@ -487,7 +487,7 @@ class KnownElements:
         """All labels, ascending."""
         return np.sort(np.concatenate([np.empty(0, np.int64), *(b.labels for b in self.blocks)]))
 
-    def one(self, label: int, asked: Place) -> Block | None:
+    def one(self, label: int, asked: Place) -> CardBlock | None:
         """A single element; None if it may be of an unused type. InputError if undefined."""
         for k, block in enumerate(self.blocks[self._indexed :], self._indexed):
             self._place |= {name: (k, row) for row, name in enumerate(block.labels.tolist())}
@@ -499,7 +499,7 @@ class KnownElements:
         number, row = self._place[label]
         return self.blocks[number].rows([row])
 
-    def within(self, labels: np.ndarray) -> list[Block]:
+    def within(self, labels: np.ndarray) -> list[CardBlock]:
         """The parts of the blocks whose labels are among `labels`."""
         at = [np.flatnonzero(np.isin(block.labels, labels)) for block in self.blocks]
         return [block.rows(rows) for block, rows in zip(self.blocks, at, strict=True) if len(rows)]
@@ -521,7 +521,7 @@ class KnownElements:
             )
             nodes = block.nodes.copy()
             nodes[mine] = nodes[mine][:, order]
-            self.blocks[k] = Block(block.type, block.kind, block.labels, nodes, block.place)
+            self.blocks[k] = CardBlock(block.type, block.kind, block.labels, nodes, block.place)
             if block.kind.role == "solid":
                 found |= dict.fromkeys(block.labels[mine].tolist(), block.kind.corners)
         return found
@@ -734,7 +734,7 @@ class Generator:
             self._sets.add_elements(card, np.empty(0, np.int64), scope)
             return
         made = master + elements[1:], one.nodes + nodes[1:, None]
-        self._elements.add(Block(one.type, one.kind, *made, place))
+        self._elements.add(CardBlock(one.type, one.kind, *made, place))
         self._sets.add_elements(card, master + elements, scope)
 
     def _elcopy(self, card: Card, lines: list[Data], scope: int) -> None:
@@ -749,7 +749,7 @@ class Generator:
             if "REFLECT" in card.options:
                 turned = turned[:, block.kind.reflected(card.place)]
             self._elements.add(
-                Block(block.type, block.kind, block.labels + shift, turned + nodes, card.place)
+                CardBlock(block.type, block.kind, block.labels + shift, turned + nodes, card.place)
             )
         if "REFLECT" in card.options:
             self._sets.reflected.append(old + shift)

@@ -14,7 +14,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from tireroad.fem.decks.deck import Compound, Place, number
+from tireroad.fem.decks.deck import DeckCompound, Place, number
 from tireroad.fem.decks.rubber_tests import TESTS, Fit, fitted
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections.construction import RADII
@@ -175,7 +175,7 @@ def _poisson(bulk: float, shear: float) -> float:
     return (3 * bulk - 2 * shear) / (6 * bulk + 2 * shear)
 
 
-def rubber(compound: Compound, units: Units) -> Rubber:
+def rubber(compound: DeckCompound, units: Units) -> Rubber:
     """The compound of a solid section. Raises InputError for laws the program does not have."""
     parts = _parts(compound)
     notes: list[str] = []
@@ -221,7 +221,7 @@ def rubber(compound: Compound, units: Units) -> Rubber:
     )
 
 
-def cord(compound: Compound, units: Units) -> CordMaterial:
+def cord(compound: DeckCompound, units: Units) -> CordMaterial:
     """The material of a cord: its modulus at small strain."""
     parts = _parts(compound)
     for name in ("ELASTIC", "HYPERELASTIC"):
@@ -240,17 +240,17 @@ def cord(compound: Compound, units: Units) -> CordMaterial:
     raise compound.place.error(f"material {compound.name} of cords has no *ELASTIC")
 
 
-def density_of(compound: Compound, units: Units) -> float | None:
+def density_of(compound: DeckCompound, units: Units) -> float | None:
     """Density, kg/m3; None if it has none."""
     return _density(_parts(compound), units, compound)
 
 
-def _parts(compound: Compound) -> dict:
+def _parts(compound: DeckCompound) -> dict:
     return {keyword: (options, rows, place) for keyword, options, rows, place in compound.parts}
 
 
 def _numbers(
-    part: Any, compound: Compound, notes: list[str], lines: int = 1
+    part: Any, compound: DeckCompound, notes: list[str], lines: int = 1
 ) -> tuple[Mapping[str, str], list[float], Place]:
     """Options, numbers of the first `lines` lines (the first temperature) and place."""
     options, table, place = part
@@ -261,7 +261,7 @@ def _numbers(
     return options, [value for row in table[:lines] for value in row], place
 
 
-def _hyperelastic(parts: dict, compound: Compound, notes: list[str]) -> _Law:
+def _hyperelastic(parts: dict, compound: DeckCompound, notes: list[str]) -> _Law:
     """The law of a *HYPERELASTIC: by its coefficients, or fitted to its test data."""
     options, _, place = parts["HYPERELASTIC"]
     form, order = _form(options, place, compound.name)
@@ -286,7 +286,7 @@ def _hyperelastic(parts: dict, compound: Compound, notes: list[str]) -> _Law:
     return _simplest({key: value for key, value in values.items() if value}, bulk, place, compound)
 
 
-def _simplest(values: dict[str, float], bulk: float, place: Place, compound: Compound) -> _Law:
+def _simplest(values: dict[str, float], bulk: float, place: Place, compound: DeckCompound) -> _Law:
     """The simplest law that has these coefficients cij, none of them 0."""
     used = set(values)
     if values.get("c10", 0.0) + values.get("c01", 0.0) <= 0:
@@ -306,7 +306,7 @@ def _simplest(values: dict[str, float], bulk: float, place: Place, compound: Com
 _TESTED = {"polynomial": {1: "mooney-rivlin", 2: "polynomial"}}
 
 
-def _tested(form: str, order: int, parts: dict, compound: Compound, notes: list[str]) -> _Law:
+def _tested(form: str, order: int, parts: dict, compound: DeckCompound, notes: list[str]) -> _Law:
     """The law that follows the material's test data."""
     options, _, place = parts["HYPERELASTIC"]
     tests = {
@@ -387,7 +387,7 @@ def _elastic(options: Mapping[str, str], numbers: list[float], place: Place, nam
     return _Law("neo-hookean", {"shear": modulus / (2 * (1 + poisson))}, bulk)
 
 
-def _slope(parts: dict, compound: Compound) -> float:
+def _slope(parts: dict, compound: DeckCompound) -> float:
     """Slope at zero strain of *UNIAXIAL TEST DATA (stress, strain), from its smallest strain."""
     for _, table, _ in (parts["UNIAXIAL TEST DATA"],) if "UNIAXIAL TEST DATA" in parts else ():
         points = sorted((row[1], row[0]) for row in table if len(row) > 1 and row[1] > 0)
@@ -396,7 +396,7 @@ def _slope(parts: dict, compound: Compound) -> float:
     raise compound.place.error(f"material {compound.name} of cords has no *UNIAXIAL TEST DATA")
 
 
-def _density(parts: dict, units: Units, compound: Compound) -> float | None:
+def _density(parts: dict, units: Units, compound: DeckCompound) -> float | None:
     if "DENSITY" not in parts:
         return None
     _, numbers, place = _numbers(parts["DENSITY"], compound, [])

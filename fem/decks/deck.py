@@ -383,7 +383,7 @@ def label(text: str, place: Place) -> int:
 
 
 @dataclass(frozen=True)
-class Kind:
+class ElementShape:
     """An element shape: `role` solid, membrane or shell, dimension of the deck, nodes and faces.
 
     A face is given by its corner nodes, in the manual's order S1, S2, ...
@@ -425,26 +425,26 @@ _FAMILIES = (
     (re.compile(r"S([34689])R?[5ST]?W?"), "shell", 3),
 )
 _SOLIDS = {
-    (2, 3): Kind("solid", 2, 3, 3, _TRIANGLE),
-    (2, 4): Kind("solid", 2, 4, 4, _QUAD),
-    (2, 6): Kind("solid", 2, 6, 3, _TRIANGLE),
-    (2, 8): Kind("solid", 2, 8, 4, _QUAD),
-    (3, 4): Kind("solid", 3, 4, 4),
-    (3, 10): Kind("solid", 3, 10, 4),
-    (3, 6): Kind("solid", 3, 6, 6, _WEDGE),
-    (3, 15): Kind("solid", 3, 15, 6, _WEDGE),
-    (3, 8): Kind("solid", 3, 8, 8, _HEXAHEDRON),
-    (3, 20): Kind("solid", 3, 20, 8, _HEXAHEDRON),
-    (3, 27): Kind("solid", 3, 27, 8, _HEXAHEDRON),
+    (2, 3): ElementShape("solid", 2, 3, 3, _TRIANGLE),
+    (2, 4): ElementShape("solid", 2, 4, 4, _QUAD),
+    (2, 6): ElementShape("solid", 2, 6, 3, _TRIANGLE),
+    (2, 8): ElementShape("solid", 2, 8, 4, _QUAD),
+    (3, 4): ElementShape("solid", 3, 4, 4),
+    (3, 10): ElementShape("solid", 3, 10, 4),
+    (3, 6): ElementShape("solid", 3, 6, 6, _WEDGE),
+    (3, 15): ElementShape("solid", 3, 15, 6, _WEDGE),
+    (3, 8): ElementShape("solid", 3, 8, 8, _HEXAHEDRON),
+    (3, 20): ElementShape("solid", 3, 20, 8, _HEXAHEDRON),
+    (3, 27): ElementShape("solid", 3, 27, 8, _HEXAHEDRON),
 }
 _MEMBRANES = {
-    (2, 1): Kind("membrane", 2, 2, 2),
-    (2, 2): Kind("membrane", 2, 3, 2),
-    (3, 3): Kind("membrane", 3, 3, 3),
-    (3, 4): Kind("membrane", 3, 4, 4),
-    (3, 6): Kind("membrane", 3, 6, 3),
-    (3, 8): Kind("membrane", 3, 8, 4),
-    (3, 9): Kind("membrane", 3, 9, 4),
+    (2, 1): ElementShape("membrane", 2, 2, 2),
+    (2, 2): ElementShape("membrane", 2, 3, 2),
+    (3, 3): ElementShape("membrane", 3, 3, 3),
+    (3, 4): ElementShape("membrane", 3, 4, 4),
+    (3, 6): ElementShape("membrane", 3, 6, 3),
+    (3, 8): ElementShape("membrane", 3, 8, 4),
+    (3, 9): ElementShape("membrane", 3, 9, 4),
 }
 _SHELLS = {key: replace(shape, role="shell") for key, shape in _MEMBRANES.items()}
 _SHAPES = {"solid": _SOLIDS, "membrane": _MEMBRANES, "shell": _SHELLS}
@@ -465,7 +465,7 @@ _REFLECTED = {
 }
 
 
-def kind(name: str) -> Kind | None:
+def kind(name: str) -> ElementShape | None:
     """The shape of an Abaqus type in capitals; None for a type that is not used."""
     for pattern, role, dimension in _FAMILIES:
         match = pattern.fullmatch(name)
@@ -474,7 +474,7 @@ def kind(name: str) -> Kind | None:
     return None
 
 
-def used_kind(name: str) -> Kind:
+def used_kind(name: str) -> ElementShape:
     """The shape of a type known to be used."""
     found = kind(name)
     assert found is not None, f"{name} is not among the types that are used"
@@ -482,18 +482,18 @@ def used_kind(name: str) -> Kind:
 
 
 @dataclass(frozen=True)
-class Block:
+class CardBlock:
     """Elements of one type: labels (n,), nodes (n, k) by label, and the line where they begin."""
 
     type: str
-    kind: Kind
+    kind: ElementShape
     labels: np.ndarray
     nodes: np.ndarray
     place: Place
 
-    def rows(self, rows: list[int] | np.ndarray) -> Block:
+    def rows(self, rows: list[int] | np.ndarray) -> CardBlock:
         """The given rows of the block."""
-        return Block(self.type, self.kind, self.labels[rows], self.nodes[rows], self.place)
+        return CardBlock(self.type, self.kind, self.labels[rows], self.nodes[rows], self.place)
 
 
 ALL_FACES = -1  # in a surface, of a solid element: its faces on the boundary
@@ -588,7 +588,7 @@ class Solid:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Layer:
+class CordLayer:
     """A layer of cords in the elements of a set, as in the deck (in its units).
 
     `angle` in degrees: from the meridian in axisymmetric elements, otherwise from the local first
@@ -642,7 +642,7 @@ class Embedded:
 
 
 @dataclass(frozen=True)
-class Compound:
+class DeckCompound:
     """A *MATERIAL as written: (keyword, options, rows of numbers, place) of each suboption."""
 
     name: str
@@ -664,16 +664,16 @@ class Deck:
     file: str
     labels: np.ndarray
     points: np.ndarray
-    blocks: tuple[Block, ...]
+    blocks: tuple[CardBlock, ...]
     node_sets: Sets
     element_sets: Sets
     surfaces: Mapping[str, np.ndarray]
     solids: tuple[Solid, ...] = ()
-    layers: tuple[Layer, ...] = ()
+    layers: tuple[CordLayer, ...] = ()
     embedded: tuple[Embedded, ...] = ()
     held: tuple[tuple[str, Place], ...] = ()
     pressed: tuple[str, ...] = ()
-    materials: Mapping[str, Compound] = field(default_factory=dict)
+    materials: Mapping[str, DeckCompound] = field(default_factory=dict)
     orientations: Mapping[str, Orientation] = field(default_factory=dict)
     lines: tuple[str, ...] = ()
     used: tuple[str, ...] = ()

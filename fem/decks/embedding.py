@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tireroad.fem.decks.compounds import CordMaterial
-from tireroad.fem.decks.deck import SCOPE, Deck, Layer
+from tireroad.fem.decks.deck import SCOPE, CordLayer, Deck
 from tireroad.fem.decks.quads import (
     SIDE_NODES,
     DeckEdges,
@@ -257,7 +257,7 @@ _LEAST_ANGLE = 0.1  # sine between a line and a side; below it the line runs alo
 
 
 @dataclass(frozen=True)
-class Line:
+class HostedLine:
     """One chain of line elements: points (k, 3, 2) at start, middle and end of each; `name` and
     `fail`, which creates an error from a text, for messages; `hosts`: elements it must lie in,
     None: any.
@@ -290,7 +290,7 @@ class _Station:
     t: float = 0.0
 
 
-def lay(quads: Quads, line: Line, origins: Origins) -> tuple[Quads, list[int]]:
+def lay(quads: Quads, line: HostedLine, origins: Origins) -> tuple[Quads, list[int]]:
     """The cells with sides all along a line, and the numbers of those sides.
 
     Raises the line's error if it leaves the body or its hosts, or crosses cells obliquely.
@@ -315,7 +315,7 @@ def lay(quads: Quads, line: Line, origins: Origins) -> tuple[Quads, list[int]]:
     return quads, numbers
 
 
-def _inside(quads: Quads, line: Line) -> None:
+def _inside(quads: Quads, line: HostedLine) -> None:
     """Check that ends and middles of the line's elements lie in the body and in the hosts."""
     points = line.points.reshape(-1, 2)
     cells, where, beyond = locate(quads, points)
@@ -329,7 +329,7 @@ def _inside(quads: Quads, line: Line) -> None:
         raise line.fail(f"element {k // 3 + 1} of it lies {what}, at r = {r:.5g}, z = {z:.5g}")
 
 
-def _cut_at_end(quads: Quads, line: Line, end: float) -> tuple[Quads, float]:
+def _cut_at_end(quads: Quads, line: HostedLine, end: float) -> tuple[Quads, float]:
     """Split the cell in which a line ends across it, unless it ends near a side or node.
 
     Also returns how far (in s) beyond the end the line must then be followed.
@@ -346,7 +346,7 @@ def _cut_at_end(quads: Quads, line: Line, end: float) -> tuple[Quads, float]:
     return cut(quads, marks, -1, {}, line.fail), SNAP * min(t, 1 - t) * cell_length
 
 
-def _stations(quads: Quads, line: Line, reach: tuple[float, float]) -> list[_Station]:
+def _stations(quads: Quads, line: HostedLine, reach: tuple[float, float]) -> list[_Station]:
     """All points where the line meets sides or nodes, for s within `reach`, in order along it."""
     sides = np.unique(quads.sides().reshape(-1, 3), axis=0)
     _, first = np.unique(sides[:, 1], return_index=True)
@@ -364,7 +364,7 @@ def _stations(quads: Quads, line: Line, reach: tuple[float, float]) -> list[_Sta
     return sorted(found.values(), key=lambda one: one.s)
 
 
-def _candidates(sides: np.ndarray, line: Line) -> Iterator[tuple[int, float]]:
+def _candidates(sides: np.ndarray, line: HostedLine) -> Iterator[tuple[int, float]]:
     """(side, s) near which a side (n, 3, 2) and the line may meet, from straight pieces of both."""
     pieces = 4
     s = np.linspace(0, len(line.points), pieces * len(line.points) + 1)
@@ -384,7 +384,7 @@ def _candidates(sides: np.ndarray, line: Line) -> Iterator[tuple[int, float]]:
             yield one // 2, s[k] + u[one] * (s[k + 1] - s[k])
 
 
-def _meet(side: np.ndarray, line: Line, s: float) -> tuple[float, float] | None:
+def _meet(side: np.ndarray, line: HostedLine, s: float) -> tuple[float, float] | None:
     """(t, s) where a side (3, 2) meets the line; None if it does not or runs along it."""
     t, step = 0.5, 1e-6
     for _ in range(20):
@@ -403,7 +403,7 @@ def _meet(side: np.ndarray, line: Line, s: float) -> tuple[float, float] | None:
 
 
 def _follow(
-    quads: Quads, line: Line, stations: list[_Station]
+    quads: Quads, line: HostedLine, stations: list[_Station]
 ) -> tuple[dict[int, float], dict[int, float], list[int]]:
     """Sides to cut, the cells concerned (position halfway), and whole sides on the line."""
     if len(stations) < 2:
@@ -431,7 +431,7 @@ def _follow(
     return marks, _half_way(quads, path, line), whole
 
 
-def _slant(line: Line, a: _Station, b: _Station) -> str:
+def _slant(line: HostedLine, a: _Station, b: _Station) -> str:
     r, z = line.at(np.array([(a.s + b.s) / 2]))[0]
     return (
         f"it crosses the elements at r = {r:.5g}, z = {z:.5g} slantwise, not from one side to the opposite "
@@ -440,7 +440,7 @@ def _slant(line: Line, a: _Station, b: _Station) -> str:
 
 
 def _between(
-    quads: Quads, cells: set[int], first: int, last: int, line: Line, a: _Station, b: _Station
+    quads: Quads, cells: set[int], first: int, last: int, line: HostedLine, a: _Station, b: _Station
 ) -> int:
     """The middle node of the side between two nodes."""
     for cell in cells:
@@ -451,7 +451,7 @@ def _between(
 
 
 def _opposite(
-    quads: Quads, cells: set[int], names: list[int], a: _Station, b: _Station, line: Line
+    quads: Quads, cells: set[int], names: list[int], a: _Station, b: _Station, line: HostedLine
 ) -> int:
     """The cell in which two sides are opposite each other."""
     if a.node < 0 and b.node < 0:
@@ -462,7 +462,7 @@ def _opposite(
     raise line.fail(_slant(line, a, b))
 
 
-def _half_way(quads: Quads, path: dict, line: Line) -> dict[int, float]:
+def _half_way(quads: Quads, path: dict, line: HostedLine) -> dict[int, float]:
     """Position of the line halfway across each cell: parabola through three of its points."""
     cells = np.array(list(path), np.int64)
     middle = line.at(np.array([(a.s + b.s) / 2 for a, b in path.values()]))
@@ -497,7 +497,7 @@ class Ply:
 
 
 @dataclass(frozen=True)
-class Laid:
+class LaidMembranes:
     """The membranes of a line: numbers of the deck's edges they lie on, and middles (k, 2) and
     directions (k, 2) of their elements from first to last node; `corded` (k,): those that have the
     layer's cords.
@@ -512,9 +512,9 @@ class Laid:
         """The element (k,) nearest to each point (k, 2)."""
         return np.linalg.norm(points[:, None] - self.middles, axis=2).argmin(axis=1)
 
-    def mirrored(self) -> Laid:
+    def mirrored(self) -> LaidMembranes:
         """With the other half, turned by 180 deg about the vertical so that cords continue."""
-        return Laid(
+        return LaidMembranes(
             self.numbers,
             np.concatenate([self.middles, self.middles * [1, -1]]),
             np.concatenate([self.directions, self.directions * [-1, 1]]),
@@ -523,7 +523,7 @@ class Laid:
 
 
 def plies(
-    quads: Quads, laid: Laid, layer: Layer, material: CordMaterial, length: float
+    quads: Quads, laid: LaidMembranes, layer: CordLayer, material: CordMaterial, length: float
 ) -> list[Ply]:
     """The plies of one cord layer: one per unbroken line, more if the angle varies along it."""
     sides = with_origin(quads, laid.numbers)
@@ -546,7 +546,12 @@ def plies(
 
 
 def _ply(
-    quads: Quads, sides: np.ndarray, layer: Layer, material: CordMaterial, length: float, sense: int
+    quads: Quads,
+    sides: np.ndarray,
+    layer: CordLayer,
+    material: CordMaterial,
+    length: float,
+    sense: int,
 ) -> Ply:
     r = quads.points[ends(quads, sides).ravel(), 0].mean()
     angle, spacing = _geometry(layer, r)
@@ -562,7 +567,7 @@ def _ply(
     )
 
 
-def _geometry(layer: Layer, r: float) -> tuple[float, float]:
+def _geometry(layer: CordLayer, r: float) -> tuple[float, float]:
     """(angle from the meridian in rad, spacing in the deck's length unit) at radius r.
 
     Lifting keeps the number of cords around: with the angle b from the circumference and the
@@ -593,7 +598,7 @@ def from_circumference(angle: float, sense: int) -> float:
     return 0.0 if abs(turned) < 1e-12 else turned
 
 
-def _sense(quads: Quads, chain: np.ndarray, laid: Laid, layer: Layer) -> int:
+def _sense(quads: Quads, chain: np.ndarray, laid: LaidMembranes, layer: CordLayer) -> int:
     """1 if the membranes run with the chain, -1 if against it."""
     points = quads.points[along(ends(quads, chain))]
     middles, steps = (points[1:] + points[:-1]) / 2, np.diff(points, axis=0)
@@ -609,7 +614,7 @@ def _sense(quads: Quads, chain: np.ndarray, laid: Laid, layer: Layer) -> int:
 
 def lay_all(
     deck: Deck, quads: Quads, edges: DeckEdges, origins: Origins
-) -> tuple[Quads, dict[str, Laid]]:
+) -> tuple[Quads, dict[str, LaidMembranes]]:
     """The cells with sides along all membranes that carry cords, and the position of each set.
 
     Membranes that share the solids' nodes already lie on sides; others are located
@@ -628,7 +633,7 @@ def lay_all(
     found = {}
     for layer in deck.layers:
         numbers, points, labels = done[layer.line or layer.elements]
-        found[layer.elements] = Laid(
+        found[layer.elements] = LaidMembranes(
             origins.with_parts(numbers),
             points[:, 1],
             points[:, 2] - points[:, 0],
@@ -637,7 +642,7 @@ def lay_all(
     return quads, found
 
 
-def _elements(deck: Deck, layer: Layer, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _elements(deck: Deck, layer: CordLayer, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """End nodes (k, 2), points (k, 3, 2) and labels (k,) of the membranes of a layer's set."""
     wanted = deck.element_sets.labels(name, layer.place)
     ends, points, labels = [], [], []
@@ -666,7 +671,7 @@ def _elements(deck: Deck, layer: Layer, name: str) -> tuple[np.ndarray, np.ndarr
 def _embed(
     deck: Deck,
     quads: Quads,
-    layer: Layer,
+    layer: CordLayer,
     ends: np.ndarray,
     points: np.ndarray,
     labels: np.ndarray,
@@ -685,7 +690,7 @@ def _embed(
                 f"cords {layer.name}: the line of membranes from element {first}: {text}"
             )
 
-        quads, new = lay(quads, Line(layer.elements, three, fail, hosts), origins)
+        quads, new = lay(quads, HostedLine(layer.elements, three, fail, hosts), origins)
         numbers += new
     return quads, np.array(numbers, np.int64)
 
@@ -703,7 +708,7 @@ def _turned(ends: np.ndarray) -> np.ndarray:
     return turned
 
 
-def _hosts(deck: Deck, layer: Layer, labels: np.ndarray) -> frozenset | None:
+def _hosts(deck: Deck, layer: CordLayer, labels: np.ndarray) -> frozenset | None:
     """Elements in which the membranes must lie; None if the deck names no host for them."""
     for embedded in deck.embedded:
         if embedded.host is None:

@@ -19,7 +19,16 @@ from pathlib import Path
 
 import numpy as np
 
-from tireroad.fem.decks.deck import ALL_FACES, LABEL, Block, Deck, Members, Place, Sets, used_kind
+from tireroad.fem.decks.deck import (
+    ALL_FACES,
+    LABEL,
+    CardBlock,
+    Deck,
+    Members,
+    Place,
+    Sets,
+    used_kind,
+)
 from tireroad.fem.errors import InputError
 
 # Type number: dimension, nodes, Abaqus name, indices of its nodes in Abaqus's order.
@@ -377,12 +386,12 @@ def _deck(
 
 def _groups(
     elements: Elements, dimension: int, names: dict[tuple[int, int], str], part: Part
-) -> tuple[list[Block], dict[str, Members], dict[str, np.ndarray]]:
+) -> tuple[list[CardBlock], dict[str, Members], dict[str, np.ndarray]]:
     """Blocks by type, element sets and surfaces by group."""
     by_type: dict[int, list] = {}
     for element in elements:
         by_type.setdefault(element[0], []).append(element)
-    blocks: list[Block] = []
+    blocks: list[CardBlock] = []
     sets: dict[str, Members] = {}
     surfaces: dict[str, np.ndarray] = {}
     for sort, those in by_type.items():
@@ -394,7 +403,7 @@ def _groups(
             take = tuple(range(count))
         labels = np.array([e[2] for e in those], np.int64)
         nodes = np.array([e[3] for e in those], np.int64)[:, list(take)]
-        blocks.append(Block(name, used_kind(name), labels, nodes, part.place))
+        blocks.append(CardBlock(name, used_kind(name), labels, nodes, part.place))
         group = np.array([e[1] for e in those])
         for number in np.unique(group):
             title = names.get((own, int(number)), f"{'group' if number else 'no group'} {number}")

@@ -11,7 +11,7 @@ from tireroad.fem.errors import InputError
 
 
 @dataclass
-class History:
+class DeckHistory:
     """Figures of a deck's history in its own units; None where it has none.
 
     `angle` (degrees) and `segments` of *SYMMETRIC MODEL GENERATION, REVOLVE; `pressure`: of the
@@ -30,9 +30,9 @@ class History:
     has_steps: bool = False
 
 
-def history(path: Path) -> History:
+def history(path: Path) -> DeckHistory:
     """What the keywords of a deck say; unreadable numbers among them are left out. InputError for no deck."""
-    found = History()
+    found = DeckHistory()
     card: Card | None = None
     lines: list[Data] = []
     for item in cards(path):
@@ -47,7 +47,7 @@ def history(path: Path) -> History:
     return found
 
 
-def _take(found: History, card: Card | None, lines: list[Data]) -> None:
+def _take(found: DeckHistory, card: Card | None, lines: list[Data]) -> None:
     if card is None or card.keyword not in _TAKEN:
         return
     try:
@@ -70,7 +70,7 @@ _Table = list[list[str]]
 _Values = list[list[float | None]]
 
 
-def _revolve(found: History, card: Card, _: _Table, values: _Values) -> None:
+def _revolve(found: DeckHistory, card: Card, _: _Table, values: _Values) -> None:
     """Two lines of the axis, then angle and number of elements of each sector, degrees."""
     if "REVOLVE" not in card.options:
         return
@@ -81,29 +81,29 @@ def _revolve(found: History, card: Card, _: _Table, values: _Values) -> None:
         found.angle, found.segments = float(angle), round(count * 360 / angle)
 
 
-def _pressed(found: History, _: Card, table: _Table, values: _Values) -> None:
+def _pressed(found: DeckHistory, _: Card, table: _Table, values: _Values) -> None:
     for parts, row in zip(table, values, strict=True):
         if len(parts) > 2 and parts[1].upper() == "P" and row[2]:
             found.pressure = abs(row[2])
 
 
-def _loaded(found: History, _: Card, __: _Table, values: _Values) -> None:
+def _loaded(found: DeckHistory, _: Card, __: _Table, values: _Values) -> None:
     for row in values:
         if len(row) > 2 and row[1] in (1, 2, 3) and row[2]:
             found.load = max(found.load or 0.0, abs(row[2]))
 
 
-def _rolling(found: History, _: Card, __: _Table, values: _Values) -> None:
+def _rolling(found: DeckHistory, _: Card, __: _Table, values: _Values) -> None:
     speeds = [abs(row[1]) for row in values if len(row) > 1 and row[1]]
     found.speed = max(speeds, default=found.speed)
 
 
-def _friction(found: History, _: Card, __: _Table, values: _Values) -> None:
+def _friction(found: DeckHistory, _: Card, __: _Table, values: _Values) -> None:
     if values and values[0] and values[0][0] and 0 < values[0][0] < 3:
         found.friction = max(found.friction or 0.0, values[0][0])
 
 
-def _modes(found: History, _: Card, __: _Table, values: _Values) -> None:
+def _modes(found: DeckHistory, _: Card, __: _Table, values: _Values) -> None:
     if values and values[0] and values[0][0] and values[0][0] >= 1:
         found.modes = int(values[0][0])
 

@@ -29,13 +29,13 @@ from tireroad.fem.decks.deck import (
     ALL_FACES,
     BOTH_SIDES,
     SCOPE,
-    Block,
+    CardBlock,
+    CordLayer,
     Deck,
-    Layer,
     Place,
     missing,
 )
-from tireroad.fem.decks.embedding import Laid, Origins, Ply, lay_all, plies
+from tireroad.fem.decks.embedding import LaidMembranes, Origins, Ply, lay_all, plies
 from tireroad.fem.decks.quads import (
     DeckEdges,
     Quads,
@@ -153,7 +153,7 @@ def regions(deck: Deck) -> Regions:
     return Regions(tuple(names), tuple(materials), tuple(places), of)
 
 
-def _by_set(deck: Deck, blocks: list[Block], labels: np.ndarray) -> Regions:
+def _by_set(deck: Deck, blocks: list[CardBlock], labels: np.ndarray) -> Regions:
     """One region per element set, smallest sets first, and one for the remaining elements."""
     sets = {
         name: np.intersect1d(deck.element_sets.labels(name), labels)
@@ -377,7 +377,7 @@ def _sides(quads: Quads, numbers: list[np.ndarray], key: str) -> np.ndarray | No
     return sides
 
 
-def _cords(deck: Deck, quads: Quads, laid: dict[str, Laid], units: Units) -> list[Ply]:
+def _cords(deck: Deck, quads: Quads, laid: dict[str, LaidMembranes], units: Units) -> list[Ply]:
     made: list[Ply] = []
     for layer in deck.layers:
         if layer.elements not in laid:
@@ -400,7 +400,7 @@ def _cords(deck: Deck, quads: Quads, laid: dict[str, Laid], units: Units) -> lis
     ]
 
 
-def _mass_per_area(deck: Deck, layer: Layer, units: Units) -> float:
+def _mass_per_area(deck: Deck, layer: CordLayer, units: Units) -> float:
     """Mass of a layer's membrane itself, kg/m2: of *SURFACE SECTION, DENSITY=, or of its material."""
     mass = layer.mass * units.density * units.length
     if layer.covering is None:

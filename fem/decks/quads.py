@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tireroad.fem.decks.deck import SCOPE, Block, Deck
+from tireroad.fem.decks.deck import SCOPE, CardBlock, Deck
 from tireroad.fem.errors import InputError
 
 SIDE_NODES = np.array([[0, 1, 2], [6, 7, 8], [0, 3, 6], [2, 5, 8]])
@@ -256,7 +256,7 @@ def build(deck: Deck, region_of: dict[int, int]) -> tuple[Quads, DeckEdges, bool
     return split(nodes, raws, (edge3, edge4), middles), edges, True
 
 
-def _raw(deck: Deck, blocks: list[Block], corners: int, region_of: dict[int, int]) -> Raw:
+def _raw(deck: Deck, blocks: list[CardBlock], corners: int, region_of: dict[int, int]) -> Raw:
     labels, ends, middles = [np.empty(0, np.int64)], [], []
     for block in blocks:
         rows = deck.rows(block.nodes, block.place)
@@ -273,7 +273,7 @@ def _raw(deck: Deck, blocks: list[Block], corners: int, region_of: dict[int, int
     )
 
 
-def _positive(deck: Deck, block: Block) -> None:
+def _positive(deck: Deck, block: CardBlock) -> None:
     """Check that corners run counter-clockwise in (r, z) with angles below 180 degrees."""
     count = block.kind.corners
     corners = deck.points[deck.rows(block.nodes[:, :count], block.place)][:, :, :2]
@@ -300,7 +300,7 @@ def _pairs(raw: Raw) -> np.ndarray:
 
 
 def _middles(
-    deck: Deck, ends: np.ndarray, parts: Sequence[tuple[np.ndarray, Raw]], blocks: list[Block]
+    deck: Deck, ends: np.ndarray, parts: Sequence[tuple[np.ndarray, Raw]], blocks: list[CardBlock]
 ) -> np.ndarray:
     """The middle of each edge: the deck's node if there is one, else halfway between its ends."""
     nodes = deck.points[:, :2]

@@ -21,11 +21,11 @@ import numpy as np
 from tireroad.fem.decks.abaqus_generation import data_lines
 from tireroad.fem.decks.deck import (
     SCOPE,
-    Block,
     Card,
+    CardBlock,
+    CordLayer,
     Data,
     Deck,
-    Layer,
     Members,
     Place,
     Sets,
@@ -55,7 +55,7 @@ def option(card: Card, name: str) -> str:
     return card.options[found[0]] if found else ""
 
 
-def layers(card: Card, lines: list[Data]) -> Iterator[Layer]:
+def layers(card: Card, lines: list[Data]) -> Iterator[CordLayer]:
     """The layers of a *REBAR; `elements` is the set or the number of an element, as written."""
     element = card.options.get("ELEMENT", "").upper()
     geometry = option(card, "GEOMETRY").upper() or "ISOPARAMETRIC"
@@ -94,14 +94,14 @@ def layers(card: Card, lines: list[Data]) -> Iterator[Layer]:
 
 def _layer(
     card: Card, of: str, area: float, spacing: float, given: dict[str, float], place: Place
-) -> Layer:
+) -> CordLayer:
     name, edge = card.options.get("NAME", "REBAR").upper(), given.get("edge", 0.0)
     if area <= 0 or spacing <= 0:
         raise place.error(f"cords of layer {name}: area and spacing must be > 0")
     if "edge" in given and edge not in range(1, _SIDES + 1):
         raise place.error(f"cords of layer {name}: edge {edge:g} is not one of 1 to 4")
     angular = given.get("radius", 0.0) > 0  # as many cords at every radius
-    return Layer(
+    return CordLayer(
         name=name,
         elements=of,
         area=area,
@@ -149,7 +149,7 @@ def on_lines(deck: Deck) -> Deck:
     return build.deck(placed)
 
 
-def _ends_first(deck: Deck, block: Block) -> Block:
+def _ends_first(deck: Deck, block: CardBlock) -> CardBlock:
     """Lines of three nodes with the middle one last, wherever the type has it."""
     if block.kind.role == "solid" or (block.kind.dimension, block.kind.nodes) != (2, 3):
         return block
@@ -184,7 +184,7 @@ class _Lines:
                 for label in self._labels(layer.elements, layer).tolist():
                     self._cuts[layer.line, label] = layer.cut
 
-    def placed(self, layer: Layer) -> Layer:
+    def placed(self, layer: CordLayer) -> CordLayer:
         """The layer on membranes."""
         whole = layer.line or layer.elements
         labels = self._labels(whole, layer)
@@ -203,7 +203,7 @@ class _Lines:
         line = names[layer.line] if layer.line else ""
         return replace(layer, elements=names[layer.elements], line=line, position=0.0, cut=None)
 
-    def _labels(self, name: str, layer: Layer) -> np.ndarray:
+    def _labels(self, name: str, layer: CordLayer) -> np.ndarray:
         return self._deck.element_sets.labels(name, layer.place)
 
     def _shift(self, number: int) -> int:
@@ -211,7 +211,7 @@ class _Lines:
         every = [int(block.labels.max(initial=0)) for block in self._deck.blocks]
         return number * SCOPE * (1 + max(every, default=0) // SCOPE)
 
-    def _new(self, layer: Layer, labels: np.ndarray, number: int) -> list[_Line]:
+    def _new(self, layer: CordLayer, labels: np.ndarray, number: int) -> list[_Line]:
         """The membranes of a layer, from the elements of its line."""
         found = []
         for block in self._deck.blocks:
@@ -244,7 +244,7 @@ class _Lines:
             )
         return found
 
-    def deck(self, layers: tuple[Layer, ...]) -> Deck:
+    def deck(self, layers: tuple[CordLayer, ...]) -> Deck:
         """The deck with all of them."""
         old, carry = self._deck, np.concatenate([np.empty(0, np.int64), *self._bare])
         blocks = []
@@ -266,9 +266,9 @@ class _Lines:
             element_sets=Sets(old.element_sets.sort, self._members, known),
         )
 
-    def _nodes(self) -> tuple[list[Block], np.ndarray, np.ndarray]:
+    def _nodes(self) -> tuple[list[CardBlock], np.ndarray, np.ndarray]:
         """Blocks of the new membranes, and labels and points of their nodes; where they meet, one node."""
-        blocks: list[Block] = []
+        blocks: list[CardBlock] = []
         labels, points = [np.empty(0, np.int64)], [np.empty((0, 3))]
         size = np.ptp(self._deck.points, axis=0).max() if len(self._deck.points) else 1.0
         every = self._deck.labels
@@ -278,7 +278,7 @@ class _Lines:
             count = line.points.shape[1]
             nodes = first + 1 + row.reshape(-1, count)
             name = {2: "SFMGAX1", 3: "SFMGAX2"}.get(count, f"SFM3D{count}")
-            blocks.append(Block(name, used_kind(name), line.labels, nodes, line.place))
+            blocks.append(CardBlock(name, used_kind(name), line.labels, nodes, line.place))
             labels.append(first + 1 + np.arange(len(at)))
             points.append(at)
             first += SCOPE

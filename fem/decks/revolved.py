@@ -22,7 +22,16 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tireroad.fem.decks.deck import SCOPE, Block, Deck, Kind, Layer, Members, Sets, used_kind
+from tireroad.fem.decks.deck import (
+    SCOPE,
+    CardBlock,
+    CordLayer,
+    Deck,
+    ElementShape,
+    Members,
+    Sets,
+    used_kind,
+)
 from tireroad.fem.errors import InputError
 
 _SAME = 1e-6  # of the body's size (positions) or of a radian (angles): tolerance for equality
@@ -87,7 +96,7 @@ def _clusters(values: np.ndarray, small: float) -> np.ndarray:
     return out
 
 
-def meridian_layers(deck: Deck, senses: dict[int, int], rings: Rings) -> tuple[Layer, ...]:
+def meridian_layers(deck: Deck, senses: dict[int, int], rings: Rings) -> tuple[CordLayer, ...]:
     """The layers with angles from the meridian, for lines that run to larger axial coordinates.
 
     `senses` is s for each membrane. Raises InputError for systems that vary around the axle.
@@ -95,7 +104,7 @@ def meridian_layers(deck: Deck, senses: dict[int, int], rings: Rings) -> tuple[L
     return tuple(_layer(deck, layer, senses, rings) for layer in deck.layers)
 
 
-def _layer(deck: Deck, layer: Layer, senses: dict[int, int], rings: Rings) -> Layer:
+def _layer(deck: Deck, layer: CordLayer, senses: dict[int, int], rings: Rings) -> CordLayer:
     labels = deck.element_sets.labels(layer.elements, layer.place).tolist()
     found = {senses[label] for label in labels if label in senses}
     if not found:
@@ -121,7 +130,7 @@ def _layer(deck: Deck, layer: Layer, senses: dict[int, int], rings: Rings) -> La
     return replace(layer, angle=float(np.degrees(angle)))
 
 
-def _runs_around(deck: Deck, layer: Layer, rings: Rings) -> bool:
+def _runs_around(deck: Deck, layer: CordLayer, rings: Rings) -> bool:
     """Whether the edge to which a layer's cords are parallel runs around the axle, not along the meridian."""
     labels = deck.element_sets.labels(layer.elements, layer.place)
     found: set[bool] = set()
@@ -139,7 +148,7 @@ def _runs_around(deck: Deck, layer: Layer, rings: Rings) -> bool:
     return found.pop()
 
 
-def _from_circumference(deck: Deck, layer: Layer, axis: int) -> int:
+def _from_circumference(deck: Deck, layer: CordLayer, axis: int) -> int:
     """0: angle from the meridian; 1 or -1: cylindrical system, axis along or against the axle."""
     if not layer.orientation:
         if axis == 0:
@@ -218,7 +227,7 @@ def reduced(deck: Deck) -> tuple[Deck, np.ndarray | None]:
     return flat, rings.angles
 
 
-def _positive(deck: Deck, block: Block, rows: np.ndarray) -> None:
+def _positive(deck: Deck, block: CardBlock, rows: np.ndarray) -> None:
     """Check that the corner at the first node of every solid has a positive volume."""
     third, up = (3, 4) if block.kind.corners == 8 else (2, 3)
     at = deck.points[rows]
@@ -231,7 +240,7 @@ def _positive(deck: Deck, block: Block, rows: np.ndarray) -> None:
         )
 
 
-def _sections(deck: Deck, block: Block, rows: np.ndarray, section: _Section) -> list[Block]:
+def _sections(deck: Deck, block: CardBlock, rows: np.ndarray, section: _Section) -> list[CardBlock]:
     """Section cells of a block: the meridian face of each solid, listed once."""
     shape, rings = block.kind, section.rings
     every = rings.ring[deck.rows(block.nodes, block.place)]
@@ -251,7 +260,7 @@ def _sections(deck: Deck, block: Block, rows: np.ndarray, section: _Section) -> 
     made = []
     for size, those in cells.items():
         own, corners = np.array([c[0] for c in those]), np.array([c[1] for c in those]) + 1
-        made.append(Block(f"CGAX{size}", used_kind(f"CGAX{size}"), own, corners, block.place))
+        made.append(CardBlock(f"CGAX{size}", used_kind(f"CGAX{size}"), own, corners, block.place))
     return made
 
 
@@ -267,7 +276,7 @@ def _cell(ring: np.ndarray, face: tuple, middle: dict, rings: Rings) -> list[int
 
 
 def _meridian_faces(
-    rings: Rings, faces: Sequence[tuple[int, ...]], rows: np.ndarray, block: Block
+    rings: Rings, faces: Sequence[tuple[int, ...]], rows: np.ndarray, block: CardBlock
 ) -> np.ndarray:
     """For each solid the index of its first face with one angle and distinct rings."""
     found = np.full(len(rows), -1)
@@ -286,7 +295,7 @@ def _meridian_faces(
     return found
 
 
-def _middles(shape: Kind) -> dict[frozenset, int]:
+def _middles(shape: ElementShape) -> dict[frozenset, int]:
     """Local mid-edge node between two corners of quadratic solids, in Abaqus's order."""
     if shape.nodes in (6, 8):
         return {}
@@ -308,7 +317,7 @@ def _same_all_round(section: _Section, deck: Deck) -> None:
         )
 
 
-def _membranes(deck: Deck, section: _Section) -> tuple[list[Block], dict]:
+def _membranes(deck: Deck, section: _Section) -> tuple[list[CardBlock], dict]:
     """Membranes as lines of the section, directed towards larger axial coordinates.
 
     Also, for each label, whether its normal x that direction points to growing angles (+1) or not
@@ -339,7 +348,7 @@ def _membranes(deck: Deck, section: _Section) -> tuple[list[Block], dict]:
             senses[label] = _sense(deck.points[rows[:4]], rings, rows[:4], ends)
         if labels:
             blocks.append(
-                Block(
+                CardBlock(
                     "SFMGAX1", used_kind("SFMGAX1"), np.array(labels), np.array(nodes), block.place
                 )
             )

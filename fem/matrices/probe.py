@@ -7,7 +7,7 @@ from scipy import sparse
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections.mesh2d import line
-from tireroad.fem.tire.mesh import Lattice
+from tireroad.fem.tire.mesh import NodeGrid
 
 _POINTS = 6  # Gauss points per direction in each element under a distributed load
 
@@ -32,7 +32,7 @@ _STEP = 1e-5  # step of the difference quotient, as a fraction of an element
 
 
 def spot(
-    lattice: Lattice, ring: float, arc: float, spread: tuple[float, float] = (0.0, 0.0)
+    lattice: NodeGrid, ring: float, arc: float, spread: tuple[float, float] = (0.0, 0.0)
 ) -> np.ndarray:
     """Weights (s,) of the outer-face nodes for a point load, or a uniform traction of total 1.
 
@@ -57,7 +57,7 @@ def spot(
     return np.outer(shape_ring[:-1], shape_arc).ravel()
 
 
-def _area(lattice: Lattice, arc: np.ndarray) -> np.ndarray:
+def _area(lattice: NodeGrid, arc: np.ndarray) -> np.ndarray:
     """Undeformed outer area per ring and section angle, m2/rad2, at section angles (k,)."""
     element, local = _local(lattice.arc_corners, arc)
     low, high = np.clip(local - _STEP, 0, 1), np.clip(local + _STEP, 0, 1)

@@ -144,7 +144,10 @@ def carried_pencil(
     """
     mass = np.zeros((7, 7))
     mass[:6, :6], mass[6, 6] = whole["mass"] + axle.mass, axle.body_mass or 1.0
-    drag, stiffness = axle.joined(axle.damping), axle.joined(axle.stiffness)
+    drag, stiffness = (
+        axle.between_wheel_and_body(axle.damping),
+        axle.between_wheel_and_body(axle.stiffness),
+    )
     stiffness[:6, :6] += whole["stiffness"]
     if speed:
         drag[:6, :6] += speed * (2 * whole["gyroscopic"] + axle.gyroscopic)

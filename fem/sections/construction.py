@@ -19,7 +19,7 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections import grid
-from tireroad.fem.sections.grid import Patch, PlyLine, corners, product
+from tireroad.fem.sections.grid import PlyLine, RegionPatch, corners, product
 from tireroad.fem.sections.mesh2d import SectionMesh
 from tireroad.fem.sections.ring import Ring, revolved
 
@@ -163,7 +163,9 @@ class Construction:
 
         patches = [self._patch(part) for part in self.parts]
         for number, layer in enumerate(self.layers):
-            patches.insert(number, Patch(layer.compound, ((-length, length),), self._depth(number)))
+            patches.insert(
+                number, RegionPatch(layer.compound, ((-length, length),), self._depth(number))
+            )
         plies = [self._ply(line) for line in self.cords]
         ends = [end for part in self.parts for end in part.along] + [line.to for line in self.cords]
         ends += [self.tread, self._held]
@@ -242,11 +244,11 @@ class Construction:
     def _number(self, name: str) -> int:
         return [layer.name for layer in self.layers].index(name)
 
-    def _patch(self, part: Part) -> Patch:
+    def _patch(self, part: Part) -> RegionPatch:
         low, high = part.along
         high = min(high, self.outline.length)
         arcs = ((-high, high),) if low == 0 else ((-high, -low), (low, high))
-        return Patch(part.compound, arcs, self._depth(self._number(part.layer)))
+        return RegionPatch(part.compound, arcs, self._depth(self._number(part.layer)))
 
     def _ply(self, line: CordLine) -> PlyLine:
         end = min(line.to, self.outline.length)

@@ -48,7 +48,7 @@ def size(distance: np.ndarray, length: float, count: int, floor: float) -> np.nd
 
 
 @dataclass(frozen=True)
-class Patch:
+class RegionPatch:
     """A part of a wall of another compound: signed section angles (rad) and depths, from and to.
 
     Depth as a fraction of the wall: 0 inner, 1 outer face.
@@ -74,7 +74,7 @@ def product(
     wall: np.ndarray,
     arc: np.ndarray,
     place: Callable[[np.ndarray, np.ndarray], np.ndarray],
-    patches: Sequence[Patch] = (),
+    patches: Sequence[RegionPatch] = (),
     plies: Sequence[PlyLine] = (),
     main: str = "wall",
 ) -> SectionMesh:
@@ -131,7 +131,7 @@ def _nodes(
     return position(owner, xi, eta)
 
 
-def _regions(depth: np.ndarray, angle: np.ndarray, patches: Sequence[Patch]) -> np.ndarray:
+def _regions(depth: np.ndarray, angle: np.ndarray, patches: Sequence[RegionPatch]) -> np.ndarray:
     """Number of the last patch that contains each cell, from 1; 0: none."""
     owner = np.zeros(len(depth), int)
     for number, patch in enumerate(patches):

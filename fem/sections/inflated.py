@@ -71,7 +71,7 @@ class Rule:
         return out.reshape(*self.radius.shape, 9, -1)
 
 
-class Line:
+class CordElements:
     """Cords on a chain of edges: F a at each Gauss point, with the cord's direction a."""
 
     def __init__(self, section: SectionMesh, edges: np.ndarray, cords: CordLine, points: int):
@@ -115,7 +115,7 @@ class Line:
         return along, tension, geometric * (_UNIT - outer) + stiffness[..., None] * outer
 
 
-class Face:
+class InnerFace:
     """The deformed inner face: x_s, x_theta, and the force of a unit pressure."""
 
     def __init__(self, section: SectionMesh, displacement: np.ndarray):
@@ -161,7 +161,7 @@ def dofs(nodes: np.ndarray) -> np.ndarray:
     return (3 * nodes[:, :, None] + np.arange(3)).reshape(len(nodes), -1)
 
 
-class Wall(Protocol):
+class LayeredSection(Protocol):
     """What a ring is made of, as a Construction."""
 
     @property
@@ -208,7 +208,9 @@ class InflatedRing:
     Fields have components (r, theta, y) per node.
     """
 
-    def __init__(self, tire: Wall, elements: int, order: int, pressure: float, speed: float = 0.0):
+    def __init__(
+        self, tire: LayeredSection, elements: int, order: int, pressure: float, speed: float = 0.0
+    ):
         self.section = mesh = tire.section(elements, order)
         self.pressure, self.speed = pressure, speed
         rubber = [tire.compounds[name] for name in mesh.regions]
@@ -414,7 +416,7 @@ class InflatedRing:
         blocks = np.einsum("qa,qb,cq,c->cab", rule.N, rule.N, rule.volume, self._density)
         out = self._assembled(self.section.cells, _each_component(blocks))
         for cords, edges in self._cords:
-            line = Line(self.section, edges, cords, self.section.order + 1)
+            line = CordElements(self.section, edges, cords, self.section.order + 1)
             heavy = cords.density * cords.area / cords.spacing * line.area
             blocks = np.einsum("qa,qb,cq->cab", line.N, line.N, heavy)
             out = out + self._assembled(line.nodes, _each_component(blocks))
@@ -428,11 +430,11 @@ class InflatedRing:
             force = np.einsum("cqhd,cqh,cq->cd", G, _flat(stress(F)), rule.volume)
             np.add.at(out, own, force)
         for cords, edges in self._cords:
-            line = Line(self.section, edges, cords, self.section.order)
+            line = CordElements(self.section, edges, cords, self.section.order)
             along, tension, _ = line.state(u)
             force = np.einsum("cqkd,cqk,cq->cd", line.stretch(0), tension * along, line.area)
             np.add.at(out, dofs(line.nodes), force)
-        face = Face(self.section, u)
+        face = InnerFace(self.section, u)
         np.add.at(out, dofs(face.nodes), pressure * face.force())
         return out
 
@@ -460,7 +462,7 @@ class InflatedRing:
 
     def _tangent(self, wave: int, pressure: float, dynamic: bool = False) -> sparse.csr_matrix:
         """Of the present state; `dynamic`: of small motions about the inflated one."""
-        face, u = Face(self.section, self.displacement), self.displacement
+        face, u = InnerFace(self.section, self.displacement), self.displacement
         if dynamic:
             excess = (self._dynamic - 1)[:, None, None, None]
             moduli = [A + excess * own for A, own in self._moduli]
@@ -468,7 +470,7 @@ class InflatedRing:
             moduli = [A for A, _ in self._strained()]
         out = self._wall(wave, moduli) + pressure * self._assembled(face.nodes, face.tangent(wave))
         for cords, edges in self._cords:
-            line = Line(self.section, edges, cords, self.section.order)
+            line = CordElements(self.section, edges, cords, self.section.order)
             _, _, B = line.state(u)
             Z = line.stretch(wave)
             blocks = np.einsum("cqki,cqkm,cqmj,cq->cij", Z.conj(), B, Z, line.area, optimize=True)

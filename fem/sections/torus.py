@@ -11,7 +11,7 @@ import numpy as np
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Limits, ParameterError, finite, whole
 from tireroad.fem.sections import grid
-from tireroad.fem.sections.grid import Patch, PlyLine, corners, product
+from tireroad.fem.sections.grid import PlyLine, RegionPatch, corners, product
 from tireroad.fem.sections.mesh2d import SectionMesh
 from tireroad.fem.sections.ring import ARC_NEAR, SIZE, Ring, near_road, ring_corners
 
@@ -105,7 +105,9 @@ class Torus:
         floor = grid.LEAST * self.thickness / self.minor_radius / self.elements_arc
         return near * grid.size(edge, length, self.elements_arc, floor)
 
-    def section(self, patches: Sequence[Patch] = (), plies: Sequence[PlyLine] = ()) -> SectionMesh:
+    def section(
+        self, patches: Sequence[RegionPatch] = (), plies: Sequence[PlyLine] = ()
+    ) -> SectionMesh:
         """The section mesh, with edges exactly on the boundaries of patches and on plies."""
         wall, arc = self.lines(patches, plies)
         return product(
@@ -113,7 +115,7 @@ class Torus:
         )
 
     def lines(
-        self, patches: Sequence[Patch], plies: Sequence[PlyLine]
+        self, patches: Sequence[RegionPatch], plies: Sequence[PlyLine]
     ) -> tuple[np.ndarray, np.ndarray]:
         """Corners through the wall, as fractions of it, and along the arc, rad."""
         arcs = [end for patch in patches for arc in patch.arcs for end in arc]
@@ -127,7 +129,7 @@ class Torus:
         wall = corners(self.elements_thickness, np.ones_like, 0.0, 1.0, depths)
         return wall, self.arc_corners(arcs, ends)
 
-    def ring(self, patches: Sequence[Patch] = (), plies: Sequence[PlyLine] = ()) -> Ring:
+    def ring(self, patches: Sequence[RegionPatch] = (), plies: Sequence[PlyLine] = ()) -> Ring:
         """The ring of elements, with edges exactly on the boundaries of patches and on plies."""
 
         def coarser() -> Ring | None:

@@ -37,9 +37,15 @@ from petsc4py import PETSc
 from tireroad.fem import compat
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.static.checkpoint import Entry, Journal
-from tireroad.fem.static.road import FLAT, Road, RoadShape, Unrolled
+from tireroad.fem.static.road import FLAT, RoadContact, RoadCoordinates, RoadShape
 from tireroad.fem.static.shape_damping import ShapeDamping
-from tireroad.fem.static.tangent import HeldSystem, LinearContact, Moved, System, held_step
+from tireroad.fem.static.tangent import (
+    ConstrainedSystem,
+    LinearContact,
+    PrescribedMotion,
+    System,
+    held_step,
+)
 from tireroad.fem.static.virtual_work import (
     AT_REST,
     Rolling,
@@ -54,7 +60,7 @@ from tireroad.fem.tire.body import Body
 _ROAD = "active", "force", "height"
 
 
-class History:
+class SolutionHistory:
     """Solutions of the equilibrium problems of one stage, in order; none without a `journal`."""
 
     def __init__(self, journal: Journal | None) -> None:
@@ -65,7 +71,7 @@ class History:
         last = {int(entry["problem"]): k for k, entry in enumerate(found)}
         self._again = set(last.values())
 
-    def solve(self, problem: Equilibrium, solve: Callable[[], Step]) -> Step:
+    def solve(self, problem: Equilibrium, solve: Callable[[], SolveOutcome]) -> SolveOutcome:
         """Result of `solve()`, with body and road left as it leaves them. Collective."""
         if self._journal is None:
             return solve()
@@ -127,15 +133,15 @@ def _put(problem: Equilibrium, entry: Entry, when: str) -> None:
     problem.road.put_back((active.copy(), force.copy(), float(height)))
 
 
-def _step(step: Step) -> dict[str, np.ndarray]:
+def _step(step: SolveOutcome) -> dict[str, np.ndarray]:
     counted = np.array([step.converged, step.iterations, step.residual], dtype=float)
     return {"step": counted, "reason": np.frombuffer(step.reason.encode(), np.uint8)}
 
 
-def _read(entry: Entry) -> Step:
+def _read(entry: Entry) -> SolveOutcome:
     converged, iterations, residual = entry["step"]
     reason = bytes(entry["reason"]).decode()
-    return Step(bool(converged), int(iterations), float(residual), reason)
+    return SolveOutcome(bool(converged), int(iterations), float(residual), reason)
 
 
 class Drag:
@@ -165,7 +171,7 @@ class Drag:
 
 
 @dataclass(frozen=True)
-class Step:
+class SolveOutcome:
     """Outcome of one solve: `iterations` tangents, `residual` relative to the force scale."""
 
     converged: bool
@@ -212,7 +218,7 @@ class Forces:
         """Solutions of a linear problem that complete it to 1e-9: 1 with a complete tangent."""
         return 1 + math.ceil(math.log(1e-9) / math.log(self.lag)) if self.lag else 1
 
-    def lacking(self, change: np.ndarray, along: Unrolled | None) -> np.ndarray:
+    def lacking(self, change: np.ndarray, along: RoadCoordinates | None) -> np.ndarray:
         """Forces (N) of a `change` (m) that the tangent lacks, both in the road's coordinates
         `along` or the wheel's axes. Collective."""
         if not (self._damping and self.lag):
@@ -268,26 +274,26 @@ class Equilibrium(Forces):
         self.road_height: float | None = None
         self.shape = shape
         self.road = self._make_road()
-        self._unrolled = None if shape.flat else Unrolled(body, self.road)
+        self._unrolled = None if shape.flat else RoadCoordinates(body, self.road)
         self.force_scale = self._yardsticks()
         self._damped = bool(rolling.speed * (rolling.damping + rolling.stiffness_damping))
         self._system = self._make_system("lu" if self._damped else "cholesky")
         self._contact: LinearContact | None = None
         self._solved = body.u.x.array.copy()
-        self.history = History(None)
+        self.history = SolutionHistory(None)
 
-    def _make_road(self) -> Road:
-        return Road(self.body, self.shape)
+    def _make_road(self) -> RoadContact:
+        return RoadContact(self.body, self.shape)
 
     def _make_system(self, kind: str) -> System:
-        return HeldSystem(self.body.comm, self.matrix, kind, self.cost)
+        return ConstrainedSystem(self.body.comm, self.matrix, kind, self.cost)
 
     def _make_contact(self) -> LinearContact | None:
         """Solver for the active set within a step; None if the road is not flat."""
         return LinearContact(self.body.comm, self._system, self.road) if self.shape.flat else None
 
     @property
-    def _in_its_coordinates(self) -> Unrolled | None:
+    def _in_its_coordinates(self) -> RoadCoordinates | None:
         """Coordinates in which Newton's method currently works; None: the wheel's axes."""
         return self._unrolled if self.road.height > -np.inf else None
 
@@ -305,11 +311,11 @@ class Equilibrium(Forces):
 
     def solve(
         self, road_height: float | None = None, load: float | None = None, allowed: float = 0.0
-    ) -> Step:
+    ) -> SolveOutcome:
         """`_solve`, or its result from the `history` of an interrupted computation. Collective."""
         return self.history.solve(self, partial(self._solve, road_height, load, allowed))
 
-    def _solve(self, road_height: float | None, load: float | None, allowed: float) -> Step:
+    def _solve(self, road_height: float | None, load: float | None, allowed: float) -> SolveOutcome:
         """Equilibrium with the road at the given height (m), or without a road (None). Collective.
 
         With a `load` (N) the road moves from that height until it carries it. `allowed` N of
@@ -328,21 +334,21 @@ class Equilibrium(Forces):
             error = self._error(load)
             reason = self._stopped(error, changed, tangents, allowed / self.force_scale)
             if reason == "converged":
-                return self.solved(Step(True, tangents, error, reason))
-            closing = None
+                return self.solved(SolveOutcome(True, tangents, error, reason))
+            gap_closure = None
             changed = changed or bool(self._contact and self._contact.changed)
             if not reason and (changed or not error < max(_SERVES, self.lag) * last):
                 tangents += 1
                 reason = "" if self._take_tangent() else "the tangent is singular"
-                closing = self._system.closing
-            reason = reason or self._move(closing, load)
+                gap_closure = self._system.gap_closure
+            reason = reason or self._move(gap_closure, load)
             if reason:
                 break
         field.array[:] = kept[0]
         self.road.put_back(kept[1])
-        return self.solved(Step(False, tangents, error, reason))
+        return self.solved(SolveOutcome(False, tangents, error, reason))
 
-    def solved(self, step: Step) -> Step:
+    def solved(self, step: SolveOutcome) -> SolveOutcome:
         """Record the outcome: the body is in the state found, or restored if there is none."""
         if step.converged:
             self._solved = self.body.u.x.array.copy()
@@ -403,9 +409,11 @@ class Equilibrium(Forces):
         self._contact = self._make_contact() if taken else None
         return taken
 
-    def _move(self, closing: Moved | None, load: float | None, rise: float | None = None) -> str:
+    def _move(
+        self, gap_closure: PrescribedMotion | None, load: float | None, rise: float | None = None
+    ) -> str:
         """One linearised step; the road may `rise` (m). Reason for failure, or "". Collective."""
-        given = self.road.rows(self._work.array_r.copy()), closing, load
+        given = self.road.rows(self._work.array_r.copy()), gap_closure, load
         if self._contact is None or self.road.height == -np.inf:
             step = held_step(self.body.comm, self._system, self.road, given)
         else:
@@ -425,9 +433,9 @@ class Equilibrium(Forces):
         self._before.x.array[:] = self.body.u.x.array
         if not self._take_tangent():
             return float("nan")
-        raising, lacking = self._system.raising, np.zeros(len(self._work.array_r))
+        road_rise, lacking = self._system.road_rise, np.zeros(len(self._work.array_r))
         for _ in range(self.rounds):
-            change, force = self._system.solve(-lacking, raising)
+            change, force = self._system.solve(-lacking, road_rise)
             force += lacking[self.road.held]
             lacking = self.lacking(change, self._in_its_coordinates)
         return self.body.comm.allreduce(self.road.upward(force))
@@ -459,7 +467,9 @@ class Equilibrium(Forces):
         """Vertical road force (nodes,) N on the owned nodes, not negative. Not collective."""
         return self.road.at_nodes()
 
-    def resume(self, displacement: np.ndarray, force: np.ndarray, height: float | None) -> Step:
+    def resume(
+        self, displacement: np.ndarray, force: np.ndarray, height: float | None
+    ) -> SolveOutcome:
         """Solve from displacement (n, 3) m and road force (n,) N of all lattice nodes, road at
         `height` (m). A state already in equilibrium stays unchanged. Collective."""
         self.body.set_displacement(displacement)

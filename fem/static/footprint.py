@@ -12,7 +12,7 @@ from scipy import sparse
 from scipy.interpolate import LinearNDInterpolator
 
 from tireroad.fem.matrices.probe import line_shape
-from tireroad.fem.tire.mesh import Lattice
+from tireroad.fem.tire.mesh import NodeGrid
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Footprint:
         return load / self.area if self.area else 0.0
 
 
-def nodal_area(lattice: Lattice, positions: np.ndarray) -> np.ndarray:
+def nodal_area(lattice: NodeGrid, positions: np.ndarray) -> np.ndarray:
     """Horizontal area (s,) m2 associated with each node of the deformed outer face (s, 3).
 
     Row sums of the surface mass matrix by the Lobatto rule of the nodes. They are positive for
@@ -241,7 +241,7 @@ _CLOSE_ANGLE = 1e-9  # rad; at a lowest point the height error is its square tim
 class TreadSurface:
     """The outer face of a lattice with its nodes at `positions` (s, 3) m. Not collective."""
 
-    def __init__(self, lattice: Lattice, positions: np.ndarray) -> None:
+    def __init__(self, lattice: NodeGrid, positions: np.ndarray) -> None:
         self._lattice, self._positions = lattice, positions
         self._shape = lattice.face_shape
         self._located: dict[bytes, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}

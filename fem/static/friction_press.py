@@ -1,6 +1,6 @@
 """Pressing a tire on a road with friction: the system, the balance, steps of sliding.
 
-The linearised equilibrium of a tire with stick and slip: the counterpart of `HeldSystem`.
+The linearised equilibrium of a tire with stick and slip: the counterpart of `ConstrainedSystem`.
 
     (L K + S) P dv = L (- out) - springs,     du = P dv:
 
@@ -38,11 +38,11 @@ from scipy.optimize import root_scalar
 
 from tireroad.fem.collective import from_local_rows
 from tireroad.fem.errors import ConvergenceError, InputError, LoadingStopped
-from tireroad.fem.static.equilibrium import Equilibrium, Step
-from tireroad.fem.static.friction_road import Passing, RubbingRoad, Sliding, Standing
-from tireroad.fem.static.load_steps import Loader, Show, march
+from tireroad.fem.static.equilibrium import Equilibrium, SolveOutcome
+from tireroad.fem.static.friction_road import Passing, RubbingRoad, Sliding, StandingFriction
+from tireroad.fem.static.load_steps import LoadStepper, Show, march
 from tireroad.fem.static.state import StaticState, static_state
-from tireroad.fem.static.tangent import HeldSystem, Moved
+from tireroad.fem.static.tangent import ConstrainedSystem, PrescribedMotion
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.timing import Timing
 from tireroad.fem.tire.body import Body
@@ -55,29 +55,29 @@ class RubbingSystem:
 
     def __init__(self, comm: MPI.Comm, matrix: PETSc.Mat, timing: Timing, road: RubbingRoad):
         self._comm, self._timing, self._road = comm, timing, road
-        self._inner = HeldSystem(comm, matrix, "lu", timing)
+        self._inner = ConstrainedSystem(comm, matrix, "lu", timing)
         self._carried: PETSc.Mat | None = None
 
     @property
-    def closing(self) -> Moved:
-        """As in HeldSystem, in dv."""
-        return self._inner.closing
+    def gap_closure(self) -> PrescribedMotion:
+        """As in ConstrainedSystem, in dv."""
+        return self._inner.gap_closure
 
     @property
-    def raising(self) -> Moved:
-        """As in HeldSystem, in dv."""
-        return self._inner.raising
+    def road_rise(self) -> PrescribedMotion:
+        """As in ConstrainedSystem, in dv."""
+        return self._inner.road_rise
 
-    def take(self, matrix: PETSc.Mat, held: Array, closing: Array, raising: Array) -> bool:
+    def take(self, matrix: PETSc.Mat, held: Array, gap_closure: Array, road_rise: Array) -> bool:
         """Factorise; `matrix` must not be used afterwards."""
         with self._timing("road"):
             system = self._joined(matrix)
-        found = self._inner.take(system, held, closing, raising)
+        found = self._inner.take(system, held, gap_closure, road_rise)
         if system is not matrix:
             system.destroy()
         return found
 
-    def solve(self, right: Array, moved: Moved | None = None) -> tuple[Array, Array]:
+    def solve(self, right: Array, moved: PrescribedMotion | None = None) -> tuple[Array, Array]:
         """du (m) of the owned dofs, forces (N) at held ones; `right` already includes L."""
         change, force = self._inner.solve(right, moved)
         if self._carried is None:
@@ -169,7 +169,7 @@ class RubbingEquilibrium(Equilibrium):
 
     def solve(
         self, road_height: float | None = None, load: float | None = None, allowed: float = 0.0
-    ) -> Step:
+    ) -> SolveOutcome:
         """As without friction."""
         self.road.search()
         return super().solve(road_height, load, allowed)
@@ -182,7 +182,7 @@ class RubbingEquilibrium(Equilibrium):
         field = self.body.u.x
         kept, self._before.x.array[:] = (field.array.copy(), self.road.kept()), field.array
         self._out()
-        if not self._take_tangent() or self._move(self._system.closing, load):
+        if not self._take_tangent() or self._move(self._system.gap_closure, load):
             raise ConvergenceError("static: the tangent of a state with friction is singular")
         for _ in range(1, self.rounds):  # what an incomplete tangent left
             self._out()
@@ -224,7 +224,7 @@ class Slide:
         sliding = (
             Passing(body, state.travel, shape=state.road)
             if state.travel is not None
-            else Standing(body, state.road)
+            else StandingFriction(body, state.road)
         )
         self._sliding, self.rolls = sliding, rolls
         body.u.x.array[:] = 0.0  # the force scale is that of the undeformed body
@@ -279,7 +279,7 @@ class Slide:
     def _to(self, end: float, start: float, put: Callable[[float], None]) -> None:
         at, begins = start, True
 
-        def attempt(target: float) -> Step:
+        def attempt(target: float) -> SolveOutcome:
             """Each part starts from the last stick and slip; new contacts have slid since then."""
             nonlocal at, begins
             if begins:
@@ -343,8 +343,8 @@ class Friction:
 
 
 def with_friction(
-    loader: Loader, inflated: np.ndarray, load: float | None, friction: Friction
-) -> Loader:
+    loader: LoadStepper, inflated: np.ndarray, load: float | None, friction: Friction
+) -> LoadStepper:
     """The `loader`'s state on the road, with friction. Collective.
 
     `inflated`: `u` of the body before it met the road; `load` (N) of the road along its normal
@@ -359,27 +359,27 @@ def with_friction(
 
 
 def _on(
-    loader: Loader, sliding: Standing | Passing, friction: Friction
-) -> tuple[Loader, RubbingEquilibrium]:
+    loader: LoadStepper, sliding: StandingFriction | Passing, friction: Friction
+) -> tuple[LoadStepper, RubbingEquilibrium]:
     old = loader.equilibrium
     equilibrium = RubbingEquilibrium(loader.body, old.rolling, friction.coefficient, sliding)
     equilibrium.pressure.value = float(old.pressure.value)
-    other = Loader(equilibrium, loader.report)
+    other = LoadStepper(equilibrium, loader.report)
     other.begin_at(loader)
     return other, equilibrium
 
 
 def _pressed(
-    loader: Loader, inflated: np.ndarray, load: float | None, friction: Friction
-) -> Loader:
+    loader: LoadStepper, inflated: np.ndarray, load: float | None, friction: Friction
+) -> LoadStepper:
     """Standing: each step slips relative to the last one; the last one carries the load."""
     deflection, body = loader.deflection, loader.body
     body.u.x.array[:] = inflated
-    sliding = Standing(body, loader.equilibrium.shape)
+    sliding = StandingFriction(body, loader.equilibrium.shape)
     rubbing, _ = _on(loader, sliding, friction)
     size, done = deflection / friction.steps, 0.0
 
-    def attempt(reached: float) -> Step:
+    def attempt(reached: float) -> SolveOutcome:
         return rubbing.equilibrium.solve(rubbing.touch + reached)
 
     for number in range(1, friction.steps + 1):
@@ -392,7 +392,7 @@ def _pressed(
     return rubbing
 
 
-def _rolling(loader: Loader, load: float | None, friction: Friction) -> Loader:
+def _rolling(loader: LoadStepper, load: float | None, friction: Friction) -> LoadStepper:
     radius = friction.radius
     if radius is None:
         radius = static_state(loader.equilibrium, loader.touch).rolling_radius()
@@ -403,7 +403,7 @@ def _rolling(loader: Loader, load: float | None, friction: Friction) -> Loader:
     assert height is not None, "there is no road"
     road.take(force, height)
 
-    def attempt(friction_so_far: float) -> Step:
+    def attempt(friction_so_far: float) -> SolveOutcome:
         road.friction = friction_so_far
         return problem.solve(problem.road_height or height, load)
 
@@ -417,7 +417,7 @@ def _rolling(loader: Loader, load: float | None, friction: Friction) -> Loader:
         sliding.radius = _free(drag, radius, rubbing.load())
     if any(friction.slip):
 
-        def slide(part: float) -> Step:
+        def slide(part: float) -> SolveOutcome:
             sliding.slip = part * friction.slip[0], part * friction.slip[1]
             return problem.solve(problem.road_height, load)
 
@@ -426,7 +426,9 @@ def _rolling(loader: Loader, load: float | None, friction: Friction) -> Loader:
     return rubbing
 
 
-def _march(rubbing: Loader, attempt: Callable[[float], Step], end: float, show: Show) -> None:
+def _march(
+    rubbing: LoadStepper, attempt: Callable[[float], SolveOutcome], end: float, show: Show
+) -> None:
     """From zero to `end` at once, or in as many steps as needed. Collective."""
     try:
         rubbing.march(attempt, end, end, show)
@@ -449,7 +451,7 @@ def _free(drag: Callable[[float], float], radius: float, load: float) -> float:
     return float(found.root)
 
 
-def _checked(rubbing: Loader, step: Step) -> None:
+def _checked(rubbing: LoadStepper, step: SolveOutcome) -> None:
     rubbing.newton_steps += step.iterations
     if not step.converged:
         raise ConvergenceError(

@@ -49,7 +49,7 @@ from typing import Any, Protocol
 import numpy as np
 from mpi4py import MPI
 
-from tireroad.fem.static.road import FLAT, Road, RoadShape
+from tireroad.fem.static.road import FLAT, RoadContact, RoadShape
 from tireroad.fem.tire.body import Body
 
 Array = np.ndarray
@@ -81,7 +81,7 @@ class Sliding(Protocol):
         ...
 
 
-class Standing:
+class StandingFriction:
     """Slip under a standing tire; `place` (2,) m: position of the road, along and across."""
 
     def __init__(self, body: Body, shape: RoadShape = FLAT) -> None:
@@ -190,8 +190,8 @@ _ROUNDING, _BRINK = 1e-9, 1e-7  # of a node's friction bound
 _STIFFEST = 1e3
 
 
-class RubbingRoad(Road):
-    """`Road` with friction: `pull` (n, 2) N along and across the road; `sticks` (n,) bool."""
+class RubbingRoad(RoadContact):
+    """`RoadContact` with friction: `pull` (n, 2) N along and across the road; `sticks` (n,) bool."""
 
     def __init__(self, body: Body, friction: float, sliding: Sliding) -> None:
         super().__init__(body, sliding.shape)

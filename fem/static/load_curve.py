@@ -9,7 +9,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from tireroad.fem.static.footprint import Footprint
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.state import static_state
 
 
@@ -35,7 +35,7 @@ class CurvePoint:
         return self.footprint.pressure(self.load)
 
 
-def load_curve(loader: Loader, deflections: Sequence[float]) -> list[CurvePoint]:
+def load_curve(loader: LoadStepper, deflections: Sequence[float]) -> list[CurvePoint]:
     """States at ascending deflections (m) of an inflated tire. Collective.
 
     Each step starts from a linear extrapolation of the two previous states. Raises ConvergenceError
@@ -55,7 +55,7 @@ def slopes(deflection: np.ndarray, load: np.ndarray, at: np.ndarray) -> np.ndarr
     return CubicSpline(x, y)(at, 1)
 
 
-def _point(loader: Loader, deflection: float) -> CurvePoint:
+def _point(loader: LoadStepper, deflection: float) -> CurvePoint:
     state = static_state(loader.equilibrium, loader.touch)
     return CurvePoint(
         deflection,

@@ -31,12 +31,12 @@ from tireroad.fem.sections.ring import Ring
 from tireroad.fem.sections.split import interpolation, locate, split_ring
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.footprint import Footprint, footprint, nodal_area
-from tireroad.fem.static.load_steps import Loader, balance_near, cords_strained
+from tireroad.fem.static.load_steps import LoadStepper, balance_near, cords_strained
 from tireroad.fem.static.state import StaticState, static_state
-from tireroad.fem.static.symmetric import HalfTurnEquilibrium, looks_the_same
+from tireroad.fem.static.symmetric import HalfModelEquilibrium, looks_the_same
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.mesh import Lattice, field_lattice
+from tireroad.fem.tire.mesh import NodeGrid, field_lattice
 
 if TYPE_CHECKING:
     from tireroad.fem.model import TireModel
@@ -60,7 +60,7 @@ def carried_over(
     return static_state(equilibrium, state.touch_height) if step.converged else None
 
 
-def sampled(lattice: Lattice, values: np.ndarray, target: Lattice) -> np.ndarray:
+def sampled(lattice: NodeGrid, values: np.ndarray, target: NodeGrid) -> np.ndarray:
     """Values (n, 3) of a lattice interpolated to another lattice of the same tire."""
     section = lattice.tire.section
     place = locate(section.nodes, section.cells, section.order, target.section)
@@ -84,7 +84,7 @@ class Balance:
     `solved`: the problem that found the state."""
 
     ring: Ring
-    lattice: Lattice
+    lattice: NodeGrid
     rolling: Rolling
     height: float
     load: float
@@ -93,7 +93,7 @@ class Balance:
     solved: Equilibrium
 
     @classmethod
-    def of(cls, loader: Loader, rolling: Rolling) -> Balance:
+    def of(cls, loader: LoadStepper, rolling: Rolling) -> Balance:
         """The present state of a loader. Collective."""
         body, whole = loader.body, loader.equilibrium
         assert whole.road_height is not None, "there is no road"
@@ -108,7 +108,7 @@ class Balance:
             solved=whole,
         )._by(loader.halved)
 
-    def _by(self, half: HalfTurnEquilibrium | None) -> Balance:
+    def _by(self, half: HalfModelEquilibrium | None) -> Balance:
         """The same state, with the half-ring problem as `solved` if that has it. Collective."""
         if half is None or not _has_all_of(half, self.lattice, self.displacement):
             return self
@@ -116,7 +116,7 @@ class Balance:
 
     def near(self, ring: Ring) -> Equilibrium:
         """The same tire's problem on another `ring` of elements, at this state. Collective."""
-        if ring is self.ring and isinstance(self.solved, HalfTurnEquilibrium):
+        if ring is self.ring and isinstance(self.solved, HalfModelEquilibrium):
             return self.solved
         return self._problem(ring, self._sampled(ring))
 
@@ -174,15 +174,15 @@ class Balance:
         other.pressure.value = float(self.solved.pressure.value)
         return other
 
-    def _half(self, ring: Ring, displacement: np.ndarray) -> HalfTurnEquilibrium | None:
+    def _half(self, ring: Ring, displacement: np.ndarray) -> HalfModelEquilibrium | None:
         """The half-ring problem, if half of the ring has the whole state; else None. Collective."""
         if not (self.solved.shape.flat and looks_the_same(ring, self.rolling)):
             return None
-        half = HalfTurnEquilibrium(self.solved.body, self.rolling, ring)
+        half = HalfModelEquilibrium(self.solved.body, self.rolling, ring)
         half.body.set_displacement(displacement)
         return half if _has_all_of(half, field_lattice(ring), displacement) else None
 
-    def _touching(self, lattice: Lattice) -> np.ndarray:
+    def _touching(self, lattice: NodeGrid) -> np.ndarray:
         """A positive force (n,) N on those nodes of another lattice that lie between loaded nodes
         of this one."""
         pressed = self.face_force > 0
@@ -202,15 +202,15 @@ def _between(line: np.ndarray, values: np.ndarray) -> np.ndarray:
     return np.stack([below, above], axis=-1)
 
 
-def _has_all_of(half: HalfTurnEquilibrium, lattice: Lattice, displacement: np.ndarray) -> bool:
+def _has_all_of(half: HalfModelEquilibrium, lattice: NodeGrid, displacement: np.ndarray) -> bool:
     """Whether half of a ring reproduces the displacement (n, 3) m of the whole. Collective."""
     off = np.abs(half.on(lattice)[0] - displacement).max()
     return bool(off < _SAME * lattice.tire.thickness)
 
 
-def _nodes(solved: Equilibrium, lattice: Lattice) -> tuple[np.ndarray, np.ndarray]:
+def _nodes(solved: Equilibrium, lattice: NodeGrid) -> tuple[np.ndarray, np.ndarray]:
     """Displacement (n, 3) m and road force (n,) N at the nodes of the whole ring. Collective."""
-    if isinstance(solved, HalfTurnEquilibrium):
+    if isinstance(solved, HalfModelEquilibrium):
         return solved.on(lattice)
     return solved.body.displacement(), solved.body.everywhere(solved.contact_force())
 
@@ -254,7 +254,7 @@ class LoadError:
         return self.relative > CANCELS * max(abs(self.footprint), abs(self.bulk))
 
 
-def load_error(loader: Loader, rolling: Rolling) -> LoadError | str:
+def load_error(loader: LoadStepper, rolling: Rolling) -> LoadError | str:
     """Estimated error of the load at the present road height, or the reason why it is unknown.
 
     The body is left unchanged. Collective.
@@ -328,7 +328,7 @@ def _spot(given: Balance) -> tuple[tuple[float, float], tuple[float, float]]:
     return (places[0], places[1]), (spreads[0], spreads[1])
 
 
-def _touched(nodes: np.ndarray, corners: np.ndarray, lattice: Lattice, closed: bool) -> np.ndarray:
+def _touched(nodes: np.ndarray, corners: np.ndarray, lattice: NodeGrid, closed: bool) -> np.ndarray:
     """Flags of intervals between corners with a marked node, and of their neighbours."""
     order, count = len(lattice.edge) - 1, len(corners) - 1
     index = order * np.arange(count)[:, None] + np.arange(order + 1)

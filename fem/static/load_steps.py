@@ -49,11 +49,11 @@ from mpi4py import MPI
 
 from tireroad.fem.errors import ConvergenceError, InputError, LoadingStopped
 from tireroad.fem.parallel import on_root
-from tireroad.fem.static.equilibrium import Drag, Equilibrium, Step
+from tireroad.fem.static.equilibrium import Drag, Equilibrium, SolveOutcome
 from tireroad.fem.static.footprint import TreadSurface
 from tireroad.fem.static.symmetric import (
-    HalfTurnEquilibrium,
-    RoundEquilibrium,
+    AxisymmetricEquilibrium,
+    HalfModelEquilibrium,
     looks_the_same,
 )
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
@@ -76,7 +76,9 @@ def cords_strained(equilibrium: Equilibrium, load: float) -> bool:
     return bool(cords) and equilibrium.out_of_balance() > _STRAINED * load
 
 
-def balance_near(equilibrium: Equilibrium, road_height: float, load: float, allowed: float) -> Step:
+def balance_near(
+    equilibrium: Equilibrium, road_height: float, load: float, allowed: float
+) -> SolveOutcome:
     """Equilibrium up to `allowed` N from the present state and road forces. Collective.
 
     The road is at `road_height` (m) and carries about `load` N. As `Equilibrium.solve`; on failure
@@ -89,7 +91,9 @@ def balance_near(equilibrium: Equilibrium, road_height: float, load: float, allo
     return _dragged(equilibrium, road_height, load, allowed)
 
 
-def _dragged(equilibrium: Equilibrium, road_height: float, load: float, allowed: float) -> Step:
+def _dragged(
+    equilibrium: Equilibrium, road_height: float, load: float, allowed: float
+) -> SolveOutcome:
     body, road, field = equilibrium.body, equilibrium.road, equilibrium.body.u.x
     kept = field.array.copy(), road.kept(), equilibrium.road_height
     typical = equilibrium.force_scale / body.ring.thickness
@@ -122,7 +126,7 @@ _MOST_FALLS = 80  # steps; a section that folds at a tenth of a metre takes 20 t
 _DRAG_EASED, _DRAG_RAISED = 0.25, 8.0
 
 
-def fall(equilibrium: Equilibrium, road_height: float, allowed: float = 0.0) -> Step:
+def fall(equilibrium: Equilibrium, road_height: float, allowed: float = 0.0) -> SolveOutcome:
     """The stable state reached from the present one, on a road at `road_height` (m). Collective.
 
     As `Equilibrium.solve`; on failure body and road are restored.
@@ -145,7 +149,7 @@ def fall(equilibrium: Equilibrium, road_height: float, allowed: float = 0.0) -> 
     equilibrium.drag = None
     field.array[:], equilibrium.road_height = kept[0], kept[2]
     road.put_back(kept[1])
-    return Step(
+    return SolveOutcome(
         False, tangents, step.residual, "pseudo-transient continuation does not converge either"
     )
 
@@ -158,7 +162,7 @@ _LARGEST = 4  # times the first step
 _STUCK = 3  # consecutive failures after which a fall is tried, once
 _EASY = 6  # tangents up to which the next load step may grow
 
-Attempt = Callable[[float], Step]
+Attempt = Callable[[float], SolveOutcome]
 
 
 @dataclass(frozen=True)
@@ -178,7 +182,7 @@ def march(
     show: Show,
     fall: Attempt | None = None,
     enough: Callable[[], bool] = lambda: False,
-    seen: Callable[[Step, float, Show], None] = lambda step, target, show: None,
+    seen: Callable[[SolveOutcome, float, Show], None] = lambda step, target, show: None,
     smallest: float = _SMALLEST,
 ) -> None:
     """From a converged `start` to `end` in steps, the first of size `first`. Collective.
@@ -227,14 +231,14 @@ class _Known:
     displacement: np.ndarray
 
 
-class Way:
+class LoadPath:
     """Path of a loader's body from a state without a road. All methods are collective."""
 
-    def __init__(self, loader: Loader) -> None:
+    def __init__(self, loader: LoadStepper) -> None:
         self._loader, self._equilibrium, self._body = loader, loader.equilibrium, loader.body
         self._known = [_Known(0.0, 0.0, self._body.u.x.array.copy())]
 
-    def climb(self, deflection: float) -> None:
+    def step_to(self, deflection: float) -> None:
         """Raise the road in steps to `deflection` (m) from first touch."""
         self._body.u.x.array[:] = self._known[0].displacement
         self._raise_road(0.0, deflection, 0.0)
@@ -245,13 +249,13 @@ class Way:
         Intermediate states may have a residual; the state that an error leaves has none.
         """
         try:
-            return self._seek(load, _NEAR * load)
+            return self._find_load(load, _NEAR * load)
         except ConvergenceError:
             if self._equilibrium.solve(self._equilibrium.road_height).converged:
                 raise
-            return self._seek(load, 0.0)
+            return self._find_load(load, 0.0)
 
-    def _seek(self, load: float, allowed: float) -> float:
+    def _find_load(self, load: float, allowed: float) -> float:
         """Deflection (m) for `load`; intermediate states may have `allowed` (N) of residual."""
         self._known = self._known[:1]
         self._body.u.x.array[:] = self._known[0].displacement
@@ -263,13 +267,13 @@ class Way:
                 return last.deflection
             trial = self._next_deflection(load)
             if trial < 0.99 * _REACH * max(k.deflection for k in self._known):
-                if self._meet(load, trial):
+                if self._solve_for_load(load, trial):
                     return self._loader.deflection
                 if allowed:  # from here on the bracket must close
                     self._known, allowed = self._known[:1], 0.0
         raise self._not_met(load, "in 60 trials")
 
-    def _meet(self, load: float, trial: float) -> bool:
+    def _solve_for_load(self, load: float, trial: float) -> bool:
         """Solve for state and road height at the given load, from the estimate at `trial`."""
         self._near(trial)
         step = self._equilibrium.solve(self._loader.touch + trial, load)
@@ -367,7 +371,7 @@ class Way:
             f"to {next_.load:.4g} N at {next_.deflection:.4g} m"
         )
 
-    def _learnt(self, step: Step, deflection: float) -> Step:
+    def _learnt(self, step: SolveOutcome, deflection: float) -> SolveOutcome:
         """The step itself; if it converged, its state is recorded as known. Collective."""
         if step.converged:
             load, field = self._loader.load(), self._body.u.x.array
@@ -382,7 +386,7 @@ class Way:
 
         field, road = self._body.u.x, self._equilibrium.road
 
-        def attempt(deflection: float) -> Step:
+        def attempt(deflection: float) -> SolveOutcome:
             height = self._loader.touch + deflection
             kept = field.array.copy(), road.kept()
             self._equilibrium.predict(height)
@@ -392,7 +396,7 @@ class Way:
                 road.put_back(kept[1])
             return self._learnt(step, deflection)
 
-        def let_go(deflection: float) -> Step:
+        def let_go(deflection: float) -> SolveOutcome:
             height = self._loader.touch + deflection
             return self._learnt(fall(self._equilibrium, height, allowed), deflection)
 
@@ -416,18 +420,18 @@ class Progress:
     unit: str
     load: float
     active: int
-    step: Step
+    step: SolveOutcome
 
 
 @dataclass(frozen=True)
 class _Half:
     """Half of the ring of a loader's body."""
 
-    loader: Loader
-    equilibrium: HalfTurnEquilibrium
+    loader: LoadStepper
+    equilibrium: HalfModelEquilibrium
 
 
-class Loader:
+class LoadStepper:
     """Brings one problem to the requested state. Collective. `inflated`: `u` without the road."""
 
     def __init__(self, equilibrium: Equilibrium, report: Callable[[Progress], None]) -> None:
@@ -457,8 +461,8 @@ class Loader:
         """Solve from the axisymmetric shape; on failure False and the old state. Collective."""
 
         def shape() -> np.ndarray:
-            section = RoundEquilibrium(self.body, self.equilibrium.rolling)
-            Loader(section, self.report)._inflate_in_steps(pressure)
+            section = AxisymmetricEquilibrium(self.body, self.equilibrium.rolling)
+            LoadStepper(section, self.report)._inflate_in_steps(pressure)
             return section.on(self.body.lattice)
 
         before = self.body.u.x.array.copy()
@@ -481,7 +485,7 @@ class Loader:
             self.tell("inflation", pressure, "Pa", step)
         return step.converged
 
-    def begin_at(self, other: Loader) -> None:
+    def begin_at(self, other: LoadStepper) -> None:
         """Take over another loader's height of first touch and its step count."""
         self._touch, self.newton_steps = other.touch, other.newton_steps
 
@@ -497,10 +501,10 @@ class Loader:
             show = Show("speed", problem.rolling.speed, "rad/s")
             self.march(lambda part: self._solve_with(problem.rolls, part**2), 1.0, 1.0, show)
 
-    def _solve_at(self, pressure: float) -> Step:
+    def _solve_at(self, pressure: float) -> SolveOutcome:
         return self._solve_with(self.equilibrium.pressure, pressure)
 
-    def _solve_with(self, constant: fem.Constant, value: float) -> Step:
+    def _solve_with(self, constant: fem.Constant, value: float) -> SolveOutcome:
         before = float(constant.value)
         constant.value = value
         step = self.equilibrium.solve()
@@ -546,13 +550,13 @@ class Loader:
     def deflect(self, deflection: float) -> None:
         """Raise the road by `deflection` (m) from first touch of the inflated tire."""
         self._check_reach(deflection)
-        if not self._by_half(lambda half: Way(half).climb(deflection)):
-            Way(self).climb(deflection)
+        if not self._by_half(lambda half: LoadPath(half).step_to(deflection)):
+            LoadPath(self).step_to(deflection)
 
     def visit(self, deflections: Sequence[float]) -> Iterator[float]:
         """Raise the road to ascending deflections (m), extrapolating from the last two states."""
-        half, own = self._half(), Way(self)
-        way = None if half is None else Way(half.loader)
+        half, own = self._half(), LoadPath(self)
+        way = None if half is None else LoadPath(half.loader)
         for deflection in deflections:
             self._check_reach(deflection)
             if half is None or way is None:
@@ -570,15 +574,15 @@ class Loader:
         if not (self.equilibrium.shape.flat and looks_the_same(self.body.ring, rolling)):
             return None
         if self._half_ring is None:
-            equilibrium = HalfTurnEquilibrium(self.body, rolling)
+            equilibrium = HalfModelEquilibrium(self.body, rolling)
             equilibrium.history = self.equilibrium.history
-            self._half_ring = _Half(Loader(equilibrium, self.report), equilibrium)
+            self._half_ring = _Half(LoadStepper(equilibrium, self.report), equilibrium)
         self._half_ring.equilibrium.start(self.equilibrium)
         self._half_ring.loader._touch = self._touch
         return self._half_ring
 
     @property
-    def halved(self) -> HalfTurnEquilibrium | None:
+    def halved(self) -> HalfModelEquilibrium | None:
         """The half-ring problem, if one was used; its state may differ from that of the whole."""
         return None if self._half_ring is None else self._half_ring.equilibrium
 
@@ -594,7 +598,7 @@ class Loader:
         half.loader.newton_steps = 0
         self.equilibrium.cost.take(half.equilibrium.cost)
 
-    def _by_half(self, press: Callable[[Loader], object]) -> bool:
+    def _by_half(self, press: Callable[[LoadStepper], object]) -> bool:
         """Press half of the ring if symmetry allows; whether that solved the whole. Collective.
         After an error the whole is left in the half's last state."""
         half, start = self._half(), self.body.u.x.array.copy()
@@ -616,8 +620,8 @@ class Loader:
         Intermediate states may have a residual; the state that an error leaves has none."""
         if load <= 0:
             raise InputError(f"static.load = {load:g} N: a road carries a positive load")
-        if not self._by_half(lambda half: Way(half).carry(load)):
-            Way(self).carry(load)
+        if not self._by_half(lambda half: LoadPath(half).carry(load)):
+            LoadPath(self).carry(load)
         return self.deflection
 
     def load(self) -> float:
@@ -638,12 +642,12 @@ class Loader:
         smallest = _SMALLEST_ROLLING if self.equilibrium.rolling.speed else _SMALLEST
         march(attempt, start, end, first, show, fall, enough, self._seen, smallest)
 
-    def _seen(self, step: Step, target: float, show: Show) -> None:
+    def _seen(self, step: SolveOutcome, target: float, show: Show) -> None:
         self.newton_steps += step.iterations
         if step.converged:
             self.tell(show.what, target * show.scale, show.unit, step)
 
-    def tell(self, what: str, value: float, unit: str, step: Step) -> None:
+    def tell(self, what: str, value: float, unit: str, step: SolveOutcome) -> None:
         upright = self.equilibrium.shape.upright  # told along the road's normal, as in the results
         value *= upright if unit == "m" else 1.0
         loads = self.equilibrium.load() / upright, self.equilibrium.points()
@@ -651,7 +655,10 @@ class Loader:
 
 
 def with_cause(
-    error: ConvergenceError, loader: Loader, rolling: Rolling, press: Callable[[Loader], object]
+    error: ConvergenceError,
+    loader: LoadStepper,
+    rolling: Rolling,
+    press: Callable[[LoadStepper], object],
 ) -> ConvergenceError:
     """The error, with the cause added if that is the speed of rotation. Collective.
 
@@ -663,7 +670,7 @@ def with_cause(
     old = loader.body
     body = Body(old.comm, old.ring, old.materials, cords=old.plies.cords)
     try:
-        press(Loader(Equilibrium(body, AT_REST), lambda progress: None))
+        press(LoadStepper(Equilibrium(body, AT_REST), lambda progress: None))
     except ConvergenceError:
         return error
     return ConvergenceError(

@@ -12,7 +12,7 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.model import TireModel
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.friction_press import Friction, with_friction
-from tireroad.fem.static.load_steps import Loader, Progress
+from tireroad.fem.static.load_steps import LoadStepper, Progress
 from tireroad.fem.static.road import FLAT, RoadShape
 from tireroad.fem.static.state import StaticState, static_state
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
@@ -39,7 +39,7 @@ def press(
     """
     if not (math.isfinite(inflation) and inflation >= 0.0):
         raise InputError(f"inflation = {inflation:g} Pa must be 0 or more, and finite")
-    loader = Loader(Equilibrium(tire.body, rolling, road), report)
+    loader = LoadStepper(Equilibrium(tire.body, rolling, road), report)
     loader.inflate(inflation)
     loader = place(loader, load, deflection, road_height, friction)
     return static_state(loader.equilibrium, loader.touch)
@@ -59,13 +59,13 @@ class Near:
     height: float | None
 
     @classmethod
-    def of(cls, loader: Loader, pressed: Loader) -> Near:
+    def of(cls, loader: LoadStepper, pressed: LoadStepper) -> Near:
         """The present state of the body that `loader` inflated and `place` pressed."""
         equilibrium = pressed.equilibrium
         field = loader.body.u.x.array.copy()
         return cls(loader.inflated, field, equilibrium.contact_force(), equilibrium.road_height)
 
-    def reaches(self, loader: Loader, load: float | None, rise: float | None) -> bool:
+    def reaches(self, loader: LoadStepper, load: float | None, rise: float | None) -> bool:
         """Solve for the `load` (N) or the road's `rise` (m) from here; on failure False and the
         old state. Collective."""
         assert self.height is not None, "there is no road"
@@ -84,13 +84,13 @@ class Near:
 
 
 def place(
-    loader: Loader,
+    loader: LoadStepper,
     load: float | None,
     deflection: float | None,
     road_height: float | None,
     friction: Friction | None = None,
     near: Near | None = None,
-) -> Loader:
+) -> LoadStepper:
     """Press the inflated tire on the road as in `press`; load and deflection along its normal.
 
     Starts from the state `near`, if there is one and Newton's method converges from it. Returns the
@@ -118,7 +118,7 @@ def place(
     return with_friction(loader, loader.inflated, load, friction)
 
 
-def _raise_road(loader: Loader, load: float | None, rise: float | None) -> None:
+def _raise_road(loader: LoadStepper, load: float | None, rise: float | None) -> None:
     """Raise the road from first touch until it carries `load` (N), or by `rise` (m). Collective."""
     if load is not None:
         loader.carry(load)

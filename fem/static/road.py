@@ -141,7 +141,7 @@ def _unit(vectors: Array) -> Array:
 FLAT = RoadShape()
 
 
-class Road:
+class RoadContact:
     """A surface of given `shape` at `height` (m under the axle; -inf: no road).
 
     Arrays run over the owned tread nodes, in the order of `body.tread`: `dofs`: vertical unknowns;
@@ -264,11 +264,11 @@ class Road:
         return self._body.comm.allreduce(int((self.force > 0).sum()))
 
 
-class Unrolled:
+class RoadCoordinates:
     """Road coordinates of the owned nodes that can touch a `road`, at their present positions. All
     methods except `turn` and `spread` are collective."""
 
-    def __init__(self, body: Body, road: Road) -> None:
+    def __init__(self, body: Body, road: RoadContact) -> None:
         self._body, self._road = body, road
         self._blocks = 3 * body.tread[:, None] + np.arange(3)
 

@@ -13,7 +13,7 @@ from tireroad.fem.static.road import FLAT, RoadShape
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.cord_forces import CordForce, cord_forces
 from tireroad.fem.tire.material import Material
-from tireroad.fem.tire.mesh import Lattice
+from tireroad.fem.tire.mesh import NodeGrid
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -194,7 +194,7 @@ def static_state(equilibrium: Equilibrium, touch_height: float) -> StaticState:
 
 
 def _surface_metric(
-    lattice: Lattice, positions: np.ndarray
+    lattice: NodeGrid, positions: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, tuple[int, int]]:
     """Half sizes of each node's rectangle, dx/dtheta, and the shape (around, along) of the face."""
     shape = lattice.face_shape

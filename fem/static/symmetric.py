@@ -38,15 +38,15 @@ from scipy.sparse.linalg import SuperLU, splu
 from scipy.spatial import cKDTree
 
 from tireroad.fem.sections.ring import Ring
-from tireroad.fem.static.equilibrium import Equilibrium, Step
-from tireroad.fem.static.tangent import HeldSystem, Moved
+from tireroad.fem.static.equilibrium import Equilibrium, SolveOutcome
+from tireroad.fem.static.tangent import ConstrainedSystem, PrescribedMotion
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.timing import Timing
 from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.mesh import Lattice
+from tireroad.fem.tire.mesh import NodeGrid
 
 
-class RoundEquilibrium(Equilibrium):
+class AxisymmetricEquilibrium(Equilibrium):
     """Equilibrium of a ring's axisymmetric shape, on the shortest of its elements around.
 
     On the calling process only. The state is `body.u` of its own `body`, a sector.
@@ -60,15 +60,15 @@ class RoundEquilibrium(Equilibrium):
         self._turned = _turned(body)
         super().__init__(body, replace(rolling, damping=0.0, stiffness_damping=0.0))
 
-    def _make_system(self, kind: str) -> RoundSystem:
-        return RoundSystem(self._turned, self.cost)
+    def _make_system(self, kind: str) -> AxisymmetricSystem:
+        return AxisymmetricSystem(self._turned, self.cost)
 
     def _assemble_residual(self) -> np.ndarray:
         """The axisymmetric part of the residual forces, N."""
         copies = self.body.lattice.shape[0]
         return self._turned @ (self._turned.T @ super()._assemble_residual()) / copies
 
-    def on(self, lattice: Lattice) -> np.ndarray:
+    def on(self, lattice: NodeGrid) -> np.ndarray:
         """The displacement (n, 3) m at the nodes of the whole ring's lattice."""
         local = np.empty((self.body.lattice.shape[1], 3))
         first = self.body.ids < len(local)
@@ -79,16 +79,18 @@ class RoundEquilibrium(Equilibrium):
         return np.stack([*parts, sine * along + cosine * down], axis=-1).reshape(-1, 3)
 
 
-class RoundSystem:
-    """P^T K P of the sector, the counterpart of `HeldSystem`; no dof is held."""
+class AxisymmetricSystem:
+    """P^T K P of the sector, the counterpart of `ConstrainedSystem`; no dof is held."""
 
     def __init__(self, turned: sparse.csr_matrix, timing: Timing) -> None:
         self._turned, self._timing = turned, timing
-        self.closing = self.raising = Moved(np.zeros(turned.shape[0]), np.zeros(turned.shape[0]))
+        self.gap_closure = self.road_rise = PrescribedMotion(
+            np.zeros(turned.shape[0]), np.zeros(turned.shape[0])
+        )
         self._factor: SuperLU | None = None
 
     def take(
-        self, matrix: PETSc.Mat, held: np.ndarray, closing: np.ndarray, raising: np.ndarray
+        self, matrix: PETSc.Mat, held: np.ndarray, gap_closure: np.ndarray, road_rise: np.ndarray
     ) -> bool:
         """Factorise; False if the matrix is singular."""
         rows, columns, values = matrix.getValuesCSR()
@@ -100,7 +102,9 @@ class RoundSystem:
                 return False
         return True
 
-    def solve(self, right: np.ndarray, moved: Moved | None = None) -> tuple[np.ndarray, np.ndarray]:
+    def solve(
+        self, right: np.ndarray, moved: PrescribedMotion | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Motion (m) of all dofs of the sector under forces (N), and no reactions."""
         assert self._factor is not None, "take() comes before"
         with self._timing("solve"):
@@ -225,32 +229,34 @@ def _found(ids: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 class FoldedSystem:
-    """P^T K P: a `HeldSystem` of half a ring. Followers keep a unit diagonal row."""
+    """P^T K P: a `ConstrainedSystem` of half a ring. Followers keep a unit diagonal row."""
 
     def __init__(
         self, comm: MPI.Comm, matrix: PETSc.Mat, kind: str, timing: Timing, cut: Cut
     ) -> None:
         self._cut, self._timing = cut, timing
         self._folding = _Folding(matrix, cut)
-        self._inner = HeldSystem(comm, self._folding.matrix, kind, timing)
+        self._inner = ConstrainedSystem(comm, self._folding.matrix, kind, timing)
 
     @property
-    def closing(self) -> Moved:
-        return self._inner.closing
+    def gap_closure(self) -> PrescribedMotion:
+        return self._inner.gap_closure
 
     @property
-    def raising(self) -> Moved:
-        return self._inner.raising
+    def road_rise(self) -> PrescribedMotion:
+        return self._inner.road_rise
 
     def take(
-        self, matrix: PETSc.Mat, held: np.ndarray, closing: np.ndarray, raising: np.ndarray
+        self, matrix: PETSc.Mat, held: np.ndarray, gap_closure: np.ndarray, road_rise: np.ndarray
     ) -> bool:
         """Fold and factorise; `matrix` stays unchanged. Collective."""
         with self._timing("assembly"):
             self._folding.fill(matrix)
-        return self._inner.take(self._folding.matrix, held, closing, raising)
+        return self._inner.take(self._folding.matrix, held, gap_closure, road_rise)
 
-    def solve(self, right: np.ndarray, moved: Moved | None = None) -> tuple[np.ndarray, np.ndarray]:
+    def solve(
+        self, right: np.ndarray, moved: PrescribedMotion | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Motion (m) of owned dofs under folded forces (N), force (N) at held ones. Collective."""
         change, force = self._inner.solve(right, moved)
         self._cut.unfold(change)
@@ -259,7 +265,7 @@ class FoldedSystem:
     def columns(
         self, numbers: np.ndarray, dofs: np.ndarray, count: int
     ) -> tuple[np.ndarray, np.ndarray]:
-        """As in HeldSystem, without the motion of followers. Collective."""
+        """As in ConstrainedSystem, without the motion of followers. Collective."""
         return self._inner.columns(numbers, dofs, count)
 
     def spread(self, motion: np.ndarray) -> np.ndarray:
@@ -331,7 +337,7 @@ def looks_the_same(ring: Ring, rolling: Rolling) -> bool:
     return bool(distance.max() < small and (section.region[image] == section.region).all())
 
 
-class HalfTurnEquilibrium(Equilibrium):
+class HalfModelEquilibrium(Equilibrium):
     """Equilibrium of half a ring, from the lowest point over x > 0 to the highest. Collective.
 
     The state is `body.u` of its own `body`; loads passed and returned are those of the whole
@@ -354,7 +360,7 @@ class HalfTurnEquilibrium(Equilibrium):
 
     def solve(
         self, road_height: float | None = None, load: float | None = None, allowed: float = 0.0
-    ) -> Step:
+    ) -> SolveOutcome:
         """As for the whole tire; the half carries half of its load."""
         return super().solve(road_height, None if load is None else load / 2, allowed / 2)
 
@@ -392,7 +398,7 @@ class HalfTurnEquilibrium(Equilibrium):
         further, compliance = super().sinking(own, load)
         return 2 * further, 2 * compliance
 
-    def on(self, lattice: Lattice) -> tuple[np.ndarray, np.ndarray]:
+    def on(self, lattice: NodeGrid) -> tuple[np.ndarray, np.ndarray]:
         """Displacement (n, 3) m and road force (n,) N on the whole ring's lattice. Collective."""
         count, around = lattice.shape[1], lattice.shape[0]
         moved = self.body.displacement().reshape(-1, count, 3)

@@ -27,7 +27,7 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from tireroad.fem.errors import ConvergenceError
-from tireroad.fem.static.road import Road
+from tireroad.fem.static.road import RoadContact
 from tireroad.fem.timing import Timing
 
 _CHUNK = 64  # right-hand sides per solve
@@ -35,7 +35,7 @@ _SINGULAR = (-6, -10)  # MUMPS's INFOG(1): structurally, numerically
 
 
 @dataclass(frozen=True)
-class Moved:
+class PrescribedMotion:
     """A prescribed motion (m) of the owned dofs, nonzero at held ones only, and the force K change
     (N) it causes at all dofs."""
 
@@ -44,32 +44,34 @@ class Moved:
 
 
 class System(Protocol):
-    """The linearised equilibrium as Newton's method uses it; see `HeldSystem`."""
+    """The linearised equilibrium as Newton's method uses it; see `ConstrainedSystem`."""
 
     @property
-    def closing(self) -> Moved: ...
+    def gap_closure(self) -> PrescribedMotion: ...
 
     @property
-    def raising(self) -> Moved: ...
+    def road_rise(self) -> PrescribedMotion: ...
 
     def take(
-        self, matrix: PETSc.Mat, held: np.ndarray, closing: np.ndarray, raising: np.ndarray
+        self, matrix: PETSc.Mat, held: np.ndarray, gap_closure: np.ndarray, road_rise: np.ndarray
     ) -> bool:
         """Factorise; False if the matrix is singular. Collective."""
         ...
 
-    def solve(self, right: np.ndarray, moved: Moved | None = None) -> tuple[np.ndarray, np.ndarray]:
+    def solve(
+        self, right: np.ndarray, moved: PrescribedMotion | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Motion (m) of the owned dofs under forces (N), force (N) at held ones. Collective."""
         ...
 
 
-class Columns(System, Protocol):
+class ContactColumns(System, Protocol):
     """A system whose factorisation remains usable when other dofs are held."""
 
     def columns(
         self, numbers: np.ndarray, dofs: np.ndarray, count: int
     ) -> tuple[np.ndarray, np.ndarray]:
-        """See `HeldSystem`. Collective."""
+        """See `ConstrainedSystem`. Collective."""
         ...
 
     def spread(self, motion: np.ndarray) -> np.ndarray:
@@ -77,11 +79,11 @@ class Columns(System, Protocol):
         ...
 
 
-class HeldSystem:
+class ConstrainedSystem:
     """K du = right, with du prescribed at the held dofs. All methods are collective.
 
     `take` factorises; each `solve` then costs two triangular solves. The factorisation is usable
-    while the tangent changes little and the same dofs are held. `closing` and `raising` are the
+    while the tangent changes little and the same dofs are held. `gap_closure` and `road_rise` are the
     motions given to `take`.
     """
 
@@ -95,10 +97,10 @@ class HeldSystem:
         self._pull: PETSc.Mat | None = None
 
     def take(
-        self, matrix: PETSc.Mat, held: np.ndarray, closing: np.ndarray, raising: np.ndarray
+        self, matrix: PETSc.Mat, held: np.ndarray, gap_closure: np.ndarray, road_rise: np.ndarray
     ) -> bool:
-        """Factorise `matrix` with the owned dofs `held`, which move by `closing` (m) in the next
-        step and by `raising` (m per m) as the road rises.
+        """Factorise `matrix` with the owned dofs `held`, which move by `gap_closure` (m) in the next
+        step and by `road_rise` (m per m) as the road rises.
 
         Returns False if it is singular; raises ConvergenceError if the factorisation fails
         otherwise. `matrix` is modified and must not be used afterwards.
@@ -107,8 +109,8 @@ class HeldSystem:
         self._held = held
         with self._timing("road"):
             self._keep_reaction(matrix, rows)
-            self.closing = self._moved(matrix, closing)
-            self.raising = self._moved(matrix, raising)
+            self.gap_closure = self._moved(matrix, gap_closure)
+            self.road_rise = self._moved(matrix, road_rise)
             matrix.zeroRowsColumns(rows, 1.0)
         with self._timing("factorisation"):
             self._ksp.setOperators(
@@ -129,11 +131,11 @@ class HeldSystem:
         every.destroy()
         own.destroy()
 
-    def _moved(self, matrix: PETSc.Mat, at_held: np.ndarray) -> Moved:
+    def _moved(self, matrix: PETSc.Mat, at_held: np.ndarray) -> PrescribedMotion:
         self._x.set(0.0)
         self._x.array[self._held] = at_held
         matrix.mult(self._x, self._right)
-        return Moved(self._x.array_r.copy(), self._right.array_r.copy())
+        return PrescribedMotion(self._x.array_r.copy(), self._right.array_r.copy())
 
     def _checked(self) -> bool:
         factors = self._ksp.getPC().getFactorMatrix()
@@ -148,10 +150,12 @@ class HeldSystem:
             )
         return code >= 0
 
-    def solve(self, right: np.ndarray, moved: Moved | None = None) -> tuple[np.ndarray, np.ndarray]:
+    def solve(
+        self, right: np.ndarray, moved: PrescribedMotion | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Motion (m) of the owned dofs under forces (N), and the force (N) needed at the held dofs.
 
-        The held dofs move as in `moved` (`closing` or `raising`), or stay.
+        The held dofs move as in `moved` (`gap_closure` or `road_rise`), or stay.
         """
         with self._timing("solve"):
             self._right.array[:] = right if moved is None else right - moved.force
@@ -261,7 +265,10 @@ Array = np.ndarray
 
 
 def held_step(
-    comm: MPI.Comm, system: System, road: Road, given: tuple[Array, Moved | None, float | None]
+    comm: MPI.Comm,
+    system: System,
+    road: RoadContact,
+    given: tuple[Array, PrescribedMotion | None, float | None],
 ) -> tuple[Array, Array] | None:
     """One linearised step: motion (m) of owned dofs, reactions (N) at held ones. Collective.
 
@@ -270,12 +277,12 @@ def held_step(
     force is the reaction of the linearised problem: a residual is no force of the road (otherwise
     held dofs were seen to be released and held again forever).
     """
-    out, closing, load = given
-    change, force = system.solve(-out, closing)
+    out, gap_closure, load = given
+    change, force = system.solve(-out, gap_closure)
     force += out[road.held]
     if load is None:
         return change, force
-    further, more = system.solve(np.zeros_like(out), system.raising)
+    further, more = system.solve(np.zeros_like(out), system.road_rise)
     sums = np.array([road.upward(part) for part in (force, more)])
     total, rate = comm.allreduce(sums)
     if not rate > 0:
@@ -315,8 +322,8 @@ class _Answer:
 class LinearContact:
     """The contact problem for the current factorisation of a system. All methods are collective."""
 
-    def __init__(self, comm: MPI.Comm, system: System, road: Road) -> None:
-        self._comm, self._system, self._road = comm, cast(Columns, system), road
+    def __init__(self, comm: MPI.Comm, system: System, road: RoadContact) -> None:
+        self._comm, self._system, self._road = comm, cast(ContactColumns, system), road
         counts = comm.allgather(len(road.dofs))
         first = sum(counts[: comm.rank])
         self._own = slice(first, first + len(road.dofs))
@@ -324,16 +331,20 @@ class LinearContact:
         self._base = self._gathered(road.active)  # held in the factorisation
         self._number = np.full(len(self._base), -1)  # column number of each node
         none = np.empty((len(self._base), 0))
-        self._columns = _Answer(np.empty((system.closing.change.size, 0)), none, none)
+        self._columns = _Answer(np.empty((system.gap_closure.change.size, 0)), none, none)
         self._lift: _Answer | None = None
         self.changed = False  # whether the held nodes differ from those of the factorisation
 
     def step(
-        self, out: Array, closing: Moved | None, load: float | None, given: float | None = None
+        self,
+        out: Array,
+        gap_closure: PrescribedMotion | None,
+        load: float | None,
+        given: float | None = None,
     ) -> tuple[Array, Array] | None:
         """`held_step` that first settles the active set; the road may rise by a `given` m."""
         road = self._road
-        free = self._answer(*self._system.solve(-out, closing), out)
+        free = self._answer(*self._system.solve(-out, gap_closure), out)
         free.gap += self._gathered(road.gap())
         if given:
             free = free.plus(given, self._lifted())
@@ -343,7 +354,7 @@ class LinearContact:
         held = self._gathered(road.active)
         found = self._solved(free, lift, held, load)
         if (
-            closing is not None or given is not None
+            gap_closure is not None or given is not None
         ):  # near equilibrium the sets of a reused tangent are unreliable
             held, found = self._settled(
                 held, found, lambda held: self._solved(free, lift, held, load)
@@ -426,8 +437,8 @@ class LinearContact:
     def _lifted(self) -> _Answer:
         """Response to a unit rise of the road with its nodes held."""
         if self._lift is None:
-            nothing = np.zeros_like(self._system.closing.force)
-            self._lift = self._answer(*self._system.solve(nothing, self._system.raising), nothing)
+            nothing = np.zeros_like(self._system.gap_closure.force)
+            self._lift = self._answer(*self._system.solve(nothing, self._system.road_rise), nothing)
             self._lift.gap -= 1.0
         return self._lift
 

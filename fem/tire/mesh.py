@@ -19,17 +19,17 @@ from ufl.core.expr import Expr
 from tireroad.fem import compat
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections import mesh2d
-from tireroad.fem.sections.grid import Patch
+from tireroad.fem.sections.grid import RegionPatch
 from tireroad.fem.sections.ring import Ring
 from tireroad.fem.sections.torus import Torus
 from tireroad.fem.tire.material import MATERIALS, Kind, Material, MaterialLaw, kinds
 
-__all__ = ["INNER", "RIM", "TREAD", "Lattice", "TireMesh", "Torus", "build", "field_lattice"]
+__all__ = ["INNER", "RIM", "TREAD", "NodeGrid", "TireMesh", "Torus", "build", "field_lattice"]
 
 INNER, TREAD, RIM = 1, 2, 3  # facet tags
 
 
-class Lattice:
+class NodeGrid:
     """The nodes of a ring as a tensor product of angles around the axle and nodes of the section.
 
     The id of a node, angle * section nodes + section node, does not depend on the number of
@@ -123,7 +123,7 @@ class TireMesh:
     """
 
     ring: Ring
-    lattice: Lattice
+    lattice: NodeGrid
     mesh: dmesh.Mesh
     facets: dmesh.MeshTags
     section_cell: np.ndarray
@@ -132,7 +132,7 @@ class TireMesh:
 def build(comm: MPI.Comm, ring: Ring) -> TireMesh:
     """The ring of hexahedra; each process passes its share of cells and points. Collective."""
     nodes = compat.geometry_nodes(ring.order)
-    geometry = Lattice(ring, _edge(nodes))
+    geometry = NodeGrid(ring, _edge(nodes))
     cells = _cells(geometry, nodes, np.arange(*_share(comm, ring.elements)))
     points = geometry.points(np.arange(*_share(comm, geometry.size)))
     mesh = compat.create_mesh(comm, cells, points, ring.order)
@@ -140,9 +140,9 @@ def build(comm: MPI.Comm, ring: Ring) -> TireMesh:
     return TireMesh(ring, field_lattice(ring), mesh, _tag(mesh, ring, section_cell), section_cell)
 
 
-def field_lattice(tire: Ring | Torus) -> Lattice:
+def field_lattice(tire: Ring | Torus) -> NodeGrid:
     """The nodes of the displacement field of a tire's mesh."""
-    return Lattice(tire, _edge(compat.field_nodes(tire.order)))
+    return NodeGrid(tire, _edge(compat.field_nodes(tire.order)))
 
 
 def _share(comm: MPI.Comm, count: int) -> tuple[int, int]:
@@ -150,7 +150,7 @@ def _share(comm: MPI.Comm, count: int) -> tuple[int, int]:
     return count * comm.rank // comm.size, count * (comm.rank + 1) // comm.size
 
 
-def _cells(lattice: Lattice, nodes: np.ndarray, cells: np.ndarray) -> np.ndarray:
+def _cells(lattice: NodeGrid, nodes: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """Ids of the nodes of the given cells, (cells, nodes), in the element's node order."""
     order = lattice.tire.order
     step = np.searchsorted(_edge(nodes), nodes - 1e-9)
@@ -195,12 +195,12 @@ class Region:
     depth: tuple[float, float] = (0.0, 1.0)
     side: str = "both"
 
-    def patch(self, number: int) -> Patch:
+    def patch(self, number: int) -> RegionPatch:
         """The part of the section, named after its number in the scene."""
         low, high = self.arc
         right, left = (low, high), (-high, -low)
         arcs = {"both": (right, left), "left": (left,), "right": (right,)}[self.side]
-        return Patch(f"tire.region {number}", arcs, self.depth)
+        return RegionPatch(f"tire.region {number}", arcs, self.depth)
 
 
 def compounds(material: Material, regions: tuple[Region, ...]) -> dict[str, Material]:

@@ -83,7 +83,7 @@ class ModalDamping:
         """D_x rate, own rows, N, for velocities (n,) m/s. Collective."""
         return self._push @ summed(self._comm, self._weighted.T @ rate)
 
-    def joined(
+    def solver_with(
         self, solve: Callable[[np.ndarray], np.ndarray], share: float
     ) -> Callable[[np.ndarray], np.ndarray]:
         """Solver of A + share D_x + K_x, own rows (n, k), from `solve`, that of A. Collective."""
@@ -155,7 +155,7 @@ class AirStep:
 Array = np.ndarray
 
 
-class Wheel:
+class MovingWheel:
     """Matrices of the moving wheel. Collective to make.
 
     `operators` have a fixed rim; `rim`: products with the rim's motions; `axle`: suspension; `drag`
@@ -217,7 +217,7 @@ class WheelStep:
     """AirStep's counterpart for the `wheel`; `weights` (c1 1/s, c2 1/s2). All is collective."""
 
     def __init__(
-        self, wheel: Wheel, solve: Callable[[Array], Array], weights: tuple[float, float]
+        self, wheel: MovingWheel, solve: Callable[[Array], Array], weights: tuple[float, float]
     ) -> None:
         self._wheel, self._comm = wheel, wheel.comm
         self.mine = wheel.comm.rank == wheel.comm.size - 1
@@ -300,7 +300,9 @@ class FullTire:
         self._outputs = on_own_rows(operators, outputs).T.tocsr()
         self._drag = rotating_damping(operators, rotation, speed, damping, inertia)
         stiffness = rotating_stiffness(operators, rotation, speed, damping, inertia)
-        wheel = Wheel(operators, *corner[::-1], speed, self._drag, stiffness) if corner else None
+        wheel = (
+            MovingWheel(operators, *corner[::-1], speed, self._drag, stiffness) if corner else None
+        )
         system = stiffness.copy()
         different = PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
         share = self._gamma / (self._beta * step)
@@ -312,7 +314,7 @@ class FullTire:
         self._solver = factorise(system)
         self._columns = on_own_rows(operators, loads).toarray()
         self._modal, self._system = modal, system
-        self._joined = modal.joined(self._by_factors, share) if modal else None
+        self._with_modes = modal.solver_with(self._by_factors, share) if modal else None
         # Full motion per unit force at the end of a step: the response of a step is then one
         # product.
         self._answer = self._solved_columns(self._columns)
@@ -325,7 +327,7 @@ class FullTire:
         self.displacement, self.velocity, self.acceleration, self.balanced = np.zeros((4, n))
         self._vectors = system.createVecs()
 
-    def _with(self, air: Column | None, wheel: Wheel | None) -> AirStep | WheelStep:
+    def _with(self, air: Column | None, wheel: MovingWheel | None) -> AirStep | WheelStep:
         """Include air or wheel: append its unknowns to all arrays with one row each. Collective."""
         first = self._gamma / (self._beta * self._step)
         second = (1 - self._a) / (self._beta * self._step**2)
@@ -366,7 +368,7 @@ class FullTire:
 
     def _solved_columns(self, right: np.ndarray) -> np.ndarray:
         """As `_by_factors`, with the modal damping in the system."""
-        return (self._joined or self._by_factors)(right)
+        return (self._with_modes or self._by_factors)(right)
 
     def _solved(self, right: np.ndarray) -> np.ndarray:
         """Displacement (own rows) in equilibrium with forces (own rows) at the end of the step."""
@@ -374,8 +376,8 @@ class FullTire:
         if self._air:
             air = self._air.shared(air)
             own = self._air.right(own, air)
-        if self._joined:
-            free = self._joined(own[:, None])[:, 0]
+        if self._with_modes:
+            free = self._with_modes(own[:, None])[:, 0]
         else:
             b, x = self._vectors
             b.array[:] = own

@@ -24,15 +24,15 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from tireroad.modal.solver.fields import congruent, largest_entry, less, row_sum, rows_of
-from tireroad.modal.solver.slicing import ALONE, Team
-from tireroad.modal.solver.symmetry import TOLERANCE, Sites
+from tireroad.modal.solver.slicing import ALONE, ProcessGroup
+from tireroad.modal.solver.symmetry import TOLERANCE, DofPositions
 
 _NEAR = 1e-6  # of the body's size: distance within which nodes are images of each other
 _LONGEST = 4  # most nodes of a segment along the ring
 
 
 @dataclass(frozen=True)
-class Ring:
+class RepeatingMatrix:
     """A matrix that repeats from segment to segment.
 
     `turn` (n, n) maps the components of all segments, in sequence, to the unknowns; `blocks`
@@ -57,7 +57,7 @@ class Ring:
         """Whether the modes of a wave number are single, not in pairs."""
         return n == 0 or 2 * n == self.segments
 
-    def wave(self, n: int, team: Team = ALONE) -> Wave:
+    def wave(self, n: int, team: ProcessGroup = ALONE) -> Wave:
         """The problem of one wave number, own rows of it in the team."""
         matrix, basis, copies = self._problem(n)
         return Wave(self, n, matrix[team.own(matrix.shape[0])], basis, copies)
@@ -97,7 +97,7 @@ class Wave:
     Own rows of a `matrix` (d, d), real symmetric; `basis` (., d) maps its vectors to v.
     """
 
-    ring: Ring
+    ring: RepeatingMatrix
     number: int
     matrix: sparse.csr_matrix
     basis: sparse.csr_matrix
@@ -117,7 +117,7 @@ class Wave:
         return self.ring.turn @ (scale * fields)
 
 
-def repeated(matrix: PETSc.Mat, sites: Sites) -> Ring | None:
+def repeated(matrix: PETSc.Mat, sites: DofPositions) -> RepeatingMatrix | None:
     """The matrix (n, n) as a ring of as many equal segments as possible; None if it is not one.
 
     `sites` of all unknowns on every process. Collective.
@@ -161,7 +161,7 @@ def _segments(points: np.ndarray, angle: np.ndarray, count: int, near: float) ->
 
 def _verified(
     matrix: PETSc.Mat, points: np.ndarray, angle: np.ndarray, nodes: np.ndarray
-) -> Ring | None:
+) -> RepeatingMatrix | None:
     """The ring; None if rotation by one segment changes the matrix. Collective."""
     count, each = nodes.shape[0], 3 * nodes.shape[1]
     turn = _turned(angle, nodes.ravel())
@@ -192,10 +192,10 @@ def _verified(
     for along_axle in (1.0, -1.0):
         kept = _kept(points[own], within, 2 * np.pi / count, along_axle)
         if kept is not None:
-            ring = Ring(count, turn, blocks, np.repeat(within, 3), kept, defect)
+            ring = RepeatingMatrix(count, turn, blocks, np.repeat(within, 3), kept, defect)
             if ring.is_kept():
                 return ring
-    return Ring(count, turn, blocks, np.repeat(within, 3), None, defect)
+    return RepeatingMatrix(count, turn, blocks, np.repeat(within, 3), None, defect)
 
 
 def _turned(angle: np.ndarray, order: np.ndarray) -> sparse.csr_matrix:

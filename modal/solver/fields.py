@@ -26,7 +26,7 @@ from scipy import sparse
 
 from tireroad.fem.collective import from_local_rows, summed
 from tireroad.fem.matrices.operators import Compound
-from tireroad.modal.solver.slicing import Part, Slice, Team
+from tireroad.modal.solver.slicing import ProcessGroup, Slice, SymmetricPart
 
 
 def congruent(matrix: PETSc.Mat, basis: sparse.csr_matrix) -> PETSc.Mat:
@@ -106,7 +106,11 @@ def everywhere(matrix: PETSc.Mat) -> sparse.csr_matrix:
 
 
 def collect(
-    matrix: PETSc.Mat, parts: Sequence[Part], found: list[Slice], order: np.ndarray, team: Team
+    matrix: PETSc.Mat,
+    parts: Sequence[SymmetricPart],
+    found: list[Slice],
+    order: np.ndarray,
+    team: ProcessGroup,
 ) -> np.ndarray:
     """This process's rows of the vectors in the given order. Collective.
 
@@ -245,7 +249,9 @@ def ordered(values: np.ndarray, family: np.ndarray, same: float) -> tuple[np.nda
     return order, np.concatenate([[0], np.cumsum(change)])
 
 
-def turn_to_rule(comm: MPI.Comm, vectors: np.ndarray, rank: np.ndarray, group: np.ndarray) -> None:
+def normalise_modes(
+    comm: MPI.Comm, vectors: np.ndarray, rank: np.ndarray, group: np.ndarray
+) -> None:
     """Fix signs, and bases of groups (m,) of more than one column, of own rows (n, m) in place.
     Collective.
 

@@ -47,7 +47,7 @@ from tireroad.fem.static.checkpoint import Entry, Journal
 
 
 @dataclass(frozen=True)
-class Team:
+class ProcessGroup:
     """The team of this process.
 
     `comm`: its processes; `number`: its number; `roots`: the rank, among all processes, of the
@@ -60,7 +60,7 @@ class Team:
     roots: tuple[int, ...]
 
     @classmethod
-    def of(cls, comm: MPI.Comm, teams: int) -> Team:
+    def of(cls, comm: MPI.Comm, teams: int) -> ProcessGroup:
         """The team of this process when all are divided into `teams` of about equal size.
 
         Collective over all of `comm`.
@@ -125,7 +125,7 @@ class Team:
         return every
 
 
-ALONE = Team(MPI.COMM_SELF, 0, (0,))
+ALONE = ProcessGroup(MPI.COMM_SELF, 0, (0,))
 
 
 def how_many(comm: MPI.Comm, needed: float, room: float) -> int:
@@ -200,7 +200,7 @@ class Shifted:
     fails. Collective in the team.
     """
 
-    def __init__(self, matrix: sparse.csr_matrix, shift: float, team: Team = ALONE) -> None:
+    def __init__(self, matrix: sparse.csr_matrix, shift: float, team: ProcessGroup = ALONE) -> None:
         self.rows, self.size = matrix.shape
         self.shift, self.team = shift, team
         sizes = ((self.rows, self.size), (self.rows, self.size))
@@ -258,7 +258,7 @@ _CLEAN = 1e-9  # of the largest: components after whose removal a block is ortho
 _LOST = 1e-8  # of the largest: a direction of a new block shorter than this is rounding
 
 
-class Basis:
+class KrylovBasis:
     """Orthonormal vectors (n, m), own rows, orthogonal to `known` (n, k), grown by blocks."""
 
     def __init__(self, shifted: Shifted, known: np.ndarray, most: int, seed: int) -> None:
@@ -336,7 +336,7 @@ def nearest(
     The search ends when `wanted` have converged, to a residual below the tolerance relative to
     theta, or when the basis is full. Each process has its rows. Collective in the team.
     """
-    basis = Basis(shifted, known, _LENGTH * wanted + _MORE * BLOCK, 7 + known.shape[1])
+    basis = KrylovBasis(shifted, known, _LENGTH * wanted + _MORE * BLOCK, 7 + known.shape[1])
     blocks = 0
     while True:
         basis.grow()
@@ -399,7 +399,7 @@ class Interval:
 
 
 def eigenpairs(
-    matrix: sparse.csr_matrix, interval: Interval, team: Team = ALONE
+    matrix: sparse.csr_matrix, interval: Interval, team: ProcessGroup = ALONE
 ) -> tuple[np.ndarray, np.ndarray]:
     """The `count` eigenvalues in the interval, ascending, and orthonormal vectors (n, count).
 
@@ -428,7 +428,7 @@ def eigenpairs(
 
 
 def by_slepc(
-    matrix: sparse.csr_matrix, interval: Interval, team: Team = ALONE
+    matrix: sparse.csr_matrix, interval: Interval, team: ProcessGroup = ALONE
 ) -> tuple[np.ndarray, np.ndarray]:
     """The same by SLEPc: Krylov-Schur with spectrum slicing, which chooses slices and shifts itself.
 
@@ -544,7 +544,7 @@ def _hertz(square: float) -> float:
     return float(np.sign(square) * np.sqrt(abs(square)) / (2 * np.pi))
 
 
-def _regular_shift(matrix: sparse.csr_matrix, interval: Interval, team: Team) -> Shifted:
+def _regular_shift(matrix: sparse.csr_matrix, interval: Interval, team: ProcessGroup) -> Shifted:
     """Factorised at a shift near the middle that is no eigenvalue; else ConvergenceError."""
     width = interval.high - interval.low
     for part in (0.5, 0.507, 0.489, 0.523):
@@ -569,7 +569,7 @@ _FINEST = 1e-9  # relative width below which a crowded interval counts as one cl
 _CROWDED = 1.6  # times the wanted number in a step: above, a boundary in between costs less
 
 
-class Part(Protocol):
+class SymmetricPart(Protocol):
     """A part of a symmetric problem: own rows in the team of a sparse `matrix` (d, d), each
     eigenvalue of which stands for `copies` equal ones of the whole.
     """
@@ -598,7 +598,7 @@ class Slice:
 
 
 @dataclass(frozen=True)
-class Bottom:
+class LowestEigenvalues:
     """`negative` eigenvalues of all parts lie below -`zero`; `near` (k,) estimates those next to
     zero, ascending.
     """
@@ -619,7 +619,7 @@ class Bottom:
             )
 
 
-class Spectrum:
+class SymmetricProblem:
     """Independent parts of a symmetric problem, the same in all teams of the processes of `comm`;
     no eigenvalue is larger than `norm`. The `journal` holds earlier results; `solver`, of `SOLVERS`.
     """
@@ -627,8 +627,8 @@ class Spectrum:
     def __init__(
         self,
         comm: MPI.Comm,
-        parts: list[Part],
-        team: Team,
+        parts: list[SymmetricPart],
+        team: ProcessGroup,
         norm: float,
         journal: Journal | None = None,
         solver: str = AUTO,
@@ -638,7 +638,7 @@ class Spectrum:
         self._journal = journal or Journal()
         self.bound = 1.001 * norm
 
-    def _shared(self, work: Callable[[Part], np.ndarray | int]) -> list[np.ndarray]:
+    def _shared(self, work: Callable[[SymmetricPart], np.ndarray | int]) -> list[np.ndarray]:
         """Results for each part, computed by one team and shared with every process. Collective."""
         roots = self.team.roots
         own = range(self.team.number, len(self.parts), len(roots))
@@ -648,11 +648,11 @@ class Spectrum:
         everyone = self.comm.allgather({k: entry[str(k)] for k in own})
         return [everyone[roots[k % len(roots)]][k] for k in range(len(self.parts))]
 
-    def bottom(self) -> Bottom:
+    def bottom(self) -> LowestEigenvalues:
         """Negative eigenvalues by inertia, and estimates of the lowest. Collective."""
         zero = RIGID * self.bound
 
-        def work(part: Part) -> np.ndarray:
+        def work(part: SymmetricPart) -> np.ndarray:
             shifted = Shifted(part.matrix, -zero, self.team)
             estimates = np.repeat(_near(shifted) - zero, part.copies)
             negative = part.copies * shifted.negative
@@ -661,12 +661,14 @@ class Spectrum:
 
         found = self._shared(work)
         negative = int(sum(one[-1] for one in found))
-        return Bottom(zero, negative, np.sort(np.concatenate([one[:-1] for one in found])))
+        return LowestEigenvalues(
+            zero, negative, np.sort(np.concatenate([one[:-1] for one in found]))
+        )
 
     def below(self, shift: float) -> np.ndarray:
         """Inertia counts (parts,) below the shift, copies included. Collective."""
 
-        def work(part: Part) -> int:
+        def work(part: SymmetricPart) -> int:
             shifted = Shifted(part.matrix, shift, self.team)
             negative = shifted.negative
             shifted.destroy()
@@ -675,7 +677,7 @@ class Spectrum:
         return np.array(self._shared(work))
 
     def boundaries(
-        self, bottom: Bottom, count: int, limit: float
+        self, bottom: LowestEigenvalues, count: int, limit: float
     ) -> list[tuple[float, np.ndarray]]:
         """(value, eigenvalues below it in each part), ascending, in steps of about one slice.
 

@@ -20,9 +20,9 @@ from petsc4py import PETSc
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from tireroad.fem.collective import joined
+from tireroad.fem.collective import allgather_rows
 from tireroad.modal.solver.fields import largest_entry, multiply, rows_of
-from tireroad.modal.solver.slicing import Team
+from tireroad.modal.solver.slicing import ProcessGroup
 
 # Largest entry of R A R - A relative to that of A. A symmetric state converges to about 1e-13; a
 # road load, a slope of the footprint or a different mesh on one side gives 1e-6 and more.
@@ -53,7 +53,7 @@ HALF_TURN = Isometry("half turn about z", (-1.0, -1.0, 1.0))
 
 
 @dataclass(frozen=True)
-class Sites:
+class DofPositions:
     """The positions of the unknowns.
 
     `place` (n, 3) m, undeformed; `component` (n,): 0, 1, 2 for displacements along x, y, z and 3,
@@ -64,13 +64,13 @@ class Sites:
     component: np.ndarray
 
     @staticmethod
-    def of_nodes(points: np.ndarray) -> Sites:
+    def of_nodes(points: np.ndarray) -> DofPositions:
         """Three displacements at each of the points (k, 3)."""
-        return Sites(np.repeat(points, 3, axis=0), np.tile(np.arange(3), len(points)))
+        return DofPositions(np.repeat(points, 3, axis=0), np.tile(np.arange(3), len(points)))
 
-    def everywhere(self, comm: MPI.Comm) -> Sites:
+    def everywhere(self, comm: MPI.Comm) -> DofPositions:
         """The sites of all processes, concatenated. Collective."""
-        return Sites(*(joined(comm, part) for part in vars(self).values()))
+        return DofPositions(*(allgather_rows(comm, part) for part in vars(self).values()))
 
     def rank(self) -> np.ndarray:
         """(n,) rank of each unknown, ordered by position, lowest points first, then by component.
@@ -103,13 +103,13 @@ class Sector:
         return self.basis @ vectors
 
 
-def whole(matrix: PETSc.Mat, team: Team) -> Sector:
+def whole(matrix: PETSc.Mat, team: ProcessGroup) -> Sector:
     """The undivided problem. Collective."""
     size = matrix.getSize()[0]
     return Sector(sparse.identity(size, format="csr"), _own_rows(matrix, team))
 
 
-def _own_rows(matrix: PETSc.Mat, team: Team) -> sparse.csr_matrix:
+def _own_rows(matrix: PETSc.Mat, team: ProcessGroup) -> sparse.csr_matrix:
     own = team.own(matrix.getSize()[0])
     return rows_of(matrix, np.arange(own.start, own.stop))
 
@@ -127,7 +127,7 @@ class Symmetry:
     defect: float
 
 
-def symmetries(matrix: PETSc.Mat, sites: Sites) -> list[Symmetry]:
+def symmetries(matrix: PETSc.Mat, sites: DofPositions) -> list[Symmetry]:
     """Independent symmetries of the matrix (n, n), with the `sites` of all its unknowns.
     Collective.
 
@@ -140,7 +140,7 @@ def symmetries(matrix: PETSc.Mat, sites: Sites) -> list[Symmetry]:
     return [symmetry for symmetry in found if symmetry]
 
 
-def _found(matrix: PETSc.Mat, sites: Sites, isometry: Isometry) -> Symmetry | None:
+def _found(matrix: PETSc.Mat, sites: DofPositions, isometry: Isometry) -> Symmetry | None:
     image = _permutation(sites, isometry)
     if image is None:
         return None
@@ -161,12 +161,12 @@ def _change(matrix: PETSc.Mat, image: sparse.csr_matrix) -> float:
     comm, own = matrix.comm.tompi4py(), slice(*matrix.getOwnershipRange())
     signs = np.random.default_rng(11).choice([-1.0, 1.0], (matrix.getSize()[0], _PROBES))
     straight = multiply(matrix, signs[own])
-    turned = image[own] @ joined(comm, multiply(matrix, (image @ signs)[own]))
+    turned = image[own] @ allgather_rows(comm, multiply(matrix, (image @ signs)[own]))
     length = np.sqrt(((turned - straight) ** 2).mean(axis=1)).max(initial=0.0)
     return comm.allreduce(float(length), MPI.MAX)
 
 
-def sectors(matrix: PETSc.Mat, images: list[sparse.csr_matrix], team: Team) -> list[Sector]:
+def sectors(matrix: PETSc.Mat, images: list[sparse.csr_matrix], team: ProcessGroup) -> list[Sector]:
     """The parts into which commuting signed permutations of order two split a symmetric matrix.
 
     Without any it stays whole. Collective.
@@ -177,7 +177,7 @@ def sectors(matrix: PETSc.Mat, images: list[sparse.csr_matrix], team: Team) -> l
     return [_sector(matrix, basis, team) for basis in bases]
 
 
-def _sector(matrix: PETSc.Mat, basis: sparse.csr_matrix, team: Team) -> Sector:
+def _sector(matrix: PETSc.Mat, basis: sparse.csr_matrix, team: ProcessGroup) -> Sector:
     """Q^T A Q from the rows of A that each piece of Q reaches. Collective."""
     own, columns = team.own(basis.shape[1]), basis.tocsc()
     parts = []
@@ -190,7 +190,7 @@ def _sector(matrix: PETSc.Mat, basis: sparse.csr_matrix, team: Team) -> Sector:
     return Sector(basis, part)
 
 
-def _permutation(sites: Sites, isometry: Isometry) -> sparse.csr_matrix | None:
+def _permutation(sites: DofPositions, isometry: Isometry) -> sparse.csr_matrix | None:
     """The signed permutation that maps a field to its image; None if an unknown has no image."""
     size = len(sites.component)
     image, sign = np.empty(size, int), np.empty(size)

@@ -24,14 +24,22 @@ from tireroad.modal.solver.fields import (
     CHUNK,
     collect,
     multiply,
+    normalise_modes,
     ordered,
     orthonormalise,
     row_sum,
     scaled_by,
-    turn_to_rule,
 )
-from tireroad.modal.solver.slicing import AUTO, Bottom, Modes, Part, Slice, Spectrum, Team
-from tireroad.modal.solver.symmetry import Sites, sectors, symmetries, whole
+from tireroad.modal.solver.slicing import (
+    AUTO,
+    LowestEigenvalues,
+    Modes,
+    ProcessGroup,
+    Slice,
+    SymmetricPart,
+    SymmetricProblem,
+)
+from tireroad.modal.solver.symmetry import DofPositions, sectors, symmetries, whole
 
 RESIDUAL_TOLERANCE = 1e-8  # relative, per eigenpair
 MOST = 1e-6  # where rounding alone exceeds the tolerance
@@ -43,7 +51,7 @@ _SAME = 1e-10  # relative distance of equal eigenvalues, where rounding is no la
 class _Split:
     """Independent `parts` of the problem, their origin, and the `defect` of A's symmetry, 1/s2."""
 
-    parts: list[Part]
+    parts: list[SymmetricPart]
     defect: float = 0.0
     segments: int = 1
     symmetries: tuple[str, ...] = ()
@@ -53,7 +61,7 @@ class _Split:
 class _Proof:
     """What inertia proves: the eigenvalues next to zero, and how many lie below `top`."""
 
-    bottom: Bottom
+    bottom: LowestEigenvalues
     top: float
     inertia: int
 
@@ -64,7 +72,7 @@ def solve(
     count: int | None = None,
     *,
     up_to: float = np.inf,
-    sites: Sites | None = None,
+    sites: DofPositions | None = None,
     waves: bool = True,
     teams: int | None = None,
     journal: Journal | None = None,
@@ -85,7 +93,7 @@ def solve(
     all_sites = None if sites is None else sites.everywhere(comm)
     rank = np.arange(size) if all_sites is None else all_sites.rank()
     own = slice(*scaled.getOwnershipRange())
-    team = Team.of(comm, teams or comm.size)
+    team = ProcessGroup.of(comm, teams or comm.size)
     taken = AUTO if solver == "auto" else solver
     problem = _Problem(scaled, team, row_sum(scaled), mass, rank[own], journal or Journal(), taken)
     count, limit = min(count or size, size), (2 * np.pi * up_to) ** 2
@@ -98,7 +106,9 @@ def solve(
     return problem.checked(modes, split.defect)
 
 
-def _splits(matrix: PETSc.Mat, sites: Sites | None, waves: bool, team: Team) -> Iterator[_Split]:
+def _splits(
+    matrix: PETSc.Mat, sites: DofPositions | None, waves: bool, team: ProcessGroup
+) -> Iterator[_Split]:
     """Ways to split the problem, the finest first, the undivided problem last. Collective."""
     if sites is not None:
         ring = repeated(matrix, sites) if waves else None
@@ -106,7 +116,7 @@ def _splits(matrix: PETSc.Mat, sites: Sites | None, waves: bool, team: Team) -> 
             yield _Split([ring.wave(n, team) for n in ring.waves], ring.defect, ring.segments)
         found = symmetries(matrix, sites)
         if found:
-            parts: list[Part] = [*sectors(matrix, [one.image for one in found], team)]
+            parts: list[SymmetricPart] = [*sectors(matrix, [one.image for one in found], team)]
             names = tuple(one.isometry.name for one in found)
             yield _Split(parts, sum(one.defect for one in found), symmetries=names)
     yield _Split([whole(matrix, team)])
@@ -120,7 +130,7 @@ class _Problem:
     """
 
     scaled: PETSc.Mat
-    team: Team
+    team: ProcessGroup
     norm: float
     mass: np.ndarray
     rank: np.ndarray
@@ -133,7 +143,9 @@ class _Problem:
 
     def solve(self, split: _Split, count: int, limit: float) -> Modes:
         """Solve all slices of the parts. Collective."""
-        spectrum = Spectrum(self.comm, split.parts, self.team, self.norm, self.journal, self.solver)
+        spectrum = SymmetricProblem(
+            self.comm, split.parts, self.team, self.norm, self.journal, self.solver
+        )
         bottom = spectrum.bottom()
         bottom.check_stable()
         boundaries = spectrum.boundaries(bottom, count, limit)
@@ -160,7 +172,7 @@ class _Problem:
         part = np.concatenate([np.full(len(one.values), one.part) for one in found])[order]
         defect = orthonormalise(self.comm, vectors, part)
         vectors /= np.sqrt(self.mass)[:, None]
-        turn_to_rule(self.comm, vectors, self.rank, group)
+        normalise_modes(self.comm, vectors, self.rank, group)
         squares, vectors = values[order][:count], vectors[:, :count]
         return Modes(
             squares=squares,
@@ -224,7 +236,7 @@ class _Problem:
         return np.sqrt(summed(self.comm, defects)) / np.maximum(squares, least)
 
 
-def _families(parts: list[Part], found: list[Slice]) -> np.ndarray:
+def _families(parts: list[SymmetricPart], found: list[Slice]) -> np.ndarray:
     """(k,) a number for each eigenpair: of its part and, within it, of the copy."""
     most = max(part.copies for part in parts)
     numbers = [

@@ -25,7 +25,7 @@ import h5py
 from tireroad.fem.form_cache import user_folder
 from tireroad.runs.files import store
 from tireroad.runs.files.disk import Refused, replacing, write_text
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 
 VARIABLE, OFF = "TIREROAD_CACHE", "off"
 SHARED = (
@@ -163,7 +163,7 @@ class Cache:
             _link(path, self.place(stage, key))
             self._prune()
         except (OSError, Refused) as error:
-            observe.say(f"  not kept for other runs, {VARIABLE} = {self.folder}: {error}")
+            console.say(f"  not kept for other runs, {VARIABLE} = {self.folder}: {error}")
 
     def _figures(self, stage: str, key: str) -> Path:
         return self.place(stage, key).with_suffix(".json")
@@ -184,7 +184,7 @@ class Cache:
                 try:
                     fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 except BlockingIOError:
-                    observe.say(f"{stage:9s} waits for another run that computes the same stage")
+                    console.say(f"{stage:9s} waits for another run that computes the same stage")
                     fcntl.flock(lock, fcntl.LOCK_EX)
             yield
 

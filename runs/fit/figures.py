@@ -27,7 +27,7 @@ from tireroad.fem.sections.radial import radial, size
 
 
 @dataclass(frozen=True)
-class Kind:
+class FigureKind:
     """A figure: unit, relative tolerance of a fit, range, key in a .tir file, and what it is."""
 
     unit: str
@@ -38,35 +38,39 @@ class Kind:
     doc: str
 
 
-KINDS: Mapping[str, Kind] = {
-    "mass": Kind("kg", 0.01, 1, 200, "MASS", "of the tire"),
-    "lateral_frequency": Kind("Hz", 0.02, 5, 500, "FREQ_LAT", "sidewise, rim held, no road"),
-    "yaw_frequency": Kind("Hz", 0.02, 5, 500, "FREQ_YAW", "yaw and tilt of the belt"),
-    "windup_frequency": Kind("Hz", 0.02, 5, 500, "FREQ_WINDUP", "belt against rim about the axle"),
-    "vertical_frequency": Kind("Hz", 0.02, 5, 500, "FREQ_LONG", "vertical and fore-aft"),
-    "lateral_damping": Kind("-", 0.2, 1e-4, 1, "DAMP_LAT", "damping ratio of these modes"),
-    "yaw_damping": Kind("-", 0.2, 1e-4, 1, "DAMP_YAW", "damping ratio"),
-    "windup_damping": Kind("-", 0.2, 1e-4, 1, "DAMP_WINDUP", "damping ratio"),
-    "vertical_damping": Kind("-", 0.2, 1e-4, 1, "DAMP_LONG", "damping ratio"),
-    "vertical_stiffness": Kind("N/m", 0.04, 1e4, 1e7, "VERTICAL_STIFFNESS", "slope at the load"),
-    "longitudinal_stiffness": Kind(
+KINDS: Mapping[str, FigureKind] = {
+    "mass": FigureKind("kg", 0.01, 1, 200, "MASS", "of the tire"),
+    "lateral_frequency": FigureKind("Hz", 0.02, 5, 500, "FREQ_LAT", "sidewise, rim held, no road"),
+    "yaw_frequency": FigureKind("Hz", 0.02, 5, 500, "FREQ_YAW", "yaw and tilt of the belt"),
+    "windup_frequency": FigureKind(
+        "Hz", 0.02, 5, 500, "FREQ_WINDUP", "belt against rim about the axle"
+    ),
+    "vertical_frequency": FigureKind("Hz", 0.02, 5, 500, "FREQ_LONG", "vertical and fore-aft"),
+    "lateral_damping": FigureKind("-", 0.2, 1e-4, 1, "DAMP_LAT", "damping ratio of these modes"),
+    "yaw_damping": FigureKind("-", 0.2, 1e-4, 1, "DAMP_YAW", "damping ratio"),
+    "windup_damping": FigureKind("-", 0.2, 1e-4, 1, "DAMP_WINDUP", "damping ratio"),
+    "vertical_damping": FigureKind("-", 0.2, 1e-4, 1, "DAMP_LONG", "damping ratio"),
+    "vertical_stiffness": FigureKind(
+        "N/m", 0.04, 1e4, 1e7, "VERTICAL_STIFFNESS", "slope at the load"
+    ),
+    "longitudinal_stiffness": FigureKind(
         "N/m", 0.05, 1e4, 1e7, "LONGITUDINAL_STIFFNESS", "standing tire, at the load"
     ),
-    "lateral_stiffness": Kind(
+    "lateral_stiffness": FigureKind(
         "N/m", 0.05, 1e4, 1e7, "LATERAL_STIFFNESS", "standing tire, at the load"
     ),
-    "torsional_stiffness": Kind(
+    "torsional_stiffness": FigureKind(
         "N m/rad", 0.15, 100, 1e6, "YAW_STIFFNESS", "about the vertical axis, at the load"
     ),
-    "footprint_length": Kind("m", 0.05, 0.01, 1, "", "at the load"),
-    "footprint_width": Kind("m", 0.05, 0.01, 1, "", "at the load"),
+    "footprint_length": FigureKind("m", 0.05, 0.01, 1, "", "at the load"),
+    "footprint_width": FigureKind("m", 0.05, 0.01, 1, "", "at the load"),
 }
 LOADS = 0.03  # relative tolerance of the load at a deflection
 MODES = "lateral", "yaw", "windup", "vertical"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Figures:
+class FitFigures:
     """`size`, `inflation` Pa, the `load` N at which stiffness and footprint hold, `values` by KINDS, and
     `loads`: pairs of deflection m and load N.
     """
@@ -85,7 +89,7 @@ class Figures:
         return bool(self.loads or set(self.values) - modal)
 
 
-def read(path: Path, changes: Sequence[str] = ()) -> Figures:
+def read(path: Path, changes: Sequence[str] = ()) -> FitFigures:
     """The figures in a file, with `changes` as key=value. Raises InputError with the key for what is no figure."""
     try:
         text = path.read_text(encoding="utf-8", errors="replace")
@@ -115,7 +119,7 @@ def _parsed(text: str, path: Path) -> dict:
         raise InputError(f"{path}: {error}") from None
 
 
-def _from_table(table: dict, path: Path, notes: list[str]) -> Figures:
+def _from_table(table: dict, path: Path, notes: list[str]) -> FitFigures:
     known = {"size", "inflation", "load", "loads", *KINDS}
     wrong = sorted(set(table) - known)
     if wrong:
@@ -143,7 +147,7 @@ def _from_table(table: dict, path: Path, notes: list[str]) -> Figures:
         load = loads[-1][1] if loads else 4000.0
         if any(name.endswith("stiffness") for name in values):
             notes.append(f"load = {load:g} N taken for the load at which stiffness holds")
-    return Figures(
+    return FitFigures(
         size=table["size"],
         inflation=_number(path, "inflation", table["inflation"], 1e4, 2e6, "Pa"),
         load=_number(path, "load", load, 10, 1e6, "N"),

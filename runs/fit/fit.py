@@ -22,8 +22,8 @@ from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.sections.construction import Construction
 from tireroad.fem.sections.inflated import InflatedRing
 from tireroad.fem.sections.radial import radial
-from tireroad.runs.fit.figures import KINDS, LOADS, MODES, Figures, read
-from tireroad.runs.process import observe
+from tireroad.runs.fit.figures import KINDS, LOADS, MODES, FitFigures, read
+from tireroad.runs.process import console
 
 WIDE = 1.0  # standard deviation of a parameter's logarithm where no figure speaks
 _STEP = 0.1  # of the finite differences, and the largest of an iteration is _TRUST
@@ -61,7 +61,7 @@ _LOSS = 0.1, 3.0
 class Fitted:
     """`factors` by parameter, and each figure with its target, what is `reached` and what the size alone gives."""
 
-    figures: Figures
+    figures: FitFigures
     factors: Mapping[str, float]
     start: Mapping[str, float]
     reached: Mapping[str, float]
@@ -71,7 +71,7 @@ class Fitted:
         return target(self.figures, name), self.start[name], self.reached[name]
 
 
-def target(figures: Figures, name: str) -> float:
+def target(figures: FitFigures, name: str) -> float:
     """The value asked for; of loads by "load at ... m"."""
     loads = {_load_name(deflection): load for deflection, load in figures.loads}
     return loads[name] if name in loads else figures.values[name]
@@ -112,7 +112,7 @@ def construction(size: str, factors: Mapping[str, float]) -> Construction:
 class Model:
     """Figures of a construction. `ratios`: of figures on the default mesh over those on the coarse one."""
 
-    def __init__(self, figures: Figures) -> None:
+    def __init__(self, figures: FitFigures) -> None:
         self.figures, self.ratios = figures, dict[str, float]()
         self._known: dict[str, dict[str, float]] = {}  # figures on the road by scene
         self.names = [
@@ -212,7 +212,7 @@ def _run(folder: Path) -> Path:
 
     mpi.start_petsc([])
     scene = load(folder / "scene.toml", [], lambda remark: None, "stiffness")
-    with observe.quiet():
+    with console.quiet():
         run(
             scene,
             folder / "out",
@@ -225,13 +225,13 @@ def _run(folder: Path) -> Path:
     return folder / "out"
 
 
-def fit(figures: Figures) -> Fitted:
+def fit(figures: FitFigures) -> Fitted:
     """The factors of the least sum of squares. Not collective; minutes with figures on the road, else seconds."""
     model = Model(figures)
     low, high = (np.log([getattr(one, end) for one in PARAMETERS]) for end in ("least", "most"))
     place = np.zeros(len(PARAMETERS))
     start = found = model.all({})
-    observe.say(f"  {figures.size} as built: {_worst(model, found)}")
+    console.say(f"  {figures.size} as built: {_worst(model, found)}")
     jacobian = _jacobian(model, place, found) if model.names else np.zeros((0, len(place)))
     for iteration in range(_ITERATIONS if model.names else 0):
         rest = model.residuals(found)
@@ -249,7 +249,7 @@ def fit(figures: Figures) -> Fitted:
             np.hypot(np.linalg.norm(model.residuals(one)), np.linalg.norm(at) / WIDE)
             for one, at in ((found, place), (new, place + step))
         )
-        observe.say(f"  iteration {iteration + 1}: {_worst(model, new)}")
+        console.say(f"  iteration {iteration + 1}: {_worst(model, new)}")
         if after < before:
             place, found = place + step, new
         if before - after < _ENOUGH * max(before, 1.0):
@@ -260,7 +260,7 @@ def fit(figures: Figures) -> Fitted:
     factors = _factors(place)
     if figures.pressed:
         found = model.free(factors) | model.pressed(factors, None)
-        observe.say(f"  on the default mesh: {_worst(model, found)}")
+        console.say(f"  on the default mesh: {_worst(model, found)}")
         start = dict(start) | model.pressed({}, None)
     factors |= _losses(figures, factors)
     return Fitted(figures, factors, start, found | model.free(factors))
@@ -270,7 +270,7 @@ def _corrected(model: Model, place: np.ndarray, found: Mapping[str, float]) -> d
     """Take the ratio of the default to the coarse mesh from here on; the figures by it."""
     fine = model.pressed(_factors(place), None)
     model.ratios = {name: value / found[name] for name, value in fine.items()}
-    observe.say("  ratios of the default mesh to the coarse one are known from here on")
+    console.say("  ratios of the default mesh to the coarse one are known from here on")
     return dict(found) | fine
 
 
@@ -286,7 +286,7 @@ def _jacobian(model: Model, place: np.ndarray, found: Mapping[str, float]) -> np
         columns.append(
             (model.residuals(model.all(_factors(moved))) - model.residuals(found)) / _STEP
         )
-        observe.say(f"  sensitivity to {one.name}: {one.doc}")
+        console.say(f"  sensitivity to {one.name}: {one.doc}")
     return np.array(columns).T
 
 
@@ -299,7 +299,7 @@ def _worst(model: Model, found: Mapping[str, float]) -> str:
     return f"{name} {100 * off[name]:+.1f} %, farthest off of {len(off)} figures"
 
 
-def _losses(figures: Figures, factors: Mapping[str, float]) -> dict[str, float]:
+def _losses(figures: FitFigures, factors: Mapping[str, float]) -> dict[str, float]:
     """Factors of the loss factors by the damping ratios, which are linear in them."""
     names = [f"{mode}_damping" for mode in MODES if f"{mode}_damping" in figures.values]
     if not names:
@@ -318,7 +318,7 @@ def _losses(figures: Figures, factors: Mapping[str, float]) -> dict[str, float]:
     return {f"{which} loss": float(value) for which, value in zip(_LOSSES, best, strict=True)}
 
 
-def tire_table(figures: Figures, factors: Mapping[str, float]) -> str:
+def tire_table(figures: FitFigures, factors: Mapping[str, float]) -> str:
     """The [tire] of a scene with these factors: size, compounds, carcass cords."""
     tire = construction(figures.size, factors)
     lines = ["[tire]", 'section = "radial"', f'size = "{figures.size}"']

@@ -69,7 +69,7 @@ def digits(value: float) -> str:
 
 
 @dataclass
-class Table:
+class TextTable:
     head: tuple[str, ...]
     rows: list[tuple[str, ...]]
 
@@ -89,7 +89,7 @@ class Section:
     lead: str = ""
     facts: list[tuple[str, str]] = field(default_factory=list)
     figures: list[Picture] = field(default_factory=list)
-    table: Table | None = None
+    table: TextTable | None = None
     sounds: list[tuple[str, str]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)

@@ -11,14 +11,14 @@ from matplotlib.figure import Figure
 
 from tireroad.fem.decks.compounds import SYSTEMS, Rubber
 from tireroad.fem.decks.deck import Deck
-from tireroad.fem.decks.history import History, history
+from tireroad.fem.decks.history import DeckHistory, history
 from tireroad.fem.decks.own import MESHES, Wishes, section_of
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections.construction import INFLATION, RADII
 from tireroad.runs.report.figures import COLOURS, WIDE, canvas, styled
 from tireroad.runs.report.section_figure import NAME, save_section
 from tireroad.runs.scene.sections.kinds.file import FileSection, own_section
-from tireroad.runs.scene.tables.tire import Tire
+from tireroad.runs.scene.tables.tire import TireTable
 
 _RIM = re.compile(r"RIM|BEAD|FLANGE|WHEEL")
 _INNER = re.compile(r"INNER|INSIDE|LINER|CAVITY|INFLAT|PRESS|_IN\b|^IN\b")
@@ -38,7 +38,7 @@ def describe_tire(path: Path, out: Path) -> str:
     """
     if not path.is_file():
         raise InputError(f"{path}: no such file")
-    steps = history(path) if path.suffix.lower() == ".inp" else History()
+    steps = history(path) if path.suffix.lower() == ".inp" else DeckHistory()
     if steps.has_steps and not steps.has_mesh:
         return "\n".join(
             [
@@ -67,7 +67,7 @@ def describe_tire(path: Path, out: Path) -> str:
         ) from None
     scene = write()
     keys = {key: getattr(wishes, key) for key in ("inner", "tread", "rim", "length_unit", "mirror")}
-    tire = Tire(section="file", shape=FileSection(file=str(path), **keys))
+    tire = TireTable(section="file", shape=FileSection(file=str(path), **keys))
     own = own_section(tire)
     radius, width = own.mesh.nodes[:, 0].max(), np.ptp(own.mesh.nodes[:, 1])
     kind = "section" if deck.dimension == 2 else "body"
@@ -182,7 +182,7 @@ def _table(path: Path, wishes: Wishes, guessed: dict[str, str]) -> list[str]:
     return rows
 
 
-def _run(steps: History, unit: str) -> list[str]:
+def _run(steps: DeckHistory, unit: str) -> list[str]:
     """The other tables, as far as the deck's steps give figures for them."""
     of = SYSTEMS[unit]
     force = of.stress * of.length**2

@@ -191,16 +191,16 @@ def operations(
         # 2.8 s for 400 coordinates, 62 to 82 s for 2,060 to 2,280: blocks fill the caches.
         parts["rotating"] = 0.7 * pairs**2 * max(1.0, pairs / 12) * (1 + size.speeds)
     if "contact" not in left_out:
-        loads = size.nodes * (3 if scene.contact.rubs else 1)
+        loads = size.nodes * (3 if scene.contact.has_friction else 1)
         parts["greens"] = 3.0 * mesh * loads / 277
         if scene.greens.residual == "attachment":  # solved for both sides, and joined to the modes
             parts["greens"] *= 1.6
         # Conjugate gradients: 12 ms for 3,041 points.
         points = size.points**2 if dense else 4000 * size.points
         step = 2e-4 + 1e-9 * (4 * loads * size.coordinates + points)
-        if scene.contact.rubs:
-            sheared = _SHEARED + _SHEARED_POINT * size.touching
-            step += sheared if scene.contact.sheared else _BRISTLES
+        if scene.contact.has_friction:
+            has_shear = _SHEARED + _SHEARED_POINT * size.touching
+            step += has_shear if scene.contact.has_shear else _BRISTLES
         if scene.time.scheme == "convolution":
             step += 1e-9 * 0.5 * size.steps * loads**2
         parts["contact loop"] = size.steps * step
@@ -248,7 +248,7 @@ def disk(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, float
         )
     if "contact" not in left_out:
         # A checkpoint is a copy of contact.h5 so far.
-        numbers = size.points * (3 + 2 * (scene.contact.rubs)) + 10
+        numbers = size.points * (3 + 2 * (scene.contact.has_friction)) + 10
         parts["contact.h5"] = HEADER + 2 * PACKED * 8.0 * size.steps * numbers
         parts["greens.h5"] = HEADER + 16.0 * 2 * size.nodes * (2 * size.coordinates + size.nodes)
     if "response" not in left_out:
@@ -423,7 +423,7 @@ def _each_step(scene: Scene, points: int) -> int:
 
 
 def _contact_memory(scene: Scene, size: Sizes) -> dict[str, float]:
-    directions = 3 if scene.contact.rubs else 1
+    directions = 3 if scene.contact.has_friction else 1
     loads = directions * size.nodes
     shapes = SHAPES.get(scene.greens.residual, 0)
     parts = {
@@ -446,8 +446,8 @@ def _in_the_loop(scene: Scene, size: Sizes, directions: int) -> float:
     steps and as arrays of them, with two more for checks and nine for the work of a piece.
     """
     dense = _matrices_of_points(scene, size)
-    slipping = SLIPPING * size.touching**2 if scene.contact.rubs else 0
-    each = 2 + (2 if scene.contact.rubs else 0) + 2 * directions
+    slipping = SLIPPING * size.touching**2 if scene.contact.has_friction else 0
+    each = 2 + (2 if scene.contact.has_friction else 0) + 2 * directions
     steps = min(size.steps, BLOCK) * size.points
     pieces = min(size.steps, PIECE) * size.points * 9 * directions
     counted = dense * PIVOTED / PIVOT + (2 * each + 1 + 2) * steps + pieces

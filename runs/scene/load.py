@@ -42,7 +42,7 @@ from tireroad.runs.scene.schema import (
     variant_of,
 )
 from tireroad.runs.scene.source import Path_, Source, parts, shortened
-from tireroad.runs.scene.tables.scene import Damping, Modal, Road, Scene, filled
+from tireroad.runs.scene.tables.scene import DampingTable, ModalTable, RoadTable, Scene, filled
 from tireroad.runs.scene.tables.tire import SECTIONS, check_series
 
 LARGEST = 1_000_000
@@ -246,7 +246,7 @@ def with_points(scene: Scene, raw: dict[str, Any], say: Say) -> Scene:
     if (
         contact is None
         or contact.on_nodes
-        or contact.rubs
+        or contact.has_friction
         or rotation is None
         or not rotation.speed
     ):
@@ -298,7 +298,7 @@ def with_speed(scene: Scene) -> Scene:
 def with_damping(scene: Scene) -> Scene:
     """Set the default proportional damping if neither it nor a compound's loss factor is given."""
     loses = scene.tire.shape.has_losses(scene.tire)
-    return replace(scene, damping=Damping()) if scene.damping is None and not loses else scene
+    return replace(scene, damping=DampingTable()) if scene.damping is None and not loses else scene
 
 
 def with_road(scene: Scene, say: Say) -> Scene:
@@ -306,7 +306,7 @@ def with_road(scene: Scene, say: Say) -> Scene:
     if scene.contact is None or scene.road is not None:
         return scene
     say("no [road]: it is flat")
-    return replace(scene, road=Road())
+    return replace(scene, road=RoadTable())
 
 
 def with_outputs(scene: Scene, say: Say) -> Scene:
@@ -323,7 +323,7 @@ def with_modal(scene: Scene, until: str | None) -> Scene:
     """Set the default [modal] where something needs modes, or the run is to end with them."""
     needed = scene.contact, scene.force, scene.rotation, scene.axle.kind != "fixed"
     if scene.modal is None and (any(needed) or until in ("modes", "rotating")):
-        return replace(scene, modal=Modal())
+        return replace(scene, modal=ModalTable())
     return scene
 
 

@@ -10,8 +10,7 @@ from tireroad.contact.roads.placement import begun_at, moved_start, shown
 from tireroad.contact.roads.road import RoadKind, placed
 from tireroad.contact.roads.under_tire import Road, is_level
 from tireroad.fem.errors import InputError
-from tireroad.runs.scene.tables.scene import Road as Table
-from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.scene.tables.scene import RoadTable, Scene
 
 # Least ratio of a pressed tire's effective rolling radius to its outer radius, and farthest reach
 # of the patch ahead of the axle, m: only what a run would certainly refuse is refused here.
@@ -73,7 +72,7 @@ def remarks(scene: Scene) -> list[str]:
     return notes
 
 
-def never_met(road: Table) -> list[str]:
+def never_met(road: RoadTable) -> list[str]:
     """A warning of a road with heights under a wheel that stands, at the start of the run-in."""
     if road.kind == "flat" and not road.offset:
         return []
@@ -83,14 +82,14 @@ def never_met(road: Table) -> list[str]:
     ]
 
 
-def foot(road: Table) -> float | None:
+def foot(road: RoadTable) -> float | None:
     """The foot (m) of a step's or cleat's first edge; None for other roads, and on a drum."""
     if isinstance(road.surface, Edges) and road.drum_radius is None:
         return road.surface.position
     return None
 
 
-def within_run_in(road: Table, place: float, share: float | None = None) -> str:
+def within_run_in(road: RoadTable, place: float, share: float | None = None) -> str:
     """A warning of an obstacle at x = `place` (m) that is met at a `share` of its height only."""
     met = "less" if share is None else f"{100 * share:.2g} %"
     return (
@@ -99,7 +98,7 @@ def within_run_in(road: Table, place: float, share: float | None = None) -> str:
     )
 
 
-def _level(table: Table, road: Road, start: float, end: float) -> bool:
+def _level(table: RoadTable, road: Road, start: float, end: float) -> bool:
     """Whether a road has one height from `start` to `end` (m), on both sides of the tire's path.
 
     Of a long road only `LOOKED` m are looked at: bounds of files and textures take time.
@@ -111,7 +110,7 @@ def _level(table: Table, road: Road, start: float, end: float) -> bool:
     return all(is_level(whole, start, last, *beside) for last in (min(start + 2.0, end), end))
 
 
-def without_relief(road: Table, first: float, last: float) -> str:
+def without_relief(road: RoadTable, first: float, last: float) -> str:
     """A warning of a road that has the same height all over the run, from `first` to `last` (m)."""
     key = "road.position, road.start" if hasattr(road.surface, "position") else "road.start"
     return (

@@ -224,17 +224,20 @@ def _contact(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     contact, static = scene.contact, scene.static
     if contact is None:
         return
-    if static.friction is not None and contact.rubs:
+    if static.friction is not None and contact.has_friction:
         raise error(
             ("static", "friction"),
             "and contact.friction or the bristles of contact.brush_stiffness carry the same horizontal forces: keep one of "
             "them",
         )
     standing = scene.rotation is None or scene.rotation.speed == 0
-    rubs = static.friction is not None
-    check_tread(contact, standing, error, rubs)
+    has_friction = static.friction is not None
+    check_tread(contact, standing, error, has_friction)
     rotation = scene.rotation
-    for key, pulls in (("free_rolling", contact.rubs), ("slip_angle", contact.rubs or rubs)):
+    for key, pulls in (
+        ("free_rolling", contact.has_friction),
+        ("slip_angle", contact.has_friction or has_friction),
+    ):
         if rotation is not None and getattr(rotation, key) and (not pulls or standing):
             raise error(
                 ("rotation", key),

@@ -27,7 +27,7 @@ DIRECTIONS = 16  # of waves, over a quarter turn
 
 
 @dataclass(frozen=True)
-class Wall:
+class ModeDensity:
     """N = A/4π (k² + s² ω (ω - ω_s)) modes up to ω, k² averaged over the directions of waves.
 
     k is the wave number of bending waves in a shallow shell (Donnell), ρh (ω² - ω_c²) = B k⁴ + T k²,
@@ -70,7 +70,7 @@ class Wall:
         return low
 
 
-def wall_of(scene: Scene) -> Wall:
+def wall_of(scene: Scene) -> ModeDensity:
     """The wall, from the section's height and thickness; tension as in a circle of that radius.
 
     With cords its bending waves are those of a flat plate: cords hinder the stretching of rubber, and
@@ -83,7 +83,7 @@ def wall_of(scene: Scene) -> Wall:
     cords = bool(shape.angles(scene.tire))
     theta = (np.arange(DIRECTIONS) + 0.5) / DIRECTIONS * math.pi / 2
     curved = np.cos(theta) ** 2 / tire.height + np.sin(theta) ** 2 / tire.outer_radius
-    return Wall(
+    return ModeDensity(
         area=2 * math.pi * middle * 2 * math.radians(tire.half_angle) * tire.height,
         mass=density * tire.thickness,
         bending=youngs * tire.thickness**3 / (12 * (1 - poisson**2)),

@@ -27,8 +27,7 @@ from tireroad.runs.files.disk import signed, write_text
 from tireroad.runs.files.folder import CHOSEN, make_folder
 from tireroad.runs.files.store import identity
 from tireroad.runs.scene.resolved import dumps
-from tireroad.runs.scene.tables.scene import Accuracy as Wanted
-from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.scene.tables.scene import AccuracyTable, Scene
 from tireroad.runs.search.settings import Settings
 
 if TYPE_CHECKING:  # a report reads the journal without finite elements
@@ -38,7 +37,7 @@ VERTICAL = 2
 
 
 @dataclass(frozen=True)
-class Found:
+class ErrorsByCause:
     """Estimated errors of a run's vertical force by cause; NaN where unknown.
 
     `history` and `mean`: relative; `level` dB of each third octave at `centre` Hz, up to the
@@ -51,7 +50,7 @@ class Found:
     level: Mapping[str, tuple[float, ...]]
 
     @classmethod
-    def of(cls, product: Accuracy, wanted: Wanted) -> Found:
+    def of(cls, product: Accuracy, wanted: AccuracyTable) -> ErrorsByCause:
         """Errors of the force that the target applies to."""
         bars = product.by_cause.get(wanted.of, {})
         below = np.flatnonzero(product.centre <= product.up_to)
@@ -67,7 +66,7 @@ class Found:
             },
         )
 
-    def over(self, wanted: Wanted) -> np.ndarray:
+    def over(self, wanted: AccuracyTable) -> np.ndarray:
         """Errors (causes, figures) over their targets; infinite where unknown."""
         columns = []
         if wanted.target is not None:
@@ -87,7 +86,7 @@ def worst(over: np.ndarray) -> tuple[float, int]:
     return float(totals[figure]), figure
 
 
-def shown(over: np.ndarray, wanted: Wanted) -> str:
+def shown(over: np.ndarray, wanted: AccuracyTable) -> str:
     """The error and its shares in words, for the figure that is furthest from its target."""
     total, figure = worst(over)
     relative = 2 if wanted.target is not None else 0
@@ -151,12 +150,12 @@ class Trial:
     settings: Settings
     seconds: Mapping[str, float]
     spent: float
-    found: Found | None = None
+    found: ErrorsByCause | None = None
     scheme: str = ""
     failed: str = ""
 
 
-class Journal:
+class SearchJournal:
     """The trials of a search in a folder; the file is rewritten after each. Root process only."""
 
     def __init__(self, directory: Path, scene: Scene) -> None:
@@ -198,14 +197,14 @@ def _trial(data: dict[str, Any]) -> Trial:
     found = data["found"]
     if found is not None:
         level = {cause: tuple(values) for cause, values in found["level"].items()}
-        found = Found(found["history"], found["mean"], tuple(found["centre"]), level)
+        found = ErrorsByCause(found["history"], found["mean"], tuple(found["centre"]), level)
     return Trial(**data | {"settings": Settings(**settings), "found": found})
 
 
 def _origin(scene: Scene) -> str:
     """Hash of all that trials depend on: the scene without its target, its files, the program."""
     of, up_to = scene.accuracy.of, scene.accuracy.up_to
-    bare = replace(scene, accuracy=Wanted(of=of, up_to=up_to))
+    bare = replace(scene, accuracy=AccuracyTable(of=of, up_to=up_to))
     files = [store.file_hash(path) for path in _files(scene)]
     program = identity("accuracy")
     parts = (

@@ -26,7 +26,7 @@ from tireroad.fem.errors import ConvergenceError, InputError, UnsuitedSettings
 from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.files.disk import signed, write_text
 from tireroad.runs.files.folder import CHOSEN
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.process.surroundings import available_memory
 from tireroad.runs.scene.estimate import DOUBTFUL, estimate
@@ -34,7 +34,7 @@ from tireroad.runs.scene.plan import STAGES
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.search import journal
-from tireroad.runs.search.journal import Found, Journal, Trial, shown, worst
+from tireroad.runs.search.journal import ErrorsByCause, SearchJournal, Trial, shown, worst
 from tireroad.runs.search.settings import (
     MARGIN,
     MARGINAL,
@@ -215,7 +215,7 @@ class Search:
         ConvergenceError if not; the results are then those of that trial. Collective.
         """
         on_root(self.comm, lambda: self._begin())
-        observe.say(f"search    for {aim(self.scene.accuracy)}, {MARGINAL}")
+        console.say(f"search    for {aim(self.scene.accuracy)}, {MARGINAL}")
         tried: list[Trial] = []
         why = ""
         settings: Settings | None = self._ladders.first()
@@ -229,7 +229,7 @@ class Search:
         why = why or "no finer settings are left, or the memory that is free does not hold them"
         best = min(tried, key=lambda trial: (self._over(trial), trial.found is None))
         if self._over(best) <= 1:
-            observe.say(
+            console.say(
                 f"  {why}; the target is met without the margin of {MARGIN:g} for estimates too small"
             )
             self._keep(best)
@@ -241,9 +241,9 @@ class Search:
         return Ladders.of(self.scene)
 
     @cached_property
-    def _journal(self) -> Journal:
+    def _journal(self) -> SearchJournal:
         """The trials so far. Root process only."""
-        return Journal(self.directory, self.scene)
+        return SearchJournal(self.directory, self.scene)
 
     @property
     def _cache(self) -> Cache:
@@ -261,11 +261,11 @@ class Search:
     def _trial(self, settings: Settings, number: int) -> Trial:
         """Run a trial, or take it from an earlier search; reports its result. Collective."""
         before = on_root(self.comm, lambda: self._journal.known(settings))
-        observe.say(f"  trial {number}: {settings}{' (from before)' if before else ''}")
+        console.say(f"  trial {number}: {settings}{' (from before)' if before else ''}")
         trial = before or self._tried(settings)
         if not before:
             on_root(self.comm, lambda: self._journal.add(trial))
-        observe.say(f"    {self._line(trial)}")
+        console.say(f"    {self._line(trial)}")
         return trial
 
     def _line(self, trial: Trial) -> str:
@@ -284,7 +284,7 @@ class Search:
         folder = self.directory / journal.FOLDER / "trial"
         on_root(self.comm, lambda: folder.mkdir(parents=True, exist_ok=True))
         try:
-            with observe.only_log():
+            with console.only_log():
                 done = run_scene(
                     applied(self.scene, settings),
                     folder,
@@ -299,11 +299,11 @@ class Search:
             spent = self.comm.bcast(time.perf_counter() - began)
             return Trial(settings, {}, spent, failed=str(error))
         except InputError:
-            observe.say("    not finished; the trials before it are kept: run again, or resume")
+            console.say("    not finished; the trials before it are kept: run again, or resume")
             raise
         cost = on_root(self.comm, lambda: seconds(folder))
         spent = self.comm.bcast(time.perf_counter() - began)
-        return Trial(settings, cost, spent, Found.of(product, self.scene.accuracy), scheme)
+        return Trial(settings, cost, spent, ErrorsByCause.of(product, self.scene.accuracy), scheme)
 
     def _over(self, trial: Trial) -> float:
         """The estimated error over the target; infinite for a failed trial."""
@@ -323,7 +323,7 @@ class Search:
         """Complete the run with a trial's settings from its stages; write its scene. Collective."""
         chosen = applied(self.scene, trial.settings)
         on_root(self.comm, lambda: write_text(self.directory / CHOSEN, signed(dumps(chosen))))
-        observe.say(f"  chosen: {trial.settings}; {self.directory / CHOSEN} needs no search")
+        console.say(f"  chosen: {trial.settings}; {self.directory / CHOSEN} needs no search")
         _tell(chosen, self._final(chosen))
         on_root(self.comm, lambda: journal.forget(self.directory))
 
@@ -402,12 +402,12 @@ def _tell(scene: Scene, done: Finished) -> None:
     """Report whether the target error is met, if it was estimated. Collective."""
     if not scene.accuracy.aimed or "accuracy" not in done.done:
         return
-    over = Found.of(done.done["accuracy"].product, scene.accuracy).over(scene.accuracy)
+    over = ErrorsByCause.of(done.done["accuracy"].product, scene.accuracy).over(scene.accuracy)
     text = f"estimated error of the {scene.accuracy.of.replace('_', ' ')}: {shown(over, scene.accuracy)}"
     if worst(over)[0] <= 1:
-        observe.say(f"{text}, within the target")
+        console.say(f"{text}, within the target")
     else:
-        observe.warn(
+        console.warn(
             f"{text}, more than the target: accuracy.search = true looks for better settings"
         )
 
@@ -415,4 +415,4 @@ def _tell(scene: Scene, done: Finished) -> None:
 def _forget(directory: Path) -> None:
     """Remove the trials and their stages. Root process only."""
     journal.forget(directory)
-    Journal.forget(directory)
+    SearchJournal.forget(directory)

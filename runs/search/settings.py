@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from tireroad.contact.results.error_bars import CAUSES
 from tireroad.runs.scene.schema import Pitch
-from tireroad.runs.scene.tables.scene import Accuracy, Scene
+from tireroad.runs.scene.tables.scene import AccuracyTable, Scene
 
 FINER = 2**0.5  # factor per rung of modes; step and spacing of the points are halved
 # A grid of points that is no part of the next one places their errors anew: on cobblestones a radial
@@ -144,7 +144,7 @@ def bounds(scene: Scene) -> list[str]:
     ]
 
 
-def aim(wanted: Accuracy) -> str:
+def aim(wanted: AccuracyTable) -> str:
     """The target in words."""
     asked = [f"{100 * wanted.target:.3g} %"] if wanted.target is not None else []
     asked += [f"{wanted.target_db:.3g} dB"] if wanted.target_db is not None else []

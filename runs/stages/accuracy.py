@@ -42,7 +42,7 @@ from tireroad.contact.setup import ContactSetup, on_shape
 from tireroad.contact.tread.between_nodes import Backed, on_nodes, over_rectangles, unsettled
 from tireroad.contact.tread.compliance import Influence
 from tireroad.contact.tread.law import TreadLaw
-from tireroad.contact.tread.laws.elastic import HalfSpace, Layer
+from tireroad.contact.tread.laws.elastic import ElasticLayer, HalfSpace
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.sections.ring import Ring
 from tireroad.fem.static.load_error import carried_over
@@ -52,20 +52,20 @@ from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.disk import Refused
 from tireroad.runs.files.folder import make_folder
 from tireroad.runs.files.store import put
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.scene.estimate import estimate
 from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.scene.tables.tire import Tire
+from tireroad.runs.scene.tables.tire import TireTable
 from tireroad.runs.stages.cavity import AirColumn
 from tireroad.runs.stages.contact_file import ContactHistory
 from tireroad.runs.stages.greens import GreensStage, Responses
 from tireroad.runs.stages.modes import Fields, ModesStage, Motions
 from tireroad.runs.stages.obtained import obtained
-from tireroad.runs.stages.rolling import Forces, bristles, first_step, forces, recursive
+from tireroad.runs.stages.rolling import ContactForces, bristles, first_step, forces, recursive
 from tireroad.runs.stages.rotating import FullMatrices, RotatingStage
 from tireroad.runs.stages.setup import Setup, points_of, tread_surface
-from tireroad.runs.stages.stage import Computed, Done, Job, Part, Record, Shared, Stage
+from tireroad.runs.stages.stage import Computed, Done, Job, PipelinePart, Record, Shared, Stage
 from tireroad.runs.stages.static import StaticStage
 
 _WHOLE = 0.9  # share of the wall from which a compound counts as all of it
@@ -77,8 +77,8 @@ class Normal:
 
     law: TreadLaw
     solver: str
-    sheared: bool = False
-    rubs: bool = False
+    has_shear: bool = False
+    has_friction: bool = False
 
 
 class Backing(NamedTuple):
@@ -97,7 +97,12 @@ def backed(job: Job, static: StaticState, setup: ContactSetup, response: Respons
     plane, horizontal forces, a tread that creeps.
     """
     contact, patch = job.scene.contact, setup.patch
-    if patch.weights is None or patch.frames is not None or contact.rubs or contact.law.creep:
+    if (
+        patch.weights is None
+        or patch.frames is not None
+        or contact.has_friction
+        or contact.law.creep
+    ):
         raise InputError(
             "the compliance of the wall between nodes is known only for a grid of points on a plane road and normal forces"
         )
@@ -111,7 +116,7 @@ def backed(job: Job, static: StaticState, setup: ContactSetup, response: Respons
     return Backing(spec, replace(setup, patch=patch), replace(response, residual=residual))
 
 
-def _outer(tire: Tire, ring: Ring) -> Influence:
+def _outer(tire: TireTable, ring: Ring) -> Influence:
     """Influence of the crown's compound: a half-space if it is the whole wall, else a layer."""
     section = ring.section
     cell = section.outer[len(section.outer) // 2, 0]
@@ -125,7 +130,7 @@ def _outer(tire: Tire, ring: Ring) -> Influence:
     law = (
         HalfSpace(**rubber)
         if thickness > _WHOLE * ring.thickness
-        else Layer(**rubber, thickness=thickness)
+        else ElasticLayer(**rubber, thickness=thickness)
     )
     return law.influence(np.inf)
 
@@ -162,12 +167,12 @@ class Given:
         return settled(self.job, self.setup, self.response, self.static.product.normal_force)
 
     @cached_property
-    def longer(self) -> Forces:
+    def longer(self) -> ContactForces:
         """The run repeated with twice its time step. Collective."""
         return self.repeated(self.settled, self.response, coarser=2)
 
     @cached_property
-    def base(self) -> Forces | None:
+    def base(self) -> ContactForces | None:
         """Reference for the companions of points, modes and mesh: the run with twice the step.
 
         It halves their cost. None if the longer step drops a state or does not resolve the
@@ -207,7 +212,7 @@ class Given:
         response: Response,
         coarser: int | None = None,
         contact: Normal | None = None,
-    ) -> Forces:
+    ) -> ContactForces:
         """Repeat the loop with another setup (settled), response or `contact`.
 
         `coarser`: factor on the time step, by default that of `base`. Collective.
@@ -222,7 +227,7 @@ def settled(job: Job, setup: ContactSetup, response: Response, force: np.ndarray
     return setup.settled(response, force, job.scene.contact)[0]
 
 
-STATIC_TO_GREENS: tuple[type[Part], ...] = (
+STATIC_TO_GREENS: tuple[type[PipelinePart], ...] = (
     Motions,
     Setup,
     ModesStage,
@@ -270,7 +275,7 @@ def coarser(run: Job, static: Done[StaticState]) -> tuple[Job, dict[str, Done]]:
         contact = replace(contact, points=points_of(run, static.product))
         job = replace(job, scene=replace(job.scene, contact=contact))
     on_root(job.comm, lambda: make_folder(job.directory))
-    chain: tuple[type[Part], ...] = (StaticStage, *STATIC_TO_GREENS)
+    chain: tuple[type[PipelinePart], ...] = (StaticStage, *STATIC_TO_GREENS)
     for kind in chain:
         part = (
             CoarserStatic(job=job, run=run, near=static)
@@ -309,7 +314,9 @@ def coarser_job(job: Job) -> Job:
     return replace(job, scene=scene, directory=job.directory / COARSER, found={})
 
 
-def _made(job: Job, kind: type[Part], part: Part | None, done: dict[str, Done]) -> Done | None:
+def _made(
+    job: Job, kind: type[PipelinePart], part: PipelinePart | None, done: dict[str, Done]
+) -> Done | None:
     """The result of one part of the chain; None if it has none. Collective."""
     if kind is RotatingStage and not job.speed:
         return RotatingStage.instead(job, done)
@@ -376,12 +383,12 @@ class Budget:
 FEWER = 1 / np.sqrt(2)  # share of the highest mode up to which the companion keeps states
 
 
-def longer_step(given: Given) -> Forces:
+def longer_step(given: Given) -> ContactForces:
     """Twice the time step. Collective."""
     return given.longer
 
 
-def other_points(given: Given) -> Forces:
+def other_points(given: Given) -> ContactForces:
     """Every other point of the grid both ways or, where affordable, twice as many. Collective."""
     job, patch = given.job, given.setup.patch
     if patch.places is None:
@@ -406,7 +413,7 @@ def other_points(given: Given) -> Forces:
     return given.of(job).repeated(setup, given.response)
 
 
-def fewer_modes(given: Given) -> Forces:
+def fewer_modes(given: Given) -> ContactForces:
     """States up to `FEWER` of the highest mode; those from there to the highest are static.
 
     States above the highest mode are kept: they belong to the shapes that joined the modes, without
@@ -423,7 +430,7 @@ def fewer_modes(given: Given) -> Forces:
     return given.repeated(given.settled, kept)
 
 
-def coarser_mesh(given: Given) -> Forces:
+def coarser_mesh(given: Given) -> ContactForces:
     """Elements of twice the size, from the static state on. Collective."""
     job, done = coarser(given.job, given.static)
     response, state = done["greens"].product.contact, done["static"].product
@@ -432,7 +439,7 @@ def coarser_mesh(given: Given) -> Forces:
     return given.of(job).repeated(setup, response)
 
 
-def finer_wall(given: Given) -> Forces:
+def finer_wall(given: Given) -> ContactForces:
     """With the local flexibility of the wall between nodes below the contact points added.
 
     A coarser mesh does not show this part: halving the elements changes the far field of a point
@@ -444,7 +451,7 @@ def finer_wall(given: Given) -> Forces:
     return given.repeated(setup, made.response, contact=made.contact)
 
 
-COMPANIONS: dict[str, Callable[[Given], Forces]] = {
+COMPANIONS: dict[str, Callable[[Given], ContactForces]] = {
     "step": longer_step,
     "points": other_points,
     "modes": fewer_modes,
@@ -459,8 +466,8 @@ class Companion(NamedTuple):
     `share`: the fraction of their difference that is the error.
     """
 
-    forces: Forces
-    beside: Forces | None
+    forces: ContactForces
+    beside: ContactForces | None
     share: float
 
     def bars(
@@ -472,7 +479,9 @@ class Companion(NamedTuple):
         return {name: bars(other[name], off[name], self.share) for name in run}
 
 
-def _figures(forces: Forces, since: float, limit: float, up_to: float) -> dict[str, Measured]:
+def _figures(
+    forces: ContactForces, since: float, limit: float, up_to: float
+) -> dict[str, Measured]:
     first = round(since / forces.step)
     both = {"contact_force": forces.contact, "axle_force": forces.axle}
     return {
@@ -485,7 +494,7 @@ def companions(cause: str, given: Given) -> list[Companion]:
 
     Raises InputError or ConvergenceError if the cause has none. Collective.
     """
-    with observe.quiet():
+    with console.quiet():
         beside = None if cause == "step" else given.base
         found = [Companion(COMPANIONS[cause](given), beside, _share(cause, given))]
         if cause == "mesh":
@@ -628,7 +637,7 @@ class AccuracyStage(Computed[Accuracy]):
         return still and not scene.force
 
     def _none(self, reason: str) -> Accuracy:
-        observe.say(f"  no error bars: {reason}")
+        console.say(f"  no error bars: {reason}")
         absent = dict.fromkeys(CAUSES, reason)
         return Accuracy(
             centre=np.zeros(0), window=0.0, up_to=0.0, mean={}, by_cause={}, absent=absent
@@ -719,6 +728,6 @@ def _describe(
                 "N",
             )
     for cause, reason in product.absent.items():
-        observe.say(f"  error by the {cause} not estimated: {reason}")
+        console.say(f"  error by the {cause} not estimated: {reason}")
         record.headline[f"error by the {cause}"] = (f"not estimated: {reason}", "-")
-    observe.say(f"  error bars from the first {product.window:.4g} s of the run")
+    console.say(f"  error bars from the first {product.window:.4g} s of the run")

@@ -18,14 +18,14 @@ import numpy as np
 from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
-from tireroad.contact.loop import Driven, Loop, roll
+from tireroad.contact.loop import DrivenTire, Loop, roll
 from tireroad.contact.model import solver_name
 from tireroad.contact.patch import Patch
 from tireroad.contact.results.band import USABLE
 from tireroad.contact.results.chatter import LIMIT, Chatter, Chosen, warning
 from tireroad.contact.results.energy import (
     Circulation,
-    Motion,
+    StateMotion,
     Totals,
     Work,
     energy_left,
@@ -41,9 +41,9 @@ from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files import store
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.process.signals import Deferred, Stopped
-from tireroad.runs.scene.tables.scene import Road
+from tireroad.runs.scene.tables.scene import RoadTable
 from tireroad.runs.stages import contact_file
 from tireroad.runs.stages import setup as stages_setup
 from tireroad.runs.stages.contact_file import (
@@ -132,7 +132,7 @@ def points(record: Record, patch: Patch, extent: Footprint, relief: float) -> No
         )
 
 
-def edges(record: Record, road: Road, patch: Patch, speed: float, highest: float) -> None:
+def edges(record: Record, road: RoadTable, patch: Patch, speed: float, highest: float) -> None:
     """Warn if the points pass an edge of the road (speed, m/s) at a frequency near the modes' band, `highest` Hz.
 
     They meet it one by one, with a force each along the road, which the tire then feels; not where it rolls so
@@ -227,7 +227,7 @@ class Works:
         return self.contact + (self.driven or 0.0)
 
 
-def works(contact: Work, driven: Driven | None) -> Works:
+def works(contact: Work, driven: DrivenTire | None) -> Works:
     """The works of a completed loop."""
     lead = contact.lead + (driven.lead if driven else 0.0)
     return Works(contact.total, driven.work if driven else None, lead)
@@ -253,10 +253,10 @@ class Losses:
         self, chosen: Integration, response: Response, rolling: RollingModes, leaning: Leaning
     ) -> None:
         tire = chosen.tire
-        self._motion: Motion | None = None
+        self._motion: StateMotion | None = None
         self._leaning, self._aside = leaning, Work(chosen.scheme)
-        if isinstance(tire, Recursion) and Motion.known(rolling, response):
-            self._motion = Motion(rolling, response.slow(chosen.step), chosen.step)
+        if isinstance(tire, Recursion) and StateMotion.known(rolling, response):
+            self._motion = StateMotion(rolling, response.slow(chosen.step), chosen.step)
             left_out = response.resolved(chosen.step).residual
             left_out = left_out[: len(leaning.others), leaning.others]
             self._circulation = Circulation(left_out * (not response.pulse), chosen.scheme)
@@ -352,7 +352,7 @@ def describe_energy(
         record.indicators["work of the prescribed forces"] = (work.driven, "J")
     own = own_states(response, rolling) and len(kept["block_state"]) == len(rolling.states.block)
     if not own:
-        observe.say(f"  energy: contact and forces put {total:.4g} J into the tire{losses.unknown}")
+        console.say(f"  energy: contact and forces put {total:.4g} J into the tire{losses.unknown}")
         return
     left = energy_left(rolling, kept, response.slow(step))
     elastic = springs(response.resolved(step), kept["push_force"], losses.others)
@@ -374,7 +374,7 @@ def _standing(
     """Energy lost, by difference; it must not be negative for a tire at rest beyond `slight` J."""
     turns = rolling.turning.speed > 0
     record.indicators["lost, less the work of the drive" if turns else "lost"] = (work - left, "J")
-    observe.say(
+    console.say(
         f"  energy: {work:.4g} J came into the tire, {left:.4g} J are left in it, "
         f"{work - left:.4g} J were lost{' less what the drive put in' if turns else ''}"
     )
@@ -405,7 +405,7 @@ def _rolling(
         "energy that the scheme takes": (taken, "J"),
         "energy that does not add up": (off, "J"),
     }
-    observe.say(
+    console.say(
         f"  energy: contact {work:.4g} J + drive {drive:.4g} J = in the tire {left:.4g} J + lost "
         f"{lost:.4g} J + lost in truncated modes, less what the drive puts into them, {beyond:.2g} J + dissipated by the scheme {taken:.2g} J; "
         f"imbalance {off:.2g} J"
@@ -472,9 +472,9 @@ class ContactStage(Stage[ContactHistory]):
             setup, slip = self._rolling_freely(record, setup, plan, chosen.scheme)
         spec, patch = self.job.scene.contact, setup.patch
         count = f"{len(patch.points)} contact points on {len(patch.index)} nodes"
-        observe.say(f"  {count}, tread {spec.tread}, solver {solver_name(spec, patch)}")
+        console.say(f"  {count}, tread {spec.tread}, solver {solver_name(spec, patch)}")
         if spec.points == "nodes" and spec.law.compliant and self.job.speed:
-            observe.say(
+            console.say(
                 '  points are nodes: contact.points = "auto" takes as many as the footprint needs'
             )
         while True:
@@ -520,7 +520,7 @@ class ContactStage(Stage[ContactHistory]):
                 totals.set_state(kept)
                 losses.set_state(kept)
                 reached = totals.figures.steps * chosen.step
-                observe.say(f"  continues from the checkpoint at t = {reached:.6g} s")
+                console.say(f"  continues from the checkpoint at t = {reached:.6g} s")
             done, began = totals.figures.steps, time.thread_time()
             self._steps(setup, loop, driven, file, totals, losses, chosen)
             # CPU time of this process's own thread: the cost of a step when no other process needs
@@ -556,7 +556,7 @@ class ContactStage(Stage[ContactHistory]):
         if not leaning(self.job):
             return Leaning(every[:0], every, None)
         rolling, shape = self._states, self.greens.product.leaning
-        if shape is None and Motion.known(rolling, response):
+        if shape is None and StateMotion.known(rolling, response):
             probes = leaning_loads(self.static.product, setup)
             shape = Basis.of(rolling).seen(probes)
         if shape is None:
@@ -589,7 +589,7 @@ class ContactStage(Stage[ContactHistory]):
         watch = Watch(self.job.comm, self.job.scene.time.checkpoint)
         with (
             Deferred() as deferred,
-            observe.Progress("contact", steps, begun=done) as bar,
+            console.ProgressBar("contact", steps, begun=done) as bar,
             # One core reads a step's matrices, a megabyte, as fast as two; threads that wait for
             # each other in every product took ten times as long where cores are shared.
             threadpool_limits(1, "blas"),

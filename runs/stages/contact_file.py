@@ -32,10 +32,10 @@ from tireroad.contact.setup import ContactSetup
 from tireroad.runs.files import store
 from tireroad.runs.files.disk import part_of, replacing, seal
 from tireroad.runs.files.store import put
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.scene.road_rules import foot, never_met, within_run_in, without_relief
-from tireroad.runs.scene.tables.scene import Road
+from tireroad.runs.scene.tables.scene import RoadTable
 from tireroad.runs.stages import corner
 from tireroad.runs.stages import setup as stages_setup
 from tireroad.runs.stages.stage import Job, Record
@@ -103,13 +103,13 @@ _SEEN = 0.5
 _WHOLE = 0.98
 
 
-def describe(record: Record, setup: ContactSetup, road: Road) -> None:
+def describe(record: Record, setup: ContactSetup, road: RoadTable) -> None:
     """Record the mean profile depth; report the processing of a measured road in words.
 
     Warns if the `road` of the scene is flat where the run passes, or flat to its points.
     """
     for note in setup.road.notes:
-        observe.say(f"  road: {note}")
+        console.say(f"  road: {note}")
     texture = setup.road.texture
     if texture is not None and texture.depth is not None:
         record.headline["mean profile depth"] = (texture.depth, "m")
@@ -313,7 +313,7 @@ class ContactFile:
         """Whether there is a usable checkpoint; reports why one is not usable."""
         reason = store.why_not(self._checkpoint, wanted, "contact")
         if reason and reason != "absent":
-            observe.say(f"  {CHECKPOINT} exists, but {reason}: the loop begins at t = 0")
+            console.say(f"  {CHECKPOINT} exists, but {reason}: the loop begins at t = 0")
         return not reason
 
     def _lay_out(self) -> None:

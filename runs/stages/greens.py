@@ -21,7 +21,7 @@ from tireroad.greens.responses import Made, Wanted, band, judged, make_response,
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
-from tireroad.runs.scene.tables.scene import PointForce, has_air
+from tireroad.runs.scene.tables.scene import PointForceTable, has_air
 from tireroad.runs.stages import cavity, corner, rotating
 from tireroad.runs.stages.modes import fill_projection, read_projection
 from tireroad.runs.stages.setup import components, leaning, leaning_loads, points_of, probes
@@ -284,6 +284,6 @@ def _share_of_residual(record, where: str, response: Response) -> None:
     record.indicators[name] = (float(part.max()), "-")
 
 
-def _place(force: PointForce) -> dict:
+def _place(force: PointForceTable) -> dict:
     """Where and in which direction a force acts; its course over time is no matter here."""
     return {k: v for k, v in asdict(force).items() if k not in ("amplitude", "frequency")}

@@ -28,7 +28,7 @@ from tireroad.modal.solver.slicing import Modes, how_many
 from tireroad.modal.standing import projected, solved, with_fields
 from tireroad.modal.waves import Labels, label
 from tireroad.runs.files.store import put
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.process.surroundings import available_memory
 from tireroad.runs.scene.estimate import estimate
@@ -266,7 +266,7 @@ class ModesStage(Computed[ModalBasis]):
         teams = how_many(comm, needed, available_memory())
         record.headline["teams of processes"] = (teams, "-")
         if teams < comm.size:
-            observe.say(
+            console.say(
                 f"  {teams} team(s) of processes, one factor each: a factor with its matrices takes about "
                 f"{needed / 1e9:.2g} GB, and {comm.size} of them do not fit"
             )
@@ -349,7 +349,7 @@ def _say_names(frequency: np.ndarray, labels) -> None:
     first = {(n, k): f for n, k, f in reversed(list(named)) if n >= 0}
     lowest = sorted(first.items(), key=lambda item: item[1])[:_NAMED]
     shown = ", ".join(f"({n}, {k}) {f:.4g}" for (n, k), f in lowest)
-    observe.say(f"  (wave number, section mode) in Hz: {shown}")
+    console.say(f"  (wave number, section mode) in Hz: {shown}")
 
 
 def _labels(motions: SmallMotions, vectors: np.ndarray) -> Labels | None:

@@ -12,7 +12,7 @@ from tireroad.greens.basis import Basis
 from tireroad.runs.files.store import put
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.stages.stage import Record
-from tireroad.runs.stages.whole_tire import Forces, WholeTire, replayed
+from tireroad.runs.stages.whole_tire import PatchForces, WholeTire, replayed
 
 _INSTANTS = 400  # at most; the last ones of the run
 _PER_PERIOD = 8  # of the band's upper frequency
@@ -56,7 +56,7 @@ class MotionStage(WholeTire[Motion]):
         record.headline["largest displacement of the face"] = (size, "m")
         return made[0]
 
-    def _seen(self, basis: Basis, forces: Forces) -> Motion:
+    def _seen(self, basis: Basis, forces: PatchForces) -> Motion:
         points = self.static.product.points
         stride = max(int(1 / (_PER_PERIOD * self.band * forces.step)), 1)
         kept = range(len(forces.time) - 1, -1, -stride)[:_INSTANTS][::-1]

@@ -27,7 +27,7 @@ from tireroad.fem.errors import ConvergenceError
 from tireroad.runs.files import store
 from tireroad.runs.files.disk import write_text
 from tireroad.runs.files.folder import Summary
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.process.signals import Stopped
 from tireroad.runs.scene.tables.scene import Scene
@@ -139,7 +139,7 @@ def _contact(scene: Scene) -> str:
         from tireroad.contact.solver.snes_vi import MAX_ITERATIONS
 
         parts.append(f"PETSc SNES vinewtonrsls, at most {MAX_ITERATIONS} iterations")
-    if scene.contact.rubs:
+    if scene.contact.has_friction:
         from tireroad.contact.solver.stick_slip import TOLERANCE as change
         from tireroad.contact.solver.stick_slip import TURNS
 
@@ -182,9 +182,9 @@ def obtained(stage: Stage) -> Obtained:
         if not reason:
             return Obtained(done=Done(key, stage.stored), reused=source, known=known)
         if reason != "absent":
-            observe.say(f"{name:9s} computed anew: {path.name} exists, but {reason}")
+            console.say(f"{name:9s} computed anew: {path.name} exists, but {reason}")
         if settings := solver_settings(name, job.scene):
-            observe.log(settings)
+            console.log(settings)
         record = Record()
         with _remembering(stage, key):
             product = stage.produce(key, record)

@@ -28,7 +28,7 @@ from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.files.disk import FACTORS, remove_factors
 from tireroad.runs.files.folder import Summary, make_folder
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.process.surroundings import factors_on_disk, forget_peak, peak_memory
 from tireroad.runs.scene.estimate import (
@@ -54,7 +54,7 @@ from tireroad.runs.stages.response import ResponseStage
 from tireroad.runs.stages.setup import Setup
 from tireroad.runs.stages.sound import RadiationStage, SoundStage
 from tireroad.runs.stages.spectra import SpectraStage
-from tireroad.runs.stages.stage import Done, Job, Part, Shared, Stage
+from tireroad.runs.stages.stage import Done, Job, PipelinePart, Shared, Stage
 from tireroad.runs.stages.static import StaticStage
 from tireroad.runs.stages.stiffness import StiffnessStage
 from tireroad.runs.stages.vibration import VibrationStage
@@ -99,7 +99,7 @@ def _sent(road: Road | None, node: MPI.Comm) -> Road | None:
         node.Barrier()
 
 
-PARTS: tuple[type[Part], ...] = (
+PARTS: tuple[type[PipelinePart], ...] = (
     StaticStage,
     RadiationStage,
     StiffnessStage,
@@ -190,12 +190,12 @@ def run_scene(
     on_root(comm, summary.begin)  # not before: a scene that is refused replaces nothing
     reasons = skipped(scene, until)
     if petsc_options:
-        observe.say(f"PETSc options: {' '.join(petsc_options)}")
+        console.say(f"PETSc options: {' '.join(petsc_options)}")
     with _factors(on_disk, directory, comm):
         done = _parts(job, reasons, summary)
     stages = on_root(comm, lambda: summary.data["stages"])
     _check_options(petsc_options, [k for k, one in stages.items() if one["status"] == "reused"])
-    observe.say(f"memory: {_peak(comm):.2g} GB of a process at most, {each:.2g} GB estimated")
+    console.say(f"memory: {_peak(comm):.2g} GB of a process at most, {each:.2g} GB estimated")
     if "report" in reasons:
         on_root(comm, lambda: summary.record("report", "skipped", reason=reasons["report"]))
     else:
@@ -227,7 +227,7 @@ def _parts(job: Job, reasons: Mapping[str, str], summary: Summary) -> dict[str, 
 
 def _skipped(kind: type[Stage], job: Job, done, reason: str, summary: Summary) -> Done | None:
     """What later parts receive instead of a stage that is skipped for a `reason`. Collective."""
-    observe.say(f"{kind.name:9s} skipped: {reason}")
+    console.say(f"{kind.name:9s} skipped: {reason}")
     on_root(job.comm, lambda: summary.record(kind.name, "skipped", reason=reason))
     return kind.instead(job, done)
 
@@ -250,8 +250,8 @@ def _say_demand(wanted: Estimate, each: float, directory: Path, comm: MPI.Comm) 
     Raises InputError if the machine has far too little. Collective.
     """
     for text in on_root(comm, lambda: check_demand(wanted, directory, comm.size)):
-        observe.warn(text)
-    observe.say(
+        console.warn(text)
+    console.say(
         f"estimated: {each:.2g} GB a process, "
         f"{sum(wanted.disk.values()) / 1e9:.2g} GB of disk, "
         f"{duration(sum(wanted.seconds.values()))} of one core"
@@ -265,15 +265,15 @@ def _run(stage: Stage, summary: Summary) -> Done:
     found = obtained(stage)
     record = found.record
     if record is None:
-        observe.say(f"{name:9s} reused: computed from the same inputs {found.reused}")
+        console.say(f"{name:9s} reused: computed from the same inputs {found.reused}")
         known = {"reason": "same inputs", "input_hash": found.done.key, **found.known}
         on_root(job.comm, lambda: summary.record(name, "reused", **known))
         return found.done
     record.indicators["largest memory of a process so far"] = (_peak(job.comm), "GB")
     seconds = time.perf_counter() - began
     for text in record.warnings:
-        observe.warn(f"{name}: {text}")
-    observe.say(f"{name:9s} done in {seconds:.1f} s: {record.line()}")
+        console.warn(f"{name}: {text}")
+    console.say(f"{name:9s} done in {seconds:.1f} s: {record.line()}")
     figures = {"input_hash": found.done.key, **vars(record)}
     on_root(job.comm, lambda: summary.record(name, "computed", seconds=seconds, **figures))
     return found.done
@@ -293,9 +293,9 @@ def _report(directory: Path, summary: Summary) -> None:
     path = write_report(directory)
     seconds = time.perf_counter() - began
     summary.record("report", "computed", seconds=seconds)
-    observe.say(f"{'report':9s} done in {seconds:.1f} s: {path}")
+    console.say(f"{'report':9s} done in {seconds:.1f} s: {path}")
     if strange := remarks(directory):
-        observe.warn(strange)
+        console.warn(strange)
 
 
 def _check_options(petsc_options: list[str], reused: Sequence[str] = ()) -> None:
@@ -303,7 +303,7 @@ def _check_options(petsc_options: list[str], reused: Sequence[str] = ()) -> None
     unused = [o for o in petsc_options if o.startswith("-") and not _was_read(o.lstrip("-"))]
     if unused:
         kept = f"; reused stages read none ({', '.join(reused)}): --fresh" if reused else ""
-        observe.warn(f"PETSc options that nothing read: {' '.join(unused)}{kept}")
+        console.warn(f"PETSc options that nothing read: {' '.join(unused)}{kept}")
 
 
 def _was_read(name: str) -> bool:

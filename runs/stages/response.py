@@ -20,7 +20,7 @@ from tireroad.greens.response import Response
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.standing import standing_modes
 from tireroad.runs.files.store import put
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.scene.outputs import Curves
 from tireroad.runs.stages.contact_file import ContactHistory
 from tireroad.runs.stages.greens import Responses
@@ -228,7 +228,7 @@ class ResponseStage(Computed[PointResponse]):
             curves["axle_force"] = axle, "N"
             curves |= {"hub_moment": (moment, "N m")} if moment.size else {}
         elif scene.output.axle_force and scene.modes.rim == "fixed":  # a free axle carries none
-            observe.say(
+            console.say(
                 '  axle force and moments left out: the road carries part of them (modal.road = "held")'
             )
         return curves
@@ -244,7 +244,7 @@ class ResponseStage(Computed[PointResponse]):
         axle[0] = force[0] @ direction - tire.inertia_force()
         late = seen.whole.pulse
         displacement[0, late:] = seen.whole.residual[late:] @ force[0]
-        with record.timing("time loop"), observe.Progress("response", len(force) - 1) as bar:
+        with record.timing("time loop"), console.ProgressBar("response", len(force) - 1) as bar:
             for k in range(1, len(force)):
                 free = tire.predict()
                 tire.advance(force[k])

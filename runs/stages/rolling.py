@@ -20,31 +20,31 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from tireroad.contact.grid_patch import on_points
-from tireroad.contact.loop import Driven, Loop, equal_steps, roll, steps_of
+from tireroad.contact.loop import DrivenTire, Loop, equal_steps, roll, steps_of
 from tireroad.contact.model import step_solver, tread_memory, tread_shear
 from tireroad.contact.patch import Patch
 from tireroad.contact.results.chatter import Chosen, choose, oscillation
 from tireroad.contact.roads.under_tire import is_level
 from tireroad.contact.setup import ContactSetup
-from tireroad.contact.solver.stick_slip import Friction
+from tireroad.contact.solver.stick_slip import BrushFriction
 from tireroad.contact.tread.brush import Brush, BrushLaw, free_slip
 from tireroad.greens.convolution import Convolution
 from tireroad.greens.recursion import Recursion, sharers
 from tireroad.greens.response import Response
-from tireroad.runs.process import observe
-from tireroad.runs.scene.tables.contact import Time
-from tireroad.runs.scene.tables.scene import PointForce, Road, Scene
+from tireroad.runs.process import console
+from tireroad.runs.scene.tables.contact import TimeTable
+from tireroad.runs.scene.tables.scene import PointForceTable, RoadTable, Scene
 from tireroad.runs.stages import corner
 from tireroad.runs.stages.stage import Job, Record
 
 
-def directions(forces: Sequence[PointForce]) -> np.ndarray:
+def directions(forces: Sequence[PointForceTable]) -> np.ndarray:
     """Unit vectors of the forces, (k, 3)."""
     given = np.array([force.direction for force in forces]).reshape(-1, 3)
     return given / np.linalg.norm(given, axis=1, keepdims=True)
 
 
-def histories(forces: Sequence[PointForce], time: np.ndarray, order: int = 0) -> np.ndarray:
+def histories(forces: Sequence[PointForceTable], time: np.ndarray, order: int = 0) -> np.ndarray:
     """The forces (nt, k) N: amplitude sin(2 pi f t), or the constant amplitude if f = 0.
 
     `order`: order of the time derivative, N/s^order.
@@ -53,20 +53,20 @@ def histories(forces: Sequence[PointForce], time: np.ndarray, order: int = 0) ->
     return np.stack(columns, axis=-1) if columns else np.zeros((len(time), 0))
 
 
-def shortest_period(forces: Sequence[PointForce]) -> float:
+def shortest_period(forces: Sequence[PointForceTable]) -> float:
     """Period of the fastest force, s; infinite if all are constant."""
     fastest = max((force.frequency for force in forces), default=0.0)
     return 1 / fastest if fastest else np.inf
 
 
-def _history(force: PointForce, time: np.ndarray, order: int) -> np.ndarray:
+def _history(force: PointForceTable, time: np.ndarray, order: int) -> np.ndarray:
     if force.frequency == 0:
         return np.full(len(time), force.amplitude if order == 0 else 0.0)
     omega = 2 * np.pi * force.frequency
     return force.amplitude * omega**order * np.sin(omega * time + order * np.pi / 2)
 
 
-def run_in(setup: ContactSetup, road: Road) -> float:
+def run_in(setup: ContactSetup, road: RoadTable) -> float:
     """Time (s) until the whole patch is past the run-in; 0 if there is none.
 
     There is none either where the road is level up to its end, as before a cleat: nothing grows,
@@ -84,7 +84,7 @@ def grown(setup: ContactSetup, length: float) -> float:
     return (length + x1 - x0) / speed
 
 
-def first_step(setup: ContactSetup, road: Road, time: np.ndarray) -> int:
+def first_step(setup: ContactSetup, road: RoadTable, time: np.ndarray) -> int:
     """Index of the first step past the run-in; 0 if that is half the run or more."""
     start = int(np.searchsorted(time, run_in(setup, road)))
     return start if start < len(time) // 2 else 0
@@ -96,7 +96,7 @@ _LEAST_STEPS = 200
 _PER_PERIOD = 16  # steps per shortest period of the excitation
 
 
-def run_time(time: Time) -> float:
+def run_time(time: TimeTable) -> float:
     """Duration of the run, s: whole steps, so slightly longer than one that is not a multiple."""
     if isinstance(time.step, str):
         return time.duration
@@ -138,12 +138,12 @@ def planned(job: Job, record: Record, response: Response, shortest: float) -> Pl
         steps = steps_of(wanted.duration, wanted.step)
     kept = response.resolved(steps.size)
     moved = len(response.every) - len(kept.every)
-    observe.say(
+    console.say(
         f"  step {steps.size:.4g} s, {steps.count} steps; fastest mode {fastest:.4g} 1/s, "
         f"{moved} states too fast for the step respond statically"
     )
     if steps.duration > wanted.duration * (1 + 1e-9):
-        observe.say(
+        console.say(
             f"  the run ends at {steps.duration:.6g} s: {wanted.duration:.6g} s is not a multiple of the step"
         )
     record.indicators["states moved to the residual"] = (moved, "-")
@@ -161,11 +161,11 @@ def integration(job: Job, plan: Planned, scheme: str) -> Integration:
             response=plan.response, step=plan.step, scheme=scheme, comm=comm, look_ahead=True
         )
         if comm.size < job.comm.size:
-            observe.say("  each process computes the whole loop: it is too small to distribute")
+            console.say("  each process computes the whole loop: it is too small to distribute")
     return Integration(tire, plan.step, plan.steps, scheme)
 
 
-def passing_period(road: Road, spacing: float, speed: float) -> float:
+def passing_period(road: RoadTable, spacing: float, speed: float) -> float:
     """Shortest period (s) of the road's excitation at `speed` (m/s).
 
     Of the shortest wave that its `spacing` (m) resolves, the sine of its motion, or the
@@ -180,14 +180,14 @@ def passing_period(road: Road, spacing: float, speed: float) -> float:
     return min(periods)
 
 
-def driven_tire(job: Job, chosen: Integration, patch: Patch) -> Driven | None:
+def driven_tire(job: Job, chosen: Integration, patch: Patch) -> DrivenTire | None:
     """The tire under prescribed forces and with wheel readings; None if the scene has neither."""
     forces = job.scene.force
     if not forces and not corner.readings(job):
         return None
     time = chosen.step * np.arange(chosen.steps + 1)
-    seen = (3 if job.scene.contact.rubs else 1) * len(patch.index)
-    return Driven(chosen.tire, histories(forces, time), directions(forces), chosen.scheme, seen)
+    seen = (3 if job.scene.contact.has_friction else 1) * len(patch.index)
+    return DrivenTire(chosen.tire, histories(forces, time), directions(forces), chosen.scheme, seen)
 
 
 def make_loop(spec, setup: ContactSetup, tire, step: float) -> Loop:
@@ -201,7 +201,7 @@ def make_loop(spec, setup: ContactSetup, tire, step: float) -> Loop:
     at_once = memory.at_once if memory else 1.0
     solver = step_solver(spec, patch, tire.same_step[:p, :p], at_once)
     friction = None
-    if spec.rubs:
+    if spec.has_friction:
         friction = _friction(spec, setup, tire, step, at_once)
     tire, normal = on_points(tire, patch)
     return Loop(tire, solver, friction, memory, normal)
@@ -209,14 +209,14 @@ def make_loop(spec, setup: ContactSetup, tire, step: float) -> Loop:
 
 def bristles(spec, patch: Patch):
     """Bristle stiffness (N/m) per point, or (c,); inf if rigid, None without horizontal forces."""
-    if not spec.rubs:
+    if not spec.has_friction:
         return None
     if spec.brush_stiffness_per_area is not None:
         return spec.brush_stiffness_per_area * patch.area
     return spec.brush_stiffness or np.inf
 
 
-def _friction(spec, setup: ContactSetup, tire, step: float, at_once: float) -> Friction:
+def _friction(spec, setup: ContactSetup, tire, step: float, at_once: float) -> BrushFriction:
     """The brush of the scene, at rest.
 
     Shear of the tread by pressure counts from the static state, like all motion. If the slip of the
@@ -231,7 +231,7 @@ def _friction(spec, setup: ContactSetup, tire, step: float, at_once: float) -> F
     law = BrushLaw(stiffness, spec.friction, setup.slips, spec.brush)
     brush = Brush(law, patch.points[:, 0], patch.line, setup.rolled.speed, step)
     brush.begin(patch.force > 0, moved)
-    return Friction(brush, tire.same_step, patch.weights, shear, pressed)
+    return BrushFriction(brush, tire.same_step, patch.weights, shear, pressed)
 
 
 def freely_rolling(
@@ -254,7 +254,7 @@ def freely_rolling(
     return setup.with_slip(slip), slip
 
 
-class Forces(NamedTuple):
+class ContactForces(NamedTuple):
     """Forces (n, 3) N of the road on the tire (`contact`) and of the tire on the axle (`axle`).
 
     After each of n steps of `step` s.
@@ -273,7 +273,7 @@ def forces(
     steps: int,
     scheme: str,
     contact=None,
-) -> Forces:
+) -> ContactForces:
     """Run the loop of the job's scene with another response, step or setup (settled), in memory.
 
     `scheme`: see greens.recursion; `contact` replaces the scene's table. Raises ConvergenceError
@@ -295,7 +295,7 @@ def forces(
             total[k, 2], axle[k] = instant.force.sum(), instant.axle_force
             if instant.force[setup.patch.edge].any():
                 setup.patch.check_edge(instant.force[None], np.array([instant.time]), setup.reach)
-    return Forces(total, axle, step)
+    return ContactForces(total, axle, step)
 
 
 def chosen_scheme(
@@ -316,7 +316,7 @@ def chosen_scheme(
 
 def reported(record: Record, chosen: Chosen) -> Chosen:
     """Report the choice in the terminal and the record; returns it."""
-    observe.say(f"  scheme {chosen.scheme}: {chosen.reason}")
+    console.say(f"  scheme {chosen.scheme}: {chosen.reason}")
     record.indicators["reason for the scheme"] = (chosen.reason, "-")
     return chosen
 

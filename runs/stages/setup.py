@@ -174,7 +174,7 @@ def scene_setup(job: Job, state: StaticState, surface: TreadSurface | None = Non
         pattern=make_pattern(scene.pattern, rolling_radius(job, state)),
         surface=surface,
     )
-    return _slipping(job, state, setup) if scene.contact.rubs else setup
+    return _slipping(job, state, setup) if scene.contact.has_friction else setup
 
 
 def points_of(job: Job, state: StaticState) -> str | Pitch:
@@ -214,13 +214,13 @@ def rolling_radius(job: Job, state: StaticState) -> float:
 def components(job: Job) -> tuple[int, ...]:
     """Directions in which the motion of the contact points is followed: normal to the road; with a
     brush also along and across."""
-    return (2, 0, 1) if job.scene.contact.rubs else (2,)
+    return (2, 0, 1) if job.scene.contact.has_friction else (2,)
 
 
 def leaning(job: Job) -> bool:
     """Whether forces along and across come from the road's slope alone: their points are not
     followed that way."""
-    return job.scene.horizontal_forces and not job.scene.contact.rubs
+    return job.scene.horizontal_forces and not job.scene.contact.has_friction
 
 
 def leaning_loads(

@@ -21,7 +21,7 @@ from tireroad.fem.static.state import StaticState
 from tireroad.greens.basis import Basis
 from tireroad.greens.tire_sound import (
     FAR,
-    Air,
+    SoundAir,
     SoundingTire,
     Transfer,
     directions,
@@ -33,7 +33,7 @@ from tireroad.greens.tire_sound import (
 from tireroad.modal.corner import BODY, SEEN
 from tireroad.runs.files.store import put
 from tireroad.runs.scene.plan import skipped
-from tireroad.runs.scene.tables.sound import Sound as Table
+from tireroad.runs.scene.tables.sound import SoundTable
 from tireroad.runs.stages.spectra import Spectra
 from tireroad.runs.stages.stage import Computed, Done, Job, Record, Shared, Stage
 from tireroad.runs.stages.vibration import HANN, POWER, decibels
@@ -101,7 +101,7 @@ class RadiationStage(Computed[Paths]):
     static: Done[StaticState]
 
     @property
-    def table(self) -> Table:
+    def table(self) -> SoundTable:
         """The table [sound]."""
         found = self.job.scene.sound
         assert found is not None, "the stage runs with [sound] only"
@@ -118,7 +118,7 @@ class RadiationStage(Computed[Paths]):
     def compute(self, record: Record) -> Paths:
         """Two meshes, all microphones and directions at each frequency. Collective."""
         table, comm = self.table, self.job.comm
-        up_to, air = self.job.scene.heard_up_to, Air.at(table.temperature)
+        up_to, air = self.job.scene.heard_up_to, SoundAir.at(table.temperature)
         frequency, size = solved_frequencies(up_to), elements_for(up_to, air)
         with record.timing("elements"):
             tire, rough = (sounding(self.static.product, table, size, by) for by in (1.0, COARSER))
@@ -174,7 +174,9 @@ class RadiationStage(Computed[Paths]):
 
     def read(self, file: h5py.File) -> Paths:
         """The same, read back."""
-        air = Air(speed=float(file.attrs["speed_of_sound"]), density=float(file.attrs["density"]))
+        air = SoundAir(
+            speed=float(file.attrs["speed_of_sound"]), density=float(file.attrs["density"])
+        )
         places = file["microphones"][:]
         kept: dict[str, Any] = {"frequency": file["frequency"][:], "air": air}
         near, far = (np.linalg.norm(one, axis=1) for one in (places, FAR * directions()[0]))
@@ -189,14 +191,16 @@ class RadiationStage(Computed[Paths]):
         )
 
 
-def sounding(state: StaticState, table: Table, size: float, coarser: float = 1.0) -> SoundingTire:
+def sounding(
+    state: StaticState, table: SoundTable, size: float, coarser: float = 1.0
+) -> SoundingTire:
     """The tire of a static state in elements of at most `coarser` times `size` m."""
     rest: dict[str, Any] = {key: getattr(table, key) for key in ("wheel", "wheel_depth", "leak")}
     return SoundingTire.of(state, size, coarser=coarser, **rest)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sound:
+class SoundPressure:
     """What k microphones hear of the vibrations of a run, up to the limit of the model.
 
     `names` and `places` (k, 3) m; `frequency` (f,) Hz, `pressure` (k, f) Pa: complex amplitudes
@@ -261,7 +265,7 @@ PASS_BY = 7.5  # m: distance of the directivity
 
 
 @dataclass(frozen=True, kw_only=True)
-class SoundStage(WholeTire[Sound]):
+class SoundStage(WholeTire[SoundPressure]):
     """Pressure from the coordinates of the run and the Green's functions of the air."""
 
     name: ClassVar[str] = "sound"
@@ -276,7 +280,7 @@ class SoundStage(WholeTire[Sound]):
             "radiation": self.radiation.key,
         }
 
-    def compute(self, record: Record) -> Sound | None:
+    def compute(self, record: Record) -> SoundPressure | None:
         """None but on the root process. Collective."""
         paths, lines, state = self.radiation.product, self.lines.product, self.static.product
         if lines is None:
@@ -306,7 +310,7 @@ class SoundStage(WholeTire[Sound]):
             parts = _sound(heard, self._errors, volumes @ lines.spectrum[below].T, lines.duration)
             normal = _normal_velocity(tire, shape, lines.amplitude[below], heard.frequency)
             efficiency = heard.efficiency(normal)
-        found = Sound(efficiency=efficiency, **parts)
+        found = SoundPressure(efficiency=efficiency, **parts)
         _describe(record, found)
         return found
 
@@ -328,7 +332,7 @@ class SoundStage(WholeTire[Sound]):
             error = np.hypot(error, axle)
         return found.levels["third_octave/centre"], error
 
-    def write(self, file: h5py.File, product: Sound) -> None:
+    def write(self, file: h5py.File, product: SoundPressure) -> None:
         """All fields of the product."""
         for name, (stored, unit) in _UNITS.items():
             put(file, stored, getattr(product, name), unit)
@@ -339,11 +343,11 @@ class SoundStage(WholeTire[Sound]):
         put(file, "directivity/elevation", elevation, "deg")
         put(file, "directivity/azimuth", azimuth, "deg")
 
-    def read(self, file: h5py.File) -> Sound:
+    def read(self, file: h5py.File) -> SoundPressure:
         """The same, read back."""
         kept: dict[str, Any] = {name: file[stored][:] for name, (stored, _) in _UNITS.items()}
         names = [str(name) for name in file["microphones"].attrs["names"]]
-        return Sound(names=names, rate=float(file["signal/pressure"].attrs["rate"]), **kept)
+        return SoundPressure(names=names, rate=float(file["signal/pressure"].attrs["rate"]), **kept)
 
 
 def angles() -> tuple[np.ndarray, np.ndarray]:
@@ -563,7 +567,7 @@ def _regions(tire: SoundingTire) -> np.ndarray:
     return found
 
 
-def _describe(record: Record, found: Sound) -> None:
+def _describe(record: Record, found: SoundPressure) -> None:
     """Levels at the microphones with their errors, the CPX level, and the sound power."""
     for k, name in enumerate(found.names):
         record.headline[f"level at {name}"] = (float(found.total[k]), "dB re 20 uPa")
@@ -588,7 +592,7 @@ def listen(
     *,
     temperature: float = 293.15,
     up_to: float | None = None,
-) -> Sound:
+) -> SoundPressure:
     """What microphones hear of a finished run: its folder, or tireroad.load of it. Not collective.
 
     `microphones`: as sound.microphones in a scene, names or places (x, y, z) in m; `temperature` K of the
@@ -602,8 +606,12 @@ def listen(
     results = run if isinstance(run, RunResults) else RunResults(run)  # type: ignore[arg-type]
     scene = load(results.directory / "scene.toml")
     given = {"microphones": microphones, "temperature": temperature, "up_to": up_to}
-    table = Table(
-        **{item.name: _read(item, given[item.name]) for item in fields(Table) if item.name in given}
+    table = SoundTable(
+        **{
+            item.name: _read(item, given[item.name])
+            for item in fields(SoundTable)
+            if item.name in given
+        }
     )
     job = Job(replace(scene, sound=table), results.directory, MPI.COMM_SELF)
     done: dict[str, Done] = {}

@@ -33,7 +33,7 @@ from tireroad.contact.results.spectra import (
 from tireroad.contact.setup import ContactSetup
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.stages import corner
 from tireroad.runs.stages.accuracy import Accuracy, all_limits
 from tireroad.runs.stages.contact_file import ContactHistory
@@ -297,7 +297,7 @@ class SpectraStage(Computed[Spectra]):
             for other in found
             if other != limit
         )
-        observe.say(f"  spectra end at {limit.frequency:.4g} Hz, {limit.cause}; {others}")
+        console.say(f"  spectra end at {limit.frequency:.4g} Hz, {limit.cause}; {others}")
         return limit
 
     def _after_run_in(self, record: Record, time: np.ndarray) -> int:

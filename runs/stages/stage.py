@@ -43,7 +43,7 @@ from tireroad.fem.turning import Turning
 from tireroad.modal.damping import Damping, Proportional, StrainEnergy
 from tireroad.runs.files import store
 from tireroad.runs.files.cache import NO_CACHE, Cache
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.process.signals import Stopped
 from tireroad.runs.scene.resolved import dumps
@@ -56,7 +56,7 @@ if TYPE_CHECKING:
     from tireroad.fem.static.road import RoadShape
     from tireroad.fem.tire.body import Body
     from tireroad.runs.scene.tables.scene import Scene
-    from tireroad.runs.scene.tables.tire import Tire
+    from tireroad.runs.scene.tables.tire import TireTable
 
 
 Figures = dict[str, tuple[Any, str]]
@@ -94,7 +94,7 @@ def _shown(value: Any) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
-def make_tire(comm: MPI.Comm, tire: Tire):
+def make_tire(comm: MPI.Comm, tire: TireTable):
     """The tire without loads; its finite elements are made on first use."""
     from tireroad.fem.model import TireModel
 
@@ -114,7 +114,7 @@ def road_shape(scene: Scene) -> RoadShape:
     )
 
 
-def make_body(comm: MPI.Comm, tire: Tire, section: Ring) -> Body:
+def make_body(comm: MPI.Comm, tire: TireTable, section: Ring) -> Body:
     """The finite-element body, undeformed. Collective."""
     from tireroad.fem.tire.body import Body
 
@@ -224,14 +224,14 @@ class Done(Generic[P]):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Part(ABC, Generic[P]):
+class PipelinePart(ABC, Generic[P]):
     """A part of the pipeline. Apart from `job`, its fields are the parts it takes, by name."""
 
     name: ClassVar[str]
     job: Job
 
     @classmethod
-    def taken(cls, job: Job, done: Mapping[str, Done]) -> Part | None:
+    def taken(cls, job: Job, done: Mapping[str, Done]) -> PipelinePart | None:
         """The part with its inputs from `done`; None if a required input is missing."""
         given: dict[str, Any] = {}
         for item in fields(cls):
@@ -244,7 +244,7 @@ class Part(ABC, Generic[P]):
         return cls(job=job, **given)
 
 
-class Shared(Part[P]):
+class Shared(PipelinePart[P]):
     """A part used by several stages, made on first use and not stored in a file."""
 
     @abstractmethod
@@ -252,7 +252,7 @@ class Shared(Part[P]):
         """The product. Collective where its parts are."""
 
 
-class Stage(Part[P]):
+class Stage(PipelinePart[P]):
     """A part whose product is stored in `<name>.h5` and reused while its inputs are unchanged."""
 
     @abstractmethod
@@ -324,7 +324,7 @@ def checkpointed(stage: Stage, what: str) -> Iterator[Journal]:
     journal = Journal(found, parts.keep)
     least = min(job.comm.allgather(len(found)))
     if least:
-        observe.say(f"  continues from the checkpoint after {least} {what}")
+        console.say(f"  continues from the checkpoint after {least} {what}")
     try:
         yield journal
     except Stopped:
@@ -362,7 +362,7 @@ class _Parts:
         reason = "" if self._job.fresh else self._read(found)
         reasons = [one for one in self._job.comm.allgather(reason) if one not in ("", "absent")]
         if reasons:
-            observe.say(f"  {self._folder.name} exists, but {reasons[0]}: only part of it is used")
+            console.say(f"  {self._folder.name} exists, but {reasons[0]}: only part of it is used")
         return found
 
     def _read(self, found: list[Entry]) -> str:

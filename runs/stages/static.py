@@ -18,17 +18,17 @@ import numpy as np
 from tireroad.fem.collective import collect
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.model import TireModel
-from tireroad.fem.static.equilibrium import Equilibrium, History
+from tireroad.fem.static.equilibrium import Equilibrium, SolutionHistory
 from tireroad.fem.static.footprint import Footprint
 from tireroad.fem.static.load_error import UNKNOWN, load_error
-from tireroad.fem.static.load_steps import Loader, with_cause
+from tireroad.fem.static.load_steps import LoadStepper, with_cause
 from tireroad.fem.static.press import Near, place
 from tireroad.fem.static.state import StaticState, static_state
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.timing import Timing
 from tireroad.fem.tire.cord_forces import CordForce
 from tireroad.runs.files.store import put
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.stages import reuse
 from tireroad.runs.stages.stage import (
@@ -207,7 +207,7 @@ class StaticStage(Computed[StaticState]):
         speed, near, steps, turns = self.job.speed, None, 0, 0
         with checkpointed(self, "solution(s)") as journal:
             journal.agreed(self.job.comm)
-            history = History(journal)
+            history = SolutionHistory(journal)
             while True:
                 state, loader, near = self._solved(record, speed, history, near)
                 steps, turns = steps + loader.newton_steps, turns + 1
@@ -217,11 +217,11 @@ class StaticStage(Computed[StaticState]):
                     loader.newton_steps = steps
                     return self._concluded(record, state, loader)
                 radius = state.rolling_radius()
-                observe.say(f"  rolling radius {radius:.6g} m: again at {speed:.6g} rad/s")
+                console.say(f"  rolling radius {radius:.6g} m: again at {speed:.6g} rad/s")
                 del loader  # its matrices and factors, before the next ones are formed
                 collect(self.job.comm)
 
-    def _concluded(self, record: Record, state: StaticState, loader: Loader) -> StaticState:
+    def _concluded(self, record: Record, state: StaticState, loader: LoadStepper) -> StaticState:
         """Add error estimate and the finer elements' footprint; record the figures. Collective."""
         if self.job.scene.static.error_estimate and state.load:
             with record.timing("error estimate"):
@@ -230,19 +230,19 @@ class StaticStage(Computed[StaticState]):
         record.headline |= friction_headline(state, self.job.scene.static.friction)
         record.notes += self._from_file()
         self._warn_at_rest(record)
-        observe.say(f"  {record.shares}")
+        console.say(f"  {record.shares}")
         return state
 
     def _solved(
-        self, record: Record, speed: float, history: History, near: Near | None
-    ) -> tuple[StaticState, Loader, Near]:
+        self, record: Record, speed: float, history: SolutionHistory, near: Near | None
+    ) -> tuple[StaticState, LoadStepper, Near]:
         """Solve up to the state at `speed` rad/s: in load steps, or from a state `near`, that of
         another speed. Collective."""
         rolling = steady_rolling(self.job, speed)
         with record.timing("mesh and forms"):
             equilibrium = Equilibrium(self.job.tire.body, rolling, road_shape(self.job.scene))
         equilibrium.history = history
-        loader = Loader(equilibrium, _show)
+        loader = LoadStepper(equilibrium, _show)
         began = Timing.clock()
         try:
             pressed = self._press(loader, rolling, near)
@@ -259,14 +259,16 @@ class StaticStage(Computed[StaticState]):
         state = static_state(pressed.equilibrium, loader.touch)
         return state, loader, Near.of(loader, pressed)
 
-    def _press(self, loader: Loader, rolling: Rolling, near: Near | None = None) -> Loader:
+    def _press(
+        self, loader: LoadStepper, rolling: Rolling, near: Near | None = None
+    ) -> LoadStepper:
         """Inflate the tire and press it on the road; returns the final loader. Collective."""
         wanted = self.job.scene.static
         loader.inflate(wanted.inflation, None if near is None else near.inflated)
         placed = wanted.load, wanted.deflection, wanted.road_height
         return place(loader, *placed, friction_of(self.job.scene, rolling), near)
 
-    def _keep_last(self, loader: Loader) -> str:
+    def _keep_last(self, loader: LoadStepper) -> str:
         """Write the last converged state, if any; returns a sentence saying where. Collective."""
         if not self.job.comm.allreduce(float(np.abs(loader.body.u.x.array).sum())):
             return ""
@@ -333,20 +335,20 @@ def _extent(attributes) -> Footprint:
     return Footprint(*(float(attributes[f"footprint_{name}"]) for name in _EXTENT))
 
 
-def _estimate(record: Record, state: StaticState, loader: Loader) -> StaticState:
+def _estimate(record: Record, state: StaticState, loader: LoadStepper) -> StaticState:
     """Report the load error from finer elements; returns the state, their footprint. Collective."""
     if state.pull is not None:  # estimated without friction: the load's error is the same with it
         loader.equilibrium.solve(loader.equilibrium.road_height)
     found = load_error(loader, state.rolling)
     if isinstance(found, str):
-        observe.say(f"  error of the load not estimated: {found}")
+        console.say(f"  error of the load not estimated: {found}")
         return state
     whole = found.bulk is not None
     what = "estimated error of the load" + ("" if whole else " by the footprint's elements")
     record.indicators[what] = (100 * found.relative, "%")
     to = f"ever smaller elements: {found.load:.5g} N" if found.signed else "of unknown sign"
     rest = f"{100 * found.bulk:.2g} %" if whole else f"not estimated: {UNKNOWN}"
-    observe.say(
+    console.say(
         f"  {what} at this height of the road: {100 * found.relative:.2g} % ({to}); of "
         f"the footprint's elements {100 * found.footprint:.2g} %, of the rest {rest}; {found.unknowns} unknowns with finer elements there"
     )
@@ -363,14 +365,14 @@ def _estimate(record: Record, state: StaticState, loader: Loader) -> StaticState
 
 def _show(progress) -> None:
     step = progress.step
-    observe.say(
+    console.say(
         f"  {progress.what} {progress.value:.6g} {progress.unit}: load {progress.load:.6g} N on "
         f"{progress.active} points, {step.iterations} Newton steps, residual {step.residual:.1e}"
         + ("" if step.reason == "converged" else f"; {step.reason}")
     )
 
 
-def _describe(record: Record, state: StaticState, loader: Loader) -> None:
+def _describe(record: Record, state: StaticState, loader: LoadStepper) -> None:
     free = 3 * len(state.displacement)
     record.headline["unknowns"] = (free, "-")
     record.headline |= cord_headline(state)

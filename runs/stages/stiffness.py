@@ -17,10 +17,10 @@ from tireroad.fem.matrices.road_stiffness import RoadStiffness, road_stiffness
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.friction_press import Slid, Slide
 from tireroad.fem.static.load_curve import CurvePoint, load_curve, slopes
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.state import StaticState
 from tireroad.runs.files.store import put
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.scene.tables.scene import deflections
 from tireroad.runs.stages.stage import Computed, Done, Job, Record, wheel_slip
 from tireroad.runs.stages.static import steady_rolling
@@ -62,7 +62,7 @@ def slides(job: Job, state: StaticState, stuck: RoadStiffness) -> dict[str, Curv
             (end * np.arange(1, wanted.slide_steps + 1) / wanted.slide_steps).tolist()
         ):
             points.append(point)
-            observe.say(f"  {name}: {_told(point, slide.rolls)}")
+            console.say(f"  {name}: {_told(point, slide.rolls)}")
         columns = {key: np.array([getattr(point, key) for point in points]) for key in _COLUMNS}
         found[name] = columns | {"start": np.array(start)}
     return found
@@ -215,7 +215,7 @@ class StiffnessStage(Computed[Stiffness]):
         body.u.x.array[:] = 0.0
         with record.timing("mesh and forms"):
             equilibrium = Equilibrium(body, steady_rolling(self.job), state.road)
-        loader = Loader(equilibrium, lambda progress: None)
+        loader = LoadStepper(equilibrium, lambda progress: None)
         try:
             loader.inflate(self.job.scene.static.inflation)
             points = load_curve(loader, deflections(self.job.scene.stiffness, _own(state)))
@@ -227,7 +227,7 @@ class StiffnessStage(Computed[Stiffness]):
         record.cost |= equilibrium.cost
         record.indicators["Newton steps"] = (loader.newton_steps, "-")
         for point in points:
-            observe.say(
+            console.say(
                 f"  {1e3 * point.deflection:.4g} mm: {point.load:.5g} N, footprint "
                 f"{1e3 * point.footprint.length:.3g} x {1e3 * point.footprint.width:.3g} mm"
             )

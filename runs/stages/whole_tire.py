@@ -28,7 +28,7 @@ from tireroad.runs.stages.contact_file import ContactHistory
 from tireroad.runs.stages.rolling import histories, of_given_forces, recursive
 from tireroad.runs.stages.setup import components, leaning, leaning_loads, probes
 from tireroad.runs.stages.spectra import Spectra
-from tireroad.runs.stages.stage import Computed, Done, Job, Part, Shared
+from tireroad.runs.stages.stage import Computed, Done, Job, PipelinePart, Shared
 
 _ROWS = 1024  # steps read at a time
 _AT_ONCE = 64  # coordinates transformed at a time, to save memory
@@ -49,7 +49,7 @@ def driven_loads(job: Job, state: StaticState, setup: ContactSetup | None) -> sp
 
 
 @dataclass(frozen=True, kw_only=True)
-class Forces:
+class PatchForces:
     """The forces of the steps ending at `time` (n,) s, `step` s apart, integrated by `scheme`.
 
     They count from the static state, as the loop's do. `seen` (k, m) kg^-1/2: the coordinates'
@@ -66,7 +66,7 @@ class Forces:
     @staticmethod
     def of(
         job: Job, setup: ContactSetup | None, history: ContactHistory | None, seen: np.ndarray
-    ) -> Forces:
+    ) -> PatchForces:
         """From the file of the contact, or of the response to given forces. Root process only."""
         if history is not None:
             time, step, scheme = history.time, history.step, history.scheme
@@ -74,7 +74,7 @@ class Forces:
             with opened(job.path("response")) as file:
                 time = file["time"][1:]  # the ends of the steps
             step, scheme = float(time[0]), of_given_forces(job.scene)
-        return Forces(job=job, setup=setup, time=time, step=step, scheme=scheme, seen=seen)
+        return PatchForces(job=job, setup=setup, time=time, step=step, scheme=scheme, seen=seen)
 
     @property
     def begun(self) -> np.ndarray:
@@ -111,7 +111,7 @@ P = TypeVar("P")
 
 
 @dataclass(frozen=True, kw_only=True)
-class OfRun(Part[P]):
+class OfRun(PipelinePart[P]):
     """A part that takes the run's forces and states."""
 
     static: Done[StaticState]
@@ -124,12 +124,12 @@ class OfRun(Part[P]):
         """Upper end of the frequency band of interest, Hz."""
         return band(self.rotating.product, Wanted(band=self.job.scene.greens.band))
 
-    def taken_in(self) -> tuple[Basis, Callable[[], Forces]]:
+    def taken_in(self) -> tuple[Basis, Callable[[], PatchForces]]:
         """The basis, and what reads the forces on the root process. Collective."""
         basis, setup = Basis.of(self.rotating.product), self.setup.product
         loads = driven_loads(self.job, self.static.product, setup)
         contact = self.contact.product if self.contact else None
-        return basis, lambda: Forces.of(self.job, setup, contact, basis.seen(loads))
+        return basis, lambda: PatchForces.of(self.job, setup, contact, basis.seen(loads))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -165,7 +165,7 @@ class LinesOfRun(OfRun[Lines | None], Shared[Lines | None]):
         return made[0] if made else None
 
 
-def _lines(basis: Basis, forces: Forces, left_out: float, top: float) -> Lines:
+def _lines(basis: Basis, forces: PatchForces, left_out: float, top: float) -> Lines:
     """After `left_out` s and up to `top` Hz."""
     steps = range(round(left_out / forces.step), len(forces.time))
     frequency = np.fft.rfftfreq(len(steps), forces.step)
@@ -204,7 +204,7 @@ class WholeTire(OfRun[P], Computed[P]):
         }
 
 
-def replayed(basis: Basis, forces: Forces, wanted: Collection[int]) -> np.ndarray:
+def replayed(basis: Basis, forces: PatchForces, wanted: Collection[int]) -> np.ndarray:
     """The coordinates (g, m) m kg^1/2 at the ends of the `wanted` steps, by the run's own scheme.
 
     The states are integrated once more under the forces of the run, which are known by now. Root

@@ -9,7 +9,7 @@ from pathlib import Path
 from tireroad.fem.errors import ConvergenceError
 from tireroad.runs.files.folder import held
 from tireroad.runs.files.store import stage_hash
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.sweep import local
 from tireroad.runs.sweep.definition import Member, Sweep, read
@@ -37,7 +37,7 @@ def _run(family: Sweep, folder: Path, at_once: int, only_gather: bool) -> None:
     if not only_gather:
         number, limit = local.at_once(family, at_once)
         if limit:
-            observe.say(f"{number} member(s) at a time, limited by {limit}")
+            console.say(f"{number} member(s) at a time, limited by {limit}")
         ended = local.run(family, folder, number)
         failed = [one.line for one in ended if one.status]
     _gather(family, folder, failed)
@@ -54,8 +54,8 @@ def _gather(family: Sweep, folder: Path, failed: Sequence[str]) -> None:
     write(table, folder)
     page = write_page(table, folder, family.name, failed)
     for name in table.missing:
-        observe.say(f"  {name}: no results of a finished run of this scene")
-    observe.say(f"{page} and sweep.csv, sweep.h5 beside it")
+        console.say(f"  {name}: no results of a finished run of this scene")
+    console.say(f"{page} and sweep.csv, sweep.h5 beside it")
 
 
 def _queue(family: Sweep, folder: Path, source: Path) -> None:
@@ -63,9 +63,9 @@ def _queue(family: Sweep, folder: Path, source: Path) -> None:
     first, rest = shared_first(family)
     scripts = local.write_scripts(family, folder, first, rest, source)
     for script in scripts.values():
-        observe.say(f"{script.path}")
+        console.say(f"{script.path}")
     jobs = local.submit(family, scripts)
-    observe.say("submitted: " + ", ".join(f"{name} as job {job}" for name, job in jobs.items()))
+    console.say("submitted: " + ", ".join(f"{name} as job {job}" for name, job in jobs.items()))
 
 
 def shared_first(family: Sweep) -> tuple[list[Member], list[Member]]:

@@ -26,7 +26,7 @@ from typing import Any
 
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.runs.files.disk import write_text
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.process.surroundings import available_memory
 from tireroad.runs.scene.estimate import memory
 from tireroad.runs.stages import obtained
@@ -50,7 +50,7 @@ class Ended:
         """The outcome in one line."""
         outcome = _OUTCOME.get(self.status, f"crashed (status {self.status}): a bug")
         more = f": {self.said}" if self.status else ""
-        return f"{self.member.name}: {outcome} after {observe.seconds(self.seconds)}{more}"
+        return f"{self.member.name}: {outcome} after {console.seconds(self.seconds)}{more}"
 
 
 def at_once(sweep: Sweep, wanted: int) -> tuple[int, str]:
@@ -99,7 +99,7 @@ def _run(sweep: Sweep, folder: Path, at_a_time: int, failures: Path) -> list[End
             for one in workers:
                 if (how := one.ended()) is not None:
                     ended.append(how)
-                    observe.say(f"  [{len(ended)}/{len(sweep.members)}] {how.line}")
+                    console.say(f"  [{len(ended)}/{len(sweep.members)}] {how.line}")
     finally:
         for one in workers:
             one.end()

@@ -46,7 +46,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Column:
+class SweepColumn:
     """A quantity of every member; NaN if a member has none."""
 
     name: str
@@ -63,7 +63,7 @@ class Gathered:
 
     names: tuple[str, ...]
     settings: Mapping[str, tuple[Any, ...]]
-    columns: tuple[Column, ...]
+    columns: tuple[SweepColumn, ...]
     missing: tuple[str, ...]
 
 
@@ -89,7 +89,7 @@ def gather(sweep: Sweep, folder: Path) -> Gathered:
         names=tuple(member.name for member in sweep.members),
         settings={key: tuple(one[key] for one in settings) for key in sweep.axes},
         columns=tuple(
-            Column(name, unit, np.array([row.get((name, unit), np.nan) for row in rows]))
+            SweepColumn(name, unit, np.array([row.get((name, unit), np.nan) for row in rows]))
             for name, unit in keys
         ),
         missing=tuple(missing),
@@ -342,7 +342,7 @@ def _page_figures(table: Gathered) -> list[tuple[str, str]]:
     return found
 
 
-def _chosen(table: Gathered) -> list[Column]:
+def _chosen(table: Gathered) -> list[SweepColumn]:
     """The columns that are drawn over the axes, in the order of `SHOWN`: those that vary."""
     finite = {c.name: c.values[np.isfinite(c.values)] for c in table.columns if c.name in SHOWN}
     vary = {name for name, values in finite.items() if len(values) > 1 and np.ptp(values) > 0}
@@ -351,7 +351,7 @@ def _chosen(table: Gathered) -> list[Column]:
 
 
 @styled
-def _spectra(bands: Sequence[Column], names: Sequence[str]) -> str:
+def _spectra(bands: Sequence[SweepColumn], names: Sequence[str]) -> str:
     figure, axes = canvas(9.5, 3.6)
     place = np.arange(len(bands))
     for number, name in enumerate(names[:CURVES]):
@@ -408,7 +408,7 @@ def _about(compared: Levels) -> str:
 
 
 @styled
-def _against(key: str, values: Array, columns: Sequence[Column]) -> str:
+def _against(key: str, values: Array, columns: Sequence[SweepColumn]) -> str:
     """Every chosen result over one axis, in separate panels."""
     count = max(min(len(columns), 4), 1)
     figure, axes = canvas(9.5, 2.0 * count + 0.4, count, sharex=True)
@@ -422,7 +422,7 @@ def _against(key: str, values: Array, columns: Sequence[Column]) -> str:
 
 
 @styled
-def _map(first: str, a: Array, second: str, b: Array, column: Column) -> str:
+def _map(first: str, a: Array, second: str, b: Array, column: SweepColumn) -> str:
     """A result over two axes, coloured at the grid's points."""
     figure, axes = canvas(6.5, 4.2)
     there = np.isfinite(a) & np.isfinite(b) & np.isfinite(column.values)

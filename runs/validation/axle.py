@@ -54,7 +54,7 @@ FORCES = (
 
 
 @dataclass(frozen=True)
-class Found:
+class AxleResult:
     """Axle force, -, and moment, m, per force (f, 3, k) by one method; its run time in seconds."""
 
     form: str
@@ -127,7 +127,7 @@ def _total(loads: sparse.csr_matrix) -> np.ndarray:
     return loads.toarray().reshape(loads.shape[0], -1, 3).sum(axis=1).T
 
 
-def _full(tires: Tires) -> Found:
+def _full(tires: Tires) -> AxleResult:
     """All unknowns; the moment from the rows that modes use, which tests compare with the forces on
     the rim's nodes."""
     loads = tires.probes.on_face.loads
@@ -142,20 +142,20 @@ def _full(tires: Tires) -> Found:
     corner = tires.modes.projection.wheel
     moment = corner.rigid(loads)[:, MOMENTS].T - s**2 * mass - s * rate - static
     force = from_moment(_total(loads), carried, FREQUENCY)
-    return Found("full FE", "all", force, moment, time.perf_counter() - began)
+    return AxleResult("full FE", "all", force, moment, time.perf_counter() - began)
 
 
-def _momentum(tires: Tires, count: int) -> Found:
+def _momentum(tires: Tires, count: int) -> AxleResult:
     """The program's own method: its response, with the momentum of each state as an output."""
     loads = tires.probes.on_face.loads
     began = time.perf_counter()
     response = tires.response(count, "attachment", counted=False)
     transfer = by_momentum(response, _total(loads), FREQUENCY)
     moment = response.between(slice(-3, None), slice(None)).receptance(FREQUENCY)
-    return Found("momentum", count, transfer, moment, time.perf_counter() - began)
+    return AxleResult("momentum", count, transfer, moment, time.perf_counter() - began)
 
 
-def _free_rim(tires: Tires) -> Iterator[Found]:
+def _free_rim(tires: Tires) -> Iterator[AxleResult]:
     """Modes of the same static state with its rim released."""
     loads, motions = tires.probes.on_face.loads, tires.motions
     free = SmallMotions(motions.tire, motions.static, rim="free")
@@ -164,4 +164,4 @@ def _free_rim(tires: Tires) -> Iterator[Found]:
         began = time.perf_counter()
         given = modes.first(count), loads, FREQUENCY, motions.rim_motion(wheel.speed != 0)
         force, moment = np.split(by_free_rim(wheel, *given), 2, axis=1)
-        yield Found("free rim", count, force, moment, time.perf_counter() - began)
+        yield AxleResult("free rim", count, force, moment, time.perf_counter() - began)

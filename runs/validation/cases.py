@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Strip:
+class RollingStrip:
     """Mass (kg), length and width (m), lowest circular frequency (1/s), wave speed (m/s), damping
     gamma1 (1/s), rolling speed (m/s)."""
 

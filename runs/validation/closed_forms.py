@@ -17,7 +17,7 @@ from scipy.sparse.linalg import eigsh
 from tireroad.fem.axle import Axle
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import Material, compound
 from tireroad.fem.tire.mesh import Torus
@@ -70,7 +70,7 @@ def _tube() -> Iterator[tuple]:
     A, B = 0.25, 0.30
     rubber = compound("mooney-rivlin", 1000.0, c10=4e5, c01=1e5, bulk_modulus=1e9)
     body = _cylinder(B, B - A, 20.0, (8, 24, 1), rubber)
-    loader = Loader(Equilibrium(body), lambda progress: None)
+    loader = LoadStepper(Equilibrium(body), lambda progress: None)
     for a in (0.26, 0.275):
         b = np.sqrt(a * a + B * B - A * A)
         p = 1e6 * (np.log(a * B / (b * A)) + (a * a - A * A) * (a**-2 - b**-2) / 2)

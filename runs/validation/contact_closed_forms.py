@@ -44,7 +44,7 @@ from tireroad.contact.roads.kinds.shapes import Flat
 from tireroad.contact.roads.under_tire import RoadUnderTire
 from tireroad.contact.setup import ContactSetup, Rolled
 from tireroad.contact.solver.active_set import ActiveSet
-from tireroad.contact.solver.stick_slip import Carcass, Friction, Stiffness, stick_slip
+from tireroad.contact.solver.stick_slip import BrushFriction, Carcass, SlidingStiffness, stick_slip
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import (
     Influence,
@@ -54,8 +54,8 @@ from tireroad.contact.tread.compliance import (
     rectangle_potential,
     winkler_compliance,
 )
-from tireroad.contact.tread.creep import steady
 from tireroad.contact.tread.kernel import GridPlaces, KernelTread
+from tireroad.contact.tread.memory import steady
 from tireroad.contact.tread.pattern import Pattern, pitch_starts
 from tireroad.contact.tread.shear import KernelShear, half_space_shear
 from tireroad.fem.errors import ConvergenceError
@@ -63,12 +63,12 @@ from tireroad.fem.sections.grid import product
 from tireroad.fem.sections.torus import Torus
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.friction_press import RubbingEquilibrium
-from tireroad.fem.static.friction_road import Passing, Sliding, Standing
+from tireroad.fem.static.friction_road import Passing, Sliding, StandingFriction
 from tireroad.fem.static.virtual_work import AT_REST
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.mesh import INNER, TREAD
-from tireroad.runs.scene.tables.contact import Groove
+from tireroad.runs.scene.tables.contact import GrooveTable
 from tireroad.runs.validation.cases import oval_patch
 
 YOUNG, POISSON = 3.4e6, 0.49
@@ -164,7 +164,7 @@ def _cattaneo_mindlin() -> Iterator[tuple]:
     half = np.float64(pitch / 2)
     potential = rectangle_potential(x[:, None] - x, y[:, None] - y, half, half)
     both = np.kron(potential / (2 * np.pi * pitch**2), np.eye(2))
-    matrix = Stiffness(Carcass(np.asarray(both, dtype=float)))
+    matrix = SlidingStiffness(Carcass(np.asarray(both, dtype=float)))
     total = normal.sum()
     for share in (0.3, 0.7):
         shift = 3 * friction * total / 8 * (1 - (1 - share) ** (2 / 3))
@@ -233,7 +233,7 @@ def _steady(x, normal, slip: float, stiffness: float, compliance) -> float:
     law = BrushLaw(stiffness, FRICTION, (slip, 0.0))
     brush = Brush(law, x, np.zeros(c, int), way, 1.0)
     brush.begin(normal > 0)
-    friction, solver = Friction(brush, tire, None), ActiveSet(np.eye(c))
+    friction, solver = BrushFriction(brush, tire, None), ActiveSet(np.eye(c))
     gap, free = np.where(normal > 0, 0.0, 1.0), np.zeros(2 * c)
     for _ in range(10 * round(HALF / way)):
         _, horizontal = friction.solve(solver, gap, normal > 0, normal, free)
@@ -316,7 +316,7 @@ def pushed(nu: float, cells: int) -> Iterator[tuple]:
     normal = np.sqrt(1 - disc.x**2 - disc.y**2) * disc.pitch**2
     total, count = float(normal.sum()), len(normal)
     tread = disc.shear(nu).between(np.arange(count))
-    stiffness = Stiffness(Carcass(np.zeros((2 * count, 2 * count))), tread=tread)
+    stiffness = SlidingStiffness(Carcass(np.zeros((2 * count, 2 * count))), tread=tread)
     for share in (0.3, 0.7):
         shift = 3 * SHEAR_FRICTION * total * (2 - nu) / 16 * (1 - (1 - share) ** (2 / 3))
         moved = np.tile([-shift, 0.0], (count, 1))
@@ -335,7 +335,7 @@ def bonded(nu: float, cells: int) -> float:
     tread = KernelTread(disc.grid, _down(nu))
     solver = ActiveSet(tread.block(np.arange(count), np.arange(count)))
     brush = Brush(BrushLaw(np.inf, kind="spring"), disc.x, disc.line, 0.0, 1.0)
-    friction = Friction(brush, np.zeros((3 * count, 3 * count)), None, disc.shear(nu))
+    friction = BrushFriction(brush, np.zeros((3 * count, 3 * count)), None, disc.shear(nu))
     gap, touching, none = np.full(count, -1e-3), np.ones(count, dtype=bool), np.zeros(count)
     found = friction.solve(solver, gap, touching, none, np.zeros(2 * count))[0]
     return float(found.sum() / solver.solve(gap, touching).sum())
@@ -355,7 +355,7 @@ def _rolled(disc: Disc, nu: float, slip) -> np.ndarray:
     count = len(disc.x)
     brush = Brush(BrushLaw(np.inf, None, slip), disc.x, disc.line, disc.pitch, 1.0)
     brush.begin(disc.inside)
-    friction = Friction(brush, np.zeros((3 * count, 3 * count)), None, _Alone(disc, nu))
+    friction = BrushFriction(brush, np.zeros((3 * count, 3 * count)), None, _Alone(disc, nu))
     solver, normal = ActiveSet(np.eye(count)), 1.0 * disc.inside
     gap, free, last = 1.0 - normal, np.zeros(2 * count), np.zeros(2)
     for _ in range(round(10 / disc.pitch)):
@@ -490,7 +490,7 @@ def oval() -> Patch:
 
 def grooves(**given) -> Pattern:
     """One groove per pitch, all pitches equal."""
-    return Pattern(AROUND, [Groove(**given)], pitch_starts(PITCHES, [1.0], 1, AROUND))
+    return Pattern(AROUND, [GrooveTable(**given)], pitch_starts(PITCHES, [1.0], 1, AROUND))
 
 
 def rolled(pattern: Pattern | None, steps: int) -> tuple[np.ndarray, Patch]:
@@ -683,7 +683,7 @@ def standing(roller: Roller, pushes: tuple[float, ...] = (2e-4, 4e-4)) -> Iterat
     """The road pushed sideways (m) under the roller."""
     load = roller.hertz_load(STATIC_HALF)
     pressed = Pressed(roller, load, STATIC_FRICTION)
-    sliding = Standing(pressed.body)
+    sliding = StandingFriction(pressed.body)
     problem = pressed.rubbing(sliding)
     for push in pushes:
         sliding.place[0] = push
@@ -694,12 +694,12 @@ def standing(roller: Roller, pushes: tuple[float, ...] = (2e-4, 4e-4)) -> Iterat
 def rolling(roller: Roller, shares: tuple[float, ...]) -> Iterator[tuple[float, float]]:
     """(share of the creepage of full sliding, force over that of full sliding), driving."""
     full = STATIC_FRICTION * STATIC_HALF / roller.outer
-    drag = Rolling(Pressed(roller, roller.hertz_load(STATIC_HALF), STATIC_FRICTION))
+    drag = RollingCase(Pressed(roller, roller.hertz_load(STATIC_HALF), STATIC_FRICTION))
     for share in shares:
         yield share, drag(drag.free * (1 - share * full)).share
 
 
-class Rolling:
+class RollingCase:
     """The rolling roller; `free` m: its travel per radian without drag."""
 
     def __init__(self, pressed: Pressed) -> None:
@@ -732,7 +732,7 @@ def over_brush(roller: Roller, creepage: float = 1e-3, half: float = 0.02) -> fl
     """
     h, width, young = roller.thickness, roller.width, roller.youngs_modulus
     load = young / h * 2 * half**3 / 3 / roller.outer * width
-    drag = Rolling(Pressed(roller, load, friction := 10.0))
+    drag = RollingCase(Pressed(roller, load, friction := 10.0))
     found = drag(drag.free * (1 - creepage)).share * friction * load
     return found / (young / 2 / h * creepage * 2 * half**2 * width)
 

@@ -13,7 +13,7 @@ import h5py
 import numpy as np
 from mpi4py import MPI
 
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.pipeline import run_scene
 from tireroad.runs.validation.full_elements import LOADED, Choice, Tires, compare, verdicts
@@ -85,7 +85,7 @@ def _run(base: Path, text: str) -> tuple[dict[str, np.ndarray], dict]:
     (base / "scene.toml").write_text(text)
     scene, out = load(base / "scene.toml"), base / "out"
     out.mkdir(exist_ok=True)
-    with observe.quiet():
+    with console.quiet():
         run_scene(scene, out, MPI.COMM_SELF, until="contact", fresh=False, petsc_options=[])
     with h5py.File(out / "contact.h5") as file:
         kept = {name: file[name][:] for name in ("axle_force", "total_force")}

@@ -32,7 +32,7 @@ from tireroad.greens.responses import make_response
 from tireroad.modal.damping import StrainEnergy, beyond, rates
 from tireroad.modal.rolling import RollingModes, rolling_modes
 from tireroad.modal.standing import fewer
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.pipeline import Finished, run_scene
 from tireroad.runs.stages.setup import leaning, leaning_loads, probes, scene_setup
@@ -41,7 +41,7 @@ from tireroad.runs.validation.tables import Table
 
 
 @dataclass(frozen=True)
-class History:
+class FullHistory:
     """Quantities (n, k) by name at the end of each of n steps of `step` s.
 
     `seconds` of the loop: CPU time of one thread, which a busy machine changes little; `setup`:
@@ -55,7 +55,7 @@ class History:
 
 
 @dataclass(frozen=True)
-class Trial:
+class Conditions:
     """The conditions of any tire model's run: table [contact], patch and road, `duration` s."""
 
     spec: Spec
@@ -63,7 +63,7 @@ class Trial:
     duration: float
 
 
-def follow(trial: Trial, tire, step: float, setup: float) -> History:
+def follow(trial: Conditions, tire, step: float, setup: float) -> FullHistory:
     """Run the tire over the trial's road, with the same points, tread and solver for any tire.
 
     Contact and axle force (n, 3) N, displacement of the contact points (n, c) m.
@@ -84,7 +84,7 @@ def follow(trial: Trial, tire, step: float, setup: float) -> History:
             moved[k] = instant.displacement
         seconds = time.process_time() - began
     values = {"contact force": contact, "axle force": axle, "displacement": moved}
-    return History(step, values, seconds, setup)
+    return FullHistory(step, values, seconds, setup)
 
 
 # Spectral radius of the full finite elements' scheme. Axle force on a cleat at steps of 1e-4 s with
@@ -123,7 +123,7 @@ class Tires:
     def __init__(self, scene: str, folder: Path):
         self._file = folder / "scene.toml"
         self._file.write_text(scene)
-        with observe.quiet():
+        with console.quiet():
             self.run: Finished = run_scene(
                 load(self._file),
                 folder,
@@ -165,7 +165,7 @@ class Tires:
         leans = setup is not None and leaning(self.job)
         self.aside = leaning_loads(static, setup) if leans else None
         if setup:
-            self.trial = Trial(contact, setup, self.job.scene.time.duration)
+            self.trial = Conditions(contact, setup, self.job.scene.time.duration)
 
     @property
     def wheel(self) -> Wheel:
@@ -272,7 +272,7 @@ class Run:
     """
 
     choice: Choice | None
-    history: History
+    history: FullHistory
     errors: dict[str, Distance]
     error: float
 
@@ -283,21 +283,21 @@ class Comparison:
     `counts`: the quantities whose error a run is selected by.
     """
 
-    def __init__(self, full: list[History], counts: tuple[str, ...]):
+    def __init__(self, full: list[FullHistory], counts: tuple[str, ...]):
         self._reference, self._counts = full[-1], counts
         errors = [self._between(history) for history in full[:-1]]
         last = {name: Distance(far.mean / 3, far.worst / 3) for name, far in errors[-1].items()}
         self.full = [self._run(None, *pair) for pair in zip(full, [*errors, last], strict=True)]
         self.modal: list[Run] = []
 
-    def add(self, choice: Choice, history: History) -> None:
+    def add(self, choice: Choice, history: FullHistory) -> None:
         """Add a modal run."""
         self.modal.append(self._run(choice, history, self._between(history)))
 
-    def _run(self, choice: Choice | None, history: History, errors: dict[str, Distance]) -> Run:
+    def _run(self, choice: Choice | None, history: FullHistory, errors: dict[str, Distance]) -> Run:
         return Run(choice, history, errors, max(errors[name].mean for name in self._counts))
 
-    def _between(self, history: History) -> dict[str, Distance]:
+    def _between(self, history: FullHistory) -> dict[str, Distance]:
         exact = self._reference.values
         return {
             name: distance(exact[name], values, self._duration)

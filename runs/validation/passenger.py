@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from tireroad.contact.results.spectra import nominal, third_octaves
-from tireroad.runs.validation.full_elements import Choice, History, Tires, digits, follow
+from tireroad.runs.validation.full_elements import Choice, FullHistory, Tires, digits, follow
 from tireroad.runs.validation.tables import Table
 
 # The full finite elements in time have the moduli of one frequency: exponent = 0.
@@ -63,7 +63,7 @@ def run() -> list[Table]:
     return [compared_table(title, compared, full[-1])]
 
 
-def compared_table(title: str, compared: dict[str, History], exact: History) -> Table:
+def compared_table(title: str, compared: dict[str, FullHistory], exact: FullHistory) -> Table:
     """Third octaves of vertical forces minus `exact`, dB: a row per band, a column per history."""
     rows: list[list] = []
     for name in ("contact", "axle"):
@@ -86,11 +86,11 @@ def compared_table(title: str, compared: dict[str, History], exact: History) -> 
     return Table(title, columns, rows, notes)
 
 
-def _seconds(history: History) -> float:
+def _seconds(history: FullHistory) -> float:
     return history.seconds / (history.step * len(history.values["contact force"]))
 
 
-def _levels(history: History, name: str) -> tuple[np.ndarray, np.ndarray]:
+def _levels(history: FullHistory, name: str) -> tuple[np.ndarray, np.ndarray]:
     centre, level = third_octaves(history.values[f"{name} force"][:, 2:], history.step, 2 * BAND[1])
     kept = (centre > BAND[0]) & (centre < BAND[1])
     return centre[kept], level[kept, 0]

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from tireroad.runs.validation.full_elements import Choice, Comparison, History, Tires, verdicts
+from tireroad.runs.validation.full_elements import Choice, Comparison, FullHistory, Tires, verdicts
 from tireroad.runs.validation.tables import Table
 
 ABOUT = "displacement under a point force, modes against full finite elements of the same mesh"
@@ -70,7 +70,7 @@ def run() -> list[Table]:
     return [*tables, verdicts("Point force: targets", rows, [])]
 
 
-def _history(tire, step: float, setup: float, frequency: float) -> History:
+def _history(tire, step: float, setup: float, frequency: float) -> FullHistory:
     """Displacement of the driven point (x, y, z) and axle force under the sine."""
     steps = round(DURATION / step)
     force = np.sin(2 * np.pi * frequency * step * np.arange(steps + 1))[:, None]
@@ -85,4 +85,4 @@ def _history(tire, step: float, setup: float, frequency: float) -> History:
             axle[k] = -tire.inertia_force()
             axle[k, 2] += force[k + 1, 0]
         seconds = time.process_time() - began
-    return History(step, {"displacement": moved, "axle force": axle}, seconds, setup)
+    return FullHistory(step, {"displacement": moved, "axle force": axle}, seconds, setup)

@@ -11,7 +11,7 @@ from tireroad.contact.results.spectra import BAND, distance
 from tireroad.fem.errors import ConvergenceError
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
-from tireroad.runs.validation.full_elements import History, Tires, digits, follow
+from tireroad.runs.validation.full_elements import FullHistory, Tires, digits, follow
 from tireroad.runs.validation.rolling import ROADS, SCENE
 from tireroad.runs.validation.tables import Table
 
@@ -59,7 +59,7 @@ def tables(mesh: dict[str, int], residuals, steps, finest: float) -> list[Table]
     return [Table("Forces linear, damped or constant over the step", columns, rows, notes)]
 
 
-def _follow(tires: Tires, response: Response, step: float, scheme: str) -> History | None:
+def _follow(tires: Tires, response: Response, step: float, scheme: str) -> FullHistory | None:
     """The history; None if the motion grew without bound."""
     tire = Recursion(
         response=response.resolved(step), step=step, scheme=scheme, comm=tires.job.comm
@@ -70,7 +70,7 @@ def _follow(tires: Tires, response: Response, step: float, scheme: str) -> Histo
         return None
 
 
-def _row(tires: Tires, response: Response, exact: History, tread, residual, step) -> list:
+def _row(tires: Tires, response: Response, exact: FullHistory, tread, residual, step) -> list:
     trial = tires.trial
     count = oscillation(trial.spec, trial.setup.patch, response.resolved(step), step)
     off = {
@@ -82,7 +82,7 @@ def _row(tires: Tires, response: Response, exact: History, tread, residual, step
     return [tread / 1e6, residual, step, shown, chosen, off[chosen], *off.values()]
 
 
-def _off(duration: float, exact: History, found: History | None) -> float | str:
+def _off(duration: float, exact: FullHistory, found: FullHistory | None) -> float | str:
     if found is None:
         return "unbounded"
     one, other = exact.values["contact force"], found.values["contact force"]

@@ -26,12 +26,12 @@ import numpy as np
 from mpi4py import MPI
 from scipy import linalg, sparse
 
-from tireroad.contact.grid_patch import OnPoints
+from tireroad.contact.grid_patch import PointTire
 from tireroad.contact.loop import Drive, roll
-from tireroad.contact.roads.kinds.shapes import Cleat, Flat, Step
+from tireroad.contact.roads.kinds.shapes import Cleat, Flat, StepRoad
 from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.solver.projected_cg import ProjectedCG, SpreadCompliance
-from tireroad.contact.solver.stick_slip import Friction
+from tireroad.contact.solver.stick_slip import BrushFriction
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import (
     half_space_compliance,
@@ -43,7 +43,7 @@ from tireroad.contact.tread.shear import MatrixShear, half_space_shear
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.state import StaticState, static_state
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
@@ -58,9 +58,9 @@ from tireroad.modal.solver.slicing import Modes
 from tireroad.modal.standing import sites
 from tireroad.modal.states import StateModes
 from tireroad.runs.files.store import opened
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.stages.pipeline import run_scene
-from tireroad.runs.validation.cases import Strip, oval_patch, thesis_torus
+from tireroad.runs.validation.cases import RollingStrip, oval_patch, thesis_torus
 from tireroad.runs.validation.tables import Table
 
 BALANCED = 1e-9  # residual of an equilibrium, relative to the force scale
@@ -102,7 +102,7 @@ def attempts() -> Iterator[Attempt]:
 
 
 @dataclass(frozen=True)
-class Ended:
+class EndedRun:
     """The final state, the solver's message if it is not the one asked for, and the check.
 
     The equations are solved again from the state: `residual`, and Newton `steps`, 0 if in
@@ -120,7 +120,7 @@ class Ended:
         return self.steps == 0 and self.residual <= BALANCED
 
 
-def result(asked: Attempt) -> Ended:
+def result(asked: Attempt) -> EndedRun:
     """Load the tire, and check the equilibrium of the final state."""
     segments, arc, order = asked.mesh
     section = thesis_torus(
@@ -135,7 +135,7 @@ def result(asked: Attempt) -> Ended:
     equilibrium = Equilibrium(
         Body(MPI.COMM_SELF, section, rubber), Rolling(speed=asked.speed, damping=500.0)
     )
-    loader = Loader(equilibrium, lambda progress: None)
+    loader = LoadStepper(equilibrium, lambda progress: None)
     message = ""
     try:
         loader.inflate(asked.inflation)
@@ -147,7 +147,7 @@ def result(asked: Attempt) -> Ended:
         message = str(error)
     state = static_state(equilibrium, loader.lowest())
     again = equilibrium.solve(equilibrium.road_height)
-    return Ended(state, message, again.residual, again.iterations)
+    return EndedRun(state, message, again.residual, again.iterations)
 
 
 def static_rows() -> list[list]:
@@ -155,7 +155,7 @@ def static_rows() -> list[list]:
     return [["fem", asked.name, *outcome(result(asked))] for asked in attempts()]
 
 
-def outcome(ended: Ended) -> tuple[str, str]:
+def outcome(ended: EndedRun) -> tuple[str, str]:
     """The result, and how it was caught, for the table."""
     state = ended.state
     moved = np.abs(state.displacement).max()
@@ -185,7 +185,7 @@ def modal_rows() -> list[list]:
         section,
         compound("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45),
     )
-    loader = Loader(Equilibrium(body), lambda progress: None)
+    loader = LoadStepper(Equilibrium(body), lambda progress: None)
     loader.inflate(2e5)
     found = [_double(Operators(body, 2e5)), _negative(body)]
     loader.deflect(0.003)
@@ -396,7 +396,7 @@ class Case:
     """One run: a strip, its tread, a step in s, a scheme, a friction or None."""
 
     name: str
-    strip: Strip = Strip(speed=20.0)
+    strip: RollingStrip = RollingStrip(speed=20.0)
     tread: np.ndarray = field(default_factory=lambda: HALF_SPACE)
     drive: Drive = Drive(Flat().height, lambda t: 0.0, 20.0)
     step: float = 1e-4
@@ -407,7 +407,7 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Rolled:
+class RolledCase:
     """Result of a case: steps; largest load (N); `growth`: variation of the load in the last tenth
     over that in the middle; worst residual of a step; whether it `left` the road; reason if
     `refused`, or another remark (`said`)."""
@@ -440,12 +440,12 @@ def wavy(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return 5e-3 * np.clip(x / 0.3, 0.0, 1.0) ** 3 * np.sin(25 * x + 10 * y)
 
 
-def outcomes() -> list[Rolled]:
+def outcomes() -> list[RolledCase]:
     """Results of all cases."""
     return [thrown_up(), *(rolled(case) for case in cases()), one_mode(), many_points()]
 
 
-def table(found: list[Rolled]) -> Table:
+def table(found: list[RolledCase]) -> Table:
     """Figures of all cases."""
     columns = [("case", ""), ("steps", "-"), ("largest load", "N"), ("variation of the load", "-"),
                ("worst residual", "-"), ("left the road", "-"), ("refused", "")]  # fmt: skip
@@ -461,12 +461,12 @@ def table(found: list[Rolled]) -> Table:
     return Table("Stability of the contact loop", columns, rows, notes)
 
 
-def thrown_up(steps: int = 1_000_000) -> Rolled:
+def thrown_up(steps: int = 1_000_000) -> RolledCase:
     """An undamped tire at rest, thrown up by a jump of the road: is its energy conserved?
 
     Energy: waves |z|^2/m, springs (residual and tread), potential of the load f_s . g.
     """
-    strip, step = Strip(damping=0.0), 3e-4
+    strip, step = RollingStrip(damping=0.0), 3e-4
     response = strip.response(PATCH.points, 6, 3, residual=5).resolved(step)
     tire = Recursion(response=response, step=step, scheme="constant", comm=MPI.COMM_SELF)
     drive = Drive(Flat().height, lambda t: 5e-3 if t < 1e-3 else 0.0, 0.0)
@@ -497,16 +497,18 @@ def cases() -> Iterator[Case]:
             yield Case(f"step {step:g} s, {scheme}", drive=waves, step=step, scheme=scheme,
                        steps=max(round(SHORTEST / step), 2000))  # fmt: skip
     for speed in (0.0, 40.0, 80.0, 160.0):
-        yield Case(f"speed {speed / CRITICAL:.2g} of critical", Strip(speed=speed),
+        yield Case(f"speed {speed / CRITICAL:.2g} of critical", RollingStrip(speed=speed),
                    drive=replace(waves, speed=speed))  # fmt: skip
     for power in range(4, 13, 2):
         tread = winkler_compliance(PATCH.area, 10.0**power)
         yield Case(f"tread of 1e{power} N/m3", tread=tread, drive=waves)
     for damping in (0.0, 10.0, 1e3, 1e5):
-        yield Case(f"damping {damping:g} 1/s", Strip(speed=20.0, damping=damping), drive=waves)
+        yield Case(
+            f"damping {damping:g} 1/s", RollingStrip(speed=20.0, damping=damping), drive=waves
+        )
     spike = Cleat(height=0.010, length=0.002, ramp=0.001).make()
     yield Case("spike of 10 mm, 2 mm long", drive=Drive(spike.height, lambda t: 0.0, 20.0))
-    edge = Step(height=0.010, ramp=0.0).make()
+    edge = StepRoad(height=0.010, ramp=0.0).make()
     yield Case("step of 10 mm", drive=Drive(edge.height, lambda t: 0.0, 20.0))
     yield Case("road falls away for 20 ms and comes back", drive=Drive(
         Flat().height, lambda t: -0.1 if 0.01 < t < 0.03 else 0.0, 20.0))  # fmt: skip
@@ -520,12 +522,12 @@ def cases() -> Iterator[Case]:
         )
 
 
-def rolled(case: Case) -> Rolled:
+def rolled(case: Case) -> RolledCase:
     """Run a case."""
     try:
         return _contact_followed(case.name, _loop(case, len(PATCH.points)), case.steps)
     except (InputError, ConvergenceError) as error:
-        return Rolled(case.name, case.steps, 0.0, 0.0, 0.0, False, str(error))
+        return RolledCase(case.name, case.steps, 0.0, 0.0, 0.0, False, str(error))
 
 
 def _loop(case: Case, count: int):
@@ -545,11 +547,11 @@ def _loop(case: Case, count: int):
         law = BrushLaw(np.inf if case.shear else 1e5, case.friction, (0.05, 0.02))
         brush = Brush(law, PATCH.points[:, 0], PATCH.line, case.drive.speed, case.step)
         brush.begin(PATCH.force > 0)
-        friction = Friction(brush, tire.same_step, None, SHEAR if case.shear else None)
+        friction = BrushFriction(brush, tire.same_step, None, SHEAR if case.shear else None)
     return roll(tire, solver, PATCH, case.drive, case.step, case.steps, friction)
 
 
-def _contact_followed(name: str, instants, steps: int) -> Rolled:
+def _contact_followed(name: str, instants, steps: int) -> RolledCase:
     load, residual, left = np.empty(steps), 0.0, False
     for k, instant in enumerate(instants):
         load[k] = instant.force.sum()
@@ -558,10 +560,10 @@ def _contact_followed(name: str, instants, steps: int) -> Rolled:
     tenth = max(steps // 10, 1)
     before = load[steps // 2 - tenth // 2 :][:tenth].std()
     growth = float(load[-tenth:].std() / before) if before > 0 else 0.0
-    return Rolled(name, steps, float(load.max()), growth, residual, left)
+    return RolledCase(name, steps, float(load.max()), growth, residual, left)
 
 
-def one_mode() -> Rolled:
+def one_mode() -> RolledCase:
     """One mode, one point."""
     patch = oval_patch((3, 3), (0.05, 0.06), 500.0)
     middle = np.array([4])
@@ -570,7 +572,7 @@ def one_mode() -> Rolled:
         for name in ("index", "points", "half_sizes", "force", "gap", "edge", "line")
     })  # fmt: skip
     tire = Recursion(
-        response=Strip().response(small.points, 0, 1),
+        response=RollingStrip().response(small.points, 0, 1),
         step=1e-4,
         scheme="linear",
         comm=MPI.COMM_SELF,
@@ -582,7 +584,7 @@ def one_mode() -> Rolled:
     )
 
 
-def many_points(steps: int = 150) -> Rolled:
+def many_points(steps: int = 150) -> RolledCase:
     """20,000 points carried by the 63 nodes, from rest onto waves."""
     fine = oval_patch((200, 100), (0.6e-3, 1.2e-3), 500.0)
     away = ((fine.points[:, None, :2] - PATCH.points[None, :, :2]) ** 2).sum(axis=-1)
@@ -591,14 +593,14 @@ def many_points(steps: int = 150) -> Rolled:
     weights = sparse.diags(1 / weights.sum(axis=1).A1) @ weights
     places = GridPlaces((200, 100), (0.6e-3, 1.2e-3), np.arange(20_000))
     kernel = KernelTread(places, lambda x, y, a, b: half_space_influence(x, y, a, b, 5e6, 0.45))
-    response = Strip(speed=20.0).response(PATCH.points, 6, 3, residual=5)
+    response = RollingStrip(speed=20.0).response(PATCH.points, 6, 3, residual=5)
     step = 2e-4
     tire = Recursion(
         response=response.resolved(step), step=step, scheme="linear", comm=MPI.COMM_SELF
     )
     solver = ProjectedCG(SpreadCompliance(tire.same_step, weights.tocsr(), kernel))
     drive = Drive(lambda x, y: 0.1 * wavy(x, y), lambda t: 0.0, 20.0)
-    instants = roll(OnPoints(tire, weights.tocsr()), solver, fine, drive, step, steps)
+    instants = roll(PointTire(tire, weights.tocsr()), solver, fine, drive, step, steps)
     return _contact_followed("20,000 points", instants, steps)
 
 
@@ -740,7 +742,7 @@ def _ended(one: Combination, folder: Path) -> tuple[str, str]:
     (folder / "scene.toml").write_text(text)
     try:
         scene = load(folder / "scene.toml", [])
-        with observe.quiet():
+        with console.quiet():
             run_scene(scene, folder, MPI.COMM_WORLD, until="contact", fresh=False, petsc_options=[])
     except (InputError, ConvergenceError) as error:
         return "refused", str(error)

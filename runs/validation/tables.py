@@ -17,7 +17,7 @@ import numpy as np
 
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.runs.files.disk import write_text
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.process.signals import Stopped
 from tireroad.runs.version import PROGRAM, VERSION
 
@@ -79,7 +79,7 @@ def run_all(package: str, names: list[str], out: Path | None, large: bool = Fals
         stop.kept = _left(results, out)
         raise
     if out is not None:
-        observe.say(f"{out} and {out.with_suffix('.html')}")
+        console.say(f"{out} and {out.with_suffix('.html')}")
     failed = [line for tables in results.values() for table in tables for line in table.failed]
     if failed:
         raise ConvergenceError(f"not measured: {'; '.join(failed)}")
@@ -116,12 +116,12 @@ def _left(results: dict[str, list[Table]], out: Path | None) -> str:
 
 def _measured(module: ModuleType, name: str, out: Path | None, large: bool) -> list[Table]:
     """Run a module and show its tables."""
-    observe.say(f"{name}: {module.ABOUT}")
+    console.say(f"{name}: {module.ABOUT}")
     began = time.perf_counter()
     tables = module.run_large() if large else _run(module, out)
     for table in tables:
         show(table)
-    observe.say(f"{name}: {time.perf_counter() - began:.1f} s\n")
+    console.say(f"{name}: {time.perf_counter() - began:.1f} s\n")
     return tables
 
 
@@ -147,9 +147,9 @@ def show(table: Table) -> None:
         grid.add_row(*(escape(_shown(value)) for value in row))
     text = io.StringIO()
     Console(file=text, width=120).print(grid)
-    observe.say(text.getvalue().rstrip())
+    console.say(text.getvalue().rstrip())
     for line in table.remarks:
-        observe.say(f"  {line}")
+        console.say(f"  {line}")
 
 
 def _shown(value) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 
 from tireroad.contact.results.band import USABLE
 from tireroad.contact.results.spectra import nominal, third_octaves
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.validation.tables import Table
 
 ABOUT = "third octaves with modes to some frequency against twice that, beside the limit that is printed"
@@ -58,7 +58,7 @@ def run() -> list[Table]:
                             nominal(centre), edge, apart[:, k], strict=False
                         ):
                             rows.append([case, f"{what} {axis}", name, share, off])
-                observe.say(f"  {residual}: {case}")
+                console.say(f"  {residual}: {case}")
         every = np.abs(np.concatenate(within))
         note = (
             f"up to {USABLE:g} of the highest mode {100 * np.mean(every <= 0.5):.0f} % of {len(every)} differences are within "

@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 from tireroad.contact.loop import Drive, roll
 from tireroad.contact.roads.kinds.shapes import Flat
 from tireroad.contact.solver.active_set import ActiveSet
-from tireroad.contact.solver.stick_slip import Friction
+from tireroad.contact.solver.stick_slip import BrushFriction
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.runs.validation.tables import Table
 from tireroad.tests.bench.parts.contact_points import large, rough
@@ -73,7 +73,7 @@ def _loop(shape, modes: int, height, brush: float | None = None, steps: int = 10
         law = BrushLaw(brush, 0.8, (0.02, 0.01))
         bristles = Brush(law, patch.points[:, 0], patch.line, 20.0, STEP)
         bristles.begin(patch.force > 0)
-        coupling = Friction(bristles, tire.same_step, None)
+        coupling = BrushFriction(bristles, tire.same_step, None)
     drive = Drive(height, lambda t: 0.0, 20.0)
     return roll(tire, solver, patch, drive, STEP, steps, coupling), solver, response
 

@@ -22,9 +22,9 @@ from tireroad.contact.results.spectra import distance, third_octaves
 from tireroad.contact.tread.law import TREADS
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.footprint import TreadSurface
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.state import StaticState, static_state
-from tireroad.runs.validation.full_elements import Trial
+from tireroad.runs.validation.full_elements import Conditions
 from tireroad.runs.validation.tables import Table
 from tireroad.tests.bench.accuracy.rough_road import BAND, Mesh, Prepared, modal, prepared
 
@@ -85,7 +85,7 @@ def _law(name: str, given: Prepared, tread: str, **keys: float) -> Outcome:
     run = given.run
     spec = replace(given.run.job.scene.contact, tread=tread, law=TREADS.make(tread, **keys))
     setup, _ = run.setup.settled(run.greens.contact, run.static.normal_force, spec)
-    trial = Trial(spec, setup, DURATION)
+    trial = Conditions(spec, setup, DURATION)
     history = modal(Prepared(run, trial), run.greens.contact, STEP)
     return Outcome(name, history.values["contact force"][:, 2], history.seconds)
 
@@ -109,7 +109,7 @@ def _pressed(given: Prepared) -> list[StaticState]:
     """The inflated tire without a road, then on a plane, up to 1.3 times the deflection."""
     body, static = given.run.job.tire.body, given.run.static
     body.u.x.array[:] = 0.0
-    loader = Loader(Equilibrium(body, static.rolling), lambda progress: None)
+    loader = LoadStepper(Equilibrium(body, static.rolling), lambda progress: None)
     loader.inflate(static.inflation)
     states = [static_state(loader.equilibrium, loader.touch)]
     depths = 1.3 * static.deflection * (np.arange(DEPTHS) + 1) / DEPTHS

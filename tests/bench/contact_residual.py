@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tireroad.runs.validation.full_elements import Choice, History, Tires, follow
+from tireroad.runs.validation.full_elements import Choice, FullHistory, Tires, follow
 from tireroad.runs.validation.tables import Table
 
 ABOUT = "10 to 200 modes in contact, without and with residual, against all modes of a small tire"
@@ -73,7 +73,7 @@ def _row(tires: Tires, count: int, exact: np.ndarray) -> list:
     return [count, *found, *TRIAL[count]]
 
 
-def _moved(history: History) -> np.ndarray:
+def _moved(history: FullHistory) -> np.ndarray:
     return history.values["displacement"]
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from mpi4py import MPI
 
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.process.surroundings import peak_memory
 from tireroad.runs.validation.cases import thesis_torus
 from tireroad.runs.validation.tables import Table
@@ -21,7 +21,7 @@ RATIO = 500  # modes in the comparison
 def run() -> list[Table]:
     """Static state, standing modes by number, SLEPc's slicing, projected states. Collective."""
     comm = MPI.COMM_WORLD
-    observe.say("static state of the tire ...")
+    console.say("static state of the tire ...")
     operators = _tire(comm)
     table, modes, exponent = _standing(comm, operators)
     plain = _plain(comm, operators)
@@ -65,7 +65,7 @@ def _met(sign: str, asked: float, value: float) -> str:
 def _tire(comm: MPI.Comm):
     from tireroad.fem.matrices.operators import Operators
     from tireroad.fem.static.equilibrium import Equilibrium
-    from tireroad.fem.static.load_steps import Loader
+    from tireroad.fem.static.load_steps import LoadStepper
     from tireroad.fem.tire.body import Body
     from tireroad.fem.tire.material import compound
 
@@ -74,7 +74,7 @@ def _tire(comm: MPI.Comm):
         model="neo-hookean", youngs_modulus=48e6, poisson_ratio=0.45, density=1200.0
     )
     body = Body(comm, section, material)
-    loader = Loader(Equilibrium(body), lambda progress: None)
+    loader = LoadStepper(Equilibrium(body), lambda progress: None)
     loader.inflate(2e5)
     loader.deflect(0.004)
     return Operators(body, 2e5)
@@ -104,7 +104,7 @@ def _standing(comm: MPI.Comm, operators):
         worst = float(found.residual.max())
         highest = float(found.frequency[-1])
         rows.append([count, highest, seconds, gigabytes, worst, found.orthonormality, found.slices])
-        observe.say(f"  {count} modes in {seconds:.1f} s")
+        console.say(f"  {count} modes in {seconds:.1f} s")
         modes = found if count == 1000 else modes
     exponent = np.polyfit(np.log(COUNTS), np.log([row[2] for row in rows]), 1)[0]
     size = operators.stiffness.getSize()[0]
@@ -132,7 +132,7 @@ def _plain(comm: MPI.Comm, operators) -> Table:
     from tireroad.modal.solver.fields import everywhere, scaled_by
     from tireroad.modal.standing import sites
 
-    observe.say(f"{RATIO} modes by SLEPc's interval slicing ...")
+    console.say(f"{RATIO} modes by SLEPc's interval slicing ...")
     own, found = _timed(
         comm,
         lambda: undamped.solve(operators.stiffness, operators.mass, RATIO, sites=sites(operators)),
@@ -199,7 +199,7 @@ def _rolling(comm: MPI.Comm, operators, modes) -> tuple[Table, float]:
     from tireroad.modal.rolling import truncation
     from tireroad.modal.rotating import checks, matrices, rotating
 
-    observe.say("projected states ...")
+    console.say("projected states ...")
     projection = project(modes, operators.rotation(), operators.carried, comm)
     pencil = matrices(projection, 50.0, (500.0, 0.0), "full")
     states = {}

@@ -11,7 +11,7 @@ from scipy import sparse
 from tireroad.fem.matrices import probe
 from tireroad.fem.model import SmallMotions, TireModel
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.state import static_state
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
@@ -66,7 +66,7 @@ def _tire(comm: MPI.Comm, segments: int, elements_arc: int) -> SmallMotions:
     section = thesis_torus(segments=segments, elements_arc=elements_arc).ring()
     rubber = compound("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
     tire = TireModel(section, lambda: Body(comm, section, rubber))
-    loader = Loader(Equilibrium(tire.body), lambda progress: None)
+    loader = LoadStepper(Equilibrium(tire.body), lambda progress: None)
     loader.inflate(INFLATION)
     return SmallMotions(tire, static_state(loader.equilibrium, loader.touch))
 

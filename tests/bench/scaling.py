@@ -16,8 +16,8 @@ from tireroad.contact.loop import Drive, roll
 from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.tread.compliance import half_space_compliance
 from tireroad.greens.recursion import Recursion
-from tireroad.runs.process import observe
-from tireroad.runs.validation.cases import Strip, oval_patch
+from tireroad.runs.process import console
+from tireroad.runs.validation.cases import RollingStrip, oval_patch
 from tireroad.runs.validation.tables import Table
 from tireroad.tests.bench.accuracy.rough_road import Mesh, prepared, write_scene
 from tireroad.tests.bench.parts.floors import bandwidth, exponent, fastest, flop_rate
@@ -57,7 +57,7 @@ def unknowns(folder: Path, meshes: tuple[Mesh, ...], modes: int) -> Table:
     """Static state, modes and Green's functions over the unknowns, and one factorisation of K."""
     rows = []
     for mesh in meshes:
-        observe.say(f"  {mesh} elements ...")
+        console.say(f"  {mesh} elements ...")
         rows.append(_size(folder / str(mesh), mesh, modes))
     sizes = [row[0] for row in rows]
     named = {"factorisation": 1, "static state": 3, "modes": 5, "Green's functions": 7}
@@ -160,7 +160,7 @@ def _steps(size: int, states: int, steps: int) -> list:
     """(points, states, steps, us per step, s in all, us per pass, ratio) for a synthetic tire."""
     step, speed = 1e-4, 20.0
     patch = oval_patch((size, size), (0.16 / size, 0.12 / size), 500.0)
-    response = Strip(speed=speed).response(patch.points, max(states // 20, 1), 10)
+    response = RollingStrip(speed=speed).response(patch.points, max(states // 20, 1), 10)
     tire = Recursion(response=response, step=step, scheme="linear", comm=MPI.COMM_SELF)
     tread = half_space_compliance(patch.points[:, :2], patch.half_sizes, 5e6, 0.45)
     solver = ActiveSet(tire.same_step + tread)
@@ -189,7 +189,7 @@ def processes(folder: Path, mesh: Mesh, modes: int, most: int) -> Table:
     counts = [2**k for k in range(most.bit_length()) if 2**k <= most]
     rows = []
     for count in counts:
-        observe.say(f"  {count} process{'es' if count > 1 else ''} ...")
+        console.say(f"  {count} process{'es' if count > 1 else ''} ...")
         rows.append(_on(folder, "strong", mesh, modes, count))
         if count > 1:
             grown = Mesh(mesh.segments * count, mesh.arc, mesh.footprint)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.validation.tables import Table
 from tireroad.tests.bench.accuracy.rough_road import SPEED, Mesh, Rolled, prepared, rolled
 
@@ -31,7 +31,7 @@ def run() -> list[Table]:
 
 def table(folder: Path, mesh: Mesh, keys: dict) -> Table:
     """Rows: what is skipped, seconds with and without it, the ratio, the change of the result."""
-    observe.say("  rolling, standing, flat, with friction ...")
+    console.say("  rolling, standing, flat, with friction ...")
     rolling = rolled(folder / "rolling", mesh, **keys)
     again = rolled(folder / "rolling", mesh, "road.seed=1", **keys)
     standing = rolled(folder / "standing", mesh, **keys | {"speed": 0.0})

@@ -18,15 +18,15 @@ from scipy.special import eval_legendre, spherical_jn, spherical_yn
 
 from tireroad.contact.roads.kinds.two_slope import LEVELS
 from tireroad.fem.static.road import FLAT
-from tireroad.greens.sound import Body, radiate
-from tireroad.greens.tire_sound import FAR, Air, SoundingTire, Transfer, directions, transfer
-from tireroad.runs.process import observe
+from tireroad.greens.sound import SoundBody, radiate
+from tireroad.greens.tire_sound import FAR, SoundAir, SoundingTire, Transfer, directions, transfer
+from tireroad.runs.process import console
 from tireroad.runs.validation.tables import Table
 
 ABOUT = "sound: spheres in closed form and over the road, horn, power, and tires beside CNOSSOS-EU"
 ROOT = Path(__file__).resolve().parents[2]
 RADIUS, C, RHO = 0.31, 343.0, 1.2
-AIR = Air(speed=C, density=RHO)
+AIR = SoundAir(speed=C, density=RHO)
 FREQUENCIES = np.array([100.0, 200.0, 400.0, 800.0, 1600.0])
 EARS = np.array([[0.6, 0.3, 0.1], [0.0, 0.5, 0.4], [7.5, 0.0, 1.2]])
 GAPS = (0.5e-3, 5e-3, 30e-3)  # m
@@ -133,7 +133,7 @@ def _over_the_road() -> Table:
     for gap in GAPS:
         for n in (8, 12):
             points, quads = ball(n, RADIUS, RADIUS + gap)
-            body = Body.of(points, quads, True)
+            body = SoundBody.of(points, quads, True)
             place, weight = body.points_and_weights(4)
             size = np.linalg.norm(weight, axis=2)
             way = place - [0, 0, RADIUS + gap]  # elements are flat: the directions are the sphere's
@@ -241,7 +241,7 @@ def _tires() -> Table:
                 power, seconds = _powers(Path(folder) / f"{road}-{speed}", speed, less)
                 emission = CNOSSOS[0] + CNOSSOS[1] * np.log10(speed / 70.0) - QUARTER
                 rows.append([road, speed, seconds, *power, *emission])
-                observe.say(
+                console.say(
                     f"  {road} {speed} km/h: {np.round(power, 1)} dB, CNOSSOS {np.round(emission, 1)}"
                 )
     columns = [("asphalt", ""), ("speed", "km/h"), ("run", "s")]

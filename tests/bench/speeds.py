@@ -9,7 +9,7 @@ import tempfile
 from pathlib import Path
 
 from tireroad.fem.errors import ConvergenceError
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.validation.tables import Table
 
 ABOUT = "20 speeds over one static state and its modes, against 20 separate runs: processor time"
@@ -44,13 +44,13 @@ def measured(folder: Path, scene: str, members: int) -> list:
         encoding="utf-8",
     )
     together = _processor_time("sweep", str(family), "--out", str(folder / scene))
-    observe.say(f"  {scene}: sweep {together:.0f} s")
+    console.say(f"  {scene}: sweep {together:.0f} s")
     alone = 0.0
     for speed in (speeds[0], speeds[-1])[:ALONE]:
         given = "--set", SHAPE, "--set", f"rotation.speed={speed}", "--fresh"
         out = folder / f"{scene}-{speed:g}"
         alone += _processor_time("run", str(source), "--out", str(out), *given) / ALONE
-    observe.say(f"  {scene}: a separate run {alone:.0f} s")
+    console.say(f"  {scene}: a separate run {alone:.0f} s")
     return [scene, members, together, members * alone, 100 * together / (members * alone)]
 
 

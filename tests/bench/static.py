@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.validation.tables import Table
 from tireroad.tests.bench.parts.launched import launched
 
@@ -41,7 +41,7 @@ def run() -> list[Table]:
     with tempfile.TemporaryDirectory() as folder:
         for speed, count in RUNS:
             runs.append(_figures(Path(folder), speed, count))
-            observe.say(f"  {speed:g} rad/s, {count} process(es): {runs[-1][0]:.1f} s")
+            console.say(f"  {speed:g} rad/s, {count} process(es): {runs[-1][0]:.1f} s")
     names = ["all", *PARTS, "unknowns", "Newton steps", "memory, a process", "error of the load"]
     units = [*["s"] * (1 + len(PARTS)), "-", "-", "GB", "%"]
     columns = [(f"{speed:g} rad/s, {count} process(es)", "-") for speed, count in RUNS]

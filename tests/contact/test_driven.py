@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from tireroad.contact.loop import Drive, Driven, roll
+from tireroad.contact.loop import Drive, DrivenTire, roll
 from tireroad.contact.patch import Patch
 from tireroad.contact.roads.kinds.shapes import Flat
 from tireroad.contact.solver.active_set import ActiveSet
@@ -50,12 +50,12 @@ def oscillator() -> Response:
     )
 
 
-def driven(steps: int = STEPS) -> Driven:
+def driven(steps: int = STEPS) -> DrivenTire:
     tire = Recursion(response=oscillator(), step=STEP, scheme="linear", comm=MPI.COMM_SELF)
-    return Driven(tire, np.full((steps + 1, 1), FORCE), np.array([[0.0, 0.0, 1.0]]))
+    return DrivenTire(tire, np.full((steps + 1, 1), FORCE), np.array([[0.0, 0.0, 1.0]]))
 
 
-def rolled(tire: Driven, steps: int, done: int = 0):
+def rolled(tire: DrivenTire, steps: int, done: int = 0):
     solver = ActiveSet(tire.same_step + TREAD)
     drive = Drive(Flat().height, lambda t: 0.0, 0.0)
     for instant in roll(tire, solver, POINT, drive, STEP, steps, done=done):

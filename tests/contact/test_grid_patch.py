@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 from tireroad.contact import grid_patch, model
 from tireroad.contact.grid_patch import (
-    OnPoints,
+    PointTire,
     halved,
     make_grid_patch,
     settle,
@@ -24,7 +24,7 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.static.footprint import TreadSurface
 from tireroad.fem.tire.mesh import field_lattice
 from tireroad.runs.scene.schema import Pitch
-from tireroad.runs.scene.tables.contact import Contact
+from tireroad.runs.scene.tables.contact import ContactTable
 from tireroad.runs.validation.cases import thesis_torus
 
 SECTION = thesis_torus(segments=60, elements_arc=16, grading="bead", footprint_size=0.3)
@@ -104,7 +104,7 @@ def test_settled_state_keeps_the_load(tread, pitch: float) -> None:
     nodal = force[patch.index]
     p = len(patch.index)
     flexibility = 1e-5 * (np.eye(p) + 0.5)
-    spec = Contact(law=HalfSpace(youngs_modulus=5e6), points=Pitch(pitch, pitch))
+    spec = ContactTable(law=HalfSpace(youngs_modulus=5e6), points=Pitch(pitch, pitch))
     settled, rise = settle(patch, step_solver(spec, patch, flexibility), flexibility, nodal)
     assert settled.force.sum() == pytest.approx(500.0, rel=1e-7)
     assert settled.force.min() >= 0 and settled.gap.min() >= 0
@@ -120,7 +120,7 @@ def test_a_patch_clear_of_the_road_settles_without_force(tread) -> None:
     """A grid point may lie a little below the nodes around it: no point is left inside the road."""
     force, _, patch = patches(tread, 3e-3, 0.004)
     flexibility = 1e-5 * np.eye(len(patch.index))
-    spec = Contact(law=HalfSpace(youngs_modulus=5e6), points=Pitch(0.004, 0.004))
+    spec = ContactTable(law=HalfSpace(youngs_modulus=5e6), points=Pitch(0.004, 0.004))
     patch = replace(patch, gap=patch.gap - 1e-5)
     free = np.zeros_like(force[patch.index])
     settled, rise = settle(patch, step_solver(spec, patch, flexibility), flexibility, free)
@@ -156,7 +156,7 @@ def test_nodes_and_points_exchange_the_same_work(tread, most, monkeypatch) -> No
 
     tire = Tire()
     monkeypatch.setattr(grid_patch, "MOST_DENSE", most)
-    on = OnPoints(tire, patch.weights)
+    on = PointTire(tire, patch.weights)
     force = np.random.default_rng(0).random(len(patch.points))
     on.advance(force)
     assert tire.force.sum() == pytest.approx(force.sum())
@@ -194,7 +194,7 @@ def test_a_grid_needs_a_tread_and_a_sane_pitch(tread) -> None:
     _, _, patch = patches(tread, 3e-3, 0.001)
     flexibility = 1e-5 * np.eye(len(patch.index))
     with pytest.raises(InputError, match="tread"):
-        step_solver(Contact(tread="none"), patch, flexibility)
+        step_solver(ContactTable(tread="none"), patch, flexibility)
     with pytest.raises(InputError, match="coarser"):
         patches(tread, 3e-3, 1e-6)
 
@@ -205,4 +205,4 @@ def test_solver_by_the_number_of_touching_points(tread, monkeypatch) -> None:
         monkeypatch.setattr(model, "MOST_TOUCHING", most)
         _, _, patch = patches(tread, 3e-3, pitch)
         flexibility = 1e-5 * np.eye(len(patch.index))
-        assert isinstance(step_solver(Contact(), patch, flexibility), solver)
+        assert isinstance(step_solver(ContactTable(), patch, flexibility), solver)

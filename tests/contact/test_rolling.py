@@ -14,11 +14,11 @@ from tireroad.contact.tread.compliance import half_space_compliance
 from tireroad.fem.errors import ConvergenceError
 from tireroad.greens.convolution import Convolution
 from tireroad.greens.recursion import Recursion
-from tireroad.runs.validation.cases import Strip, oval_patch
+from tireroad.runs.validation.cases import RollingStrip, oval_patch
 
 PATCH = oval_patch((9, 7), (0.015, 0.02), 500.0)
 TREAD = half_space_compliance(PATCH.points[:, :2], PATCH.half_sizes, 5e6, 0.45)
-STRIP = Strip(speed=20.0)
+STRIP = RollingStrip(speed=20.0)
 
 
 def shaken(t: float) -> float:
@@ -43,7 +43,7 @@ def run(response, step, steps, scheme, height=None, motion=shaken, speed=20.0, c
 @pytest.mark.parametrize("scheme", ["linear", "damped", "constant", "convolution"])
 @pytest.mark.parametrize("speed", [0.0, 30.0])
 def test_flat_road_at_rest_stays_at_rest_bit_for_bit(scheme: str, speed: float) -> None:
-    response = Strip(speed=speed).response(PATCH.points, 6, 3, residual=4)
+    response = RollingStrip(speed=speed).response(PATCH.points, 6, 3, residual=4)
     instants, _, solver = run(response, 1e-4, 200, scheme, motion=lambda t: 0.0, speed=speed)
     for instant in instants:
         assert np.array_equal(instant.force, PATCH.force)
@@ -93,7 +93,7 @@ def test_constant_scheme_never_gains_energy_undamped() -> None:
     Waves |z|^2/m, springs (residual and tread), the load's height f_s . g: each step changes their
     sum by -f . g(before) or less.
     """
-    strip = Strip(damping=0.0)
+    strip = RollingStrip(damping=0.0)
     response = strip.response(PATCH.points, 4, 2, residual=6)
     step = 2e-4
     tire = Recursion(response=response, step=step, scheme="constant", comm=MPI.COMM_SELF)
@@ -163,7 +163,7 @@ def test_same_answer_on_any_number_of_processes(scheme: str) -> None:
 
 def test_axle_carries_the_contact_force_in_the_end() -> None:
     """A held change of load: when all has died down, the axle feels what the road gives."""
-    response = Strip(damping=400.0).response(PATCH.points, 5, 3, residual=4)
+    response = RollingStrip(damping=400.0).response(PATCH.points, 5, 3, residual=4)
 
     def raised(t: float) -> float:
         return 5e-4 * min(t / 0.02, 1.0)
@@ -175,7 +175,7 @@ def test_axle_carries_the_contact_force_in_the_end() -> None:
 
 def test_work_of_contact_is_the_energy_of_an_undamped_tire() -> None:
     """Waves and residual springs hold what the road put in, to second order in the step."""
-    strip = Strip(damping=0.0)
+    strip = RollingStrip(damping=0.0)
     response = strip.response(PATCH.points, 4, 2, residual=6)
     errors = []
     for steps in (200, 400):

@@ -15,7 +15,7 @@ from tireroad.contact.setup import ContactSetup, Rolled
 from tireroad.contact.tread.laws.elastic import HalfSpace
 from tireroad.fem.static.footprint import Footprint
 from tireroad.runs.scene.load import load
-from tireroad.runs.scene.tables.contact import Contact
+from tireroad.runs.scene.tables.contact import ContactTable
 
 LOAD = 400.0  # N
 
@@ -100,7 +100,7 @@ def wheel():
 def test_nodes_settle_on_their_tread(wheel) -> None:
     """f >= 0, g = g_0 + A (f - f_0) + C~ f + rise >= 0, f g = 0, the load kept: the static state had no tread."""
     setup, response, face = wheel
-    patch, spec = setup.patch, Contact(law=HalfSpace(youngs_modulus=1e7))
+    patch, spec = setup.patch, ContactTable(law=HalfSpace(youngs_modulus=1e7))
     settled, rise = setup.settled(response, face, spec)
     found = settled.patch
     assert found.force.sum() == pytest.approx(LOAD, rel=1e-7) and found.force.min() >= 0
@@ -110,13 +110,13 @@ def test_nodes_settle_on_their_tread(wheel) -> None:
     assert gap.min() > -1e-9 and found.gap == pytest.approx(np.maximum(gap, 0.0), abs=1e-9)
     assert not (found.force * found.gap).any()
     assert np.count_nonzero(found.force) > np.count_nonzero(patch.force)
-    stiff, rise = setup.settled(response, face, Contact(law=HalfSpace(youngs_modulus=1e13)))
+    stiff, rise = setup.settled(response, face, ContactTable(law=HalfSpace(youngs_modulus=1e13)))
     assert abs(rise) < 1e-4 and np.count_nonzero(stiff.patch.force) < np.count_nonzero(found.force)
 
 
 def test_nodes_without_a_tread_have_their_static_state(wheel) -> None:
     setup, response, face = wheel
-    settled, rise = setup.settled(response, face, Contact(tread="none"))
+    settled, rise = setup.settled(response, face, ContactTable(tread="none"))
     assert rise == 0.0 and all(map(is_, vars(settled.patch).values(), vars(setup.patch).values()))
 
 

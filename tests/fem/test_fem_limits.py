@@ -6,12 +6,12 @@ import pytest
 
 from tireroad.fem.static.state import StaticState
 from tireroad.runs.validation import stability
-from tireroad.runs.validation.stability import Attempt, Ended, attempts, result
+from tireroad.runs.validation.stability import Attempt, EndedRun, attempts, result
 
 pytestmark = pytest.mark.slow
 
 
-def ended(**asked) -> Ended:
+def ended(**asked) -> EndedRun:
     """What came of it; whatever that is, the state in the end is one of equilibrium."""
     found = result(Attempt("", **asked))
     assert found.balanced, (found.residual, found.steps)
@@ -115,7 +115,10 @@ def test_a_state_out_of_balance_is_caught():
     asked = next(one for one in attempts() if one.name.startswith("one contact node"))
     good = result(asked)
     assert stability.outcome(good)[1] == "needs no catching"
-    for wrong in (Ended(good.state, "", 1e-3, 2), Ended(good.state, "static: stops", 1e-12, 1)):
+    for wrong in (
+        EndedRun(good.state, "", 1e-3, 2),
+        EndedRun(good.state, "static: stops", 1e-12, 1),
+    ):
         assert stability.outcome(wrong)[1] == "not caught"
 
 

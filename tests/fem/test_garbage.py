@@ -12,8 +12,8 @@ from tireroad.fem.collective import collect
 from tireroad.fem.matrices.operators import ROTATION
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.static.checkpoint import Journal
-from tireroad.fem.static.equilibrium import Equilibrium, History
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.equilibrium import Equilibrium, SolutionHistory
+from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.road import FLAT
 from tireroad.fem.static.virtual_work import AT_REST
 
@@ -72,11 +72,11 @@ def test_a_tire_that_is_let_go_takes_its_matrices_with_it() -> None:
 
 def test_a_record_of_solutions_keeps_no_solved_problem(make_body) -> None:
     """Matrices and factors of every wheel speed tried stayed: twice the memory estimated."""
-    body, history = make_body(), History(Journal())
+    body, history = make_body(), SolutionHistory(Journal())
     first, second = (Equilibrium(body, AT_REST, FLAT) for _ in range(2))
     for problem in [first, second]:
         problem.history = history
-        Loader(problem, lambda progress: None).inflate(1e5)
+        LoadStepper(problem, lambda progress: None).inflate(1e5)
     one, other = weakref.ref(first), weakref.ref(second)
     del first
     collect(body.comm)

@@ -12,7 +12,7 @@ from tireroad.fem.matrices import probe
 from tireroad.fem.matrices.operators import Operators, Support
 from tireroad.fem.matrices.rim_motion import rim_motion
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
@@ -40,7 +40,7 @@ def body(speed: float, deflection: float = 0.01) -> Body:
     """An inflated soft torus on the road, turning or not."""
     section = thesis_torus(segments=8, elements_arc=2)
     made = Body(COMM, section, RUBBER)
-    loader = Loader(Equilibrium(made, Rolling(speed=speed)), lambda progress: None)
+    loader = LoadStepper(Equilibrium(made, Rolling(speed=speed)), lambda progress: None)
     loader.inflate(2e5)
     if deflection:
         loader.deflect(deflection)

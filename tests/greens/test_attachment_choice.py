@@ -11,7 +11,7 @@ from tireroad.fem.matrices import direct, probe
 from tireroad.fem.matrices.compliance import LoadedShapes, compliance, on_own_rows
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
 from tireroad.greens import coupling
@@ -29,7 +29,7 @@ def tire():
     """7,200 unknowns, 40 modes, vertical probes at 15 x 9 points 8 mm apart (closer than the nodes)."""
     section = thesis_torus(segments=24, elements_arc=9, footprint_size=0.4)
     body = Body(COMM, section, compound(**SOFT))
-    Loader(Equilibrium(body), lambda progress: None).inflate(2e5)
+    LoadStepper(Equilibrium(body), lambda progress: None).inflate(2e5)
     operators = Operators(body, 2e5)
     modes = undamped.solve(operators.stiffness, operators.mass, 40)
     spots = [

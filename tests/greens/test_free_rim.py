@@ -15,7 +15,7 @@ from tireroad.fem.matrices.direct import multiply
 from tireroad.fem.matrices.operators import Operators, Support
 from tireroad.fem.matrices.rim_motion import RimMotion, rim_motion
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
@@ -39,7 +39,7 @@ def body(speed: float) -> Body:
     """An inflated soft torus, turning or not."""
     section = thesis_torus(segments=8, elements_arc=2)
     made = Body(COMM, section, RUBBER)
-    Loader(Equilibrium(made, Rolling(speed=speed)), lambda progress: None).inflate(2e5)
+    LoadStepper(Equilibrium(made, Rolling(speed=speed)), lambda progress: None).inflate(2e5)
     return made
 
 
@@ -133,7 +133,7 @@ def test_a_force_of_the_round_shape_is_no_stiffness() -> None:
     """
     rolling = Rolling(speed=80.0, damping=60.0, inertia="doppler")
     made = Body(COMM, thesis_torus(segments=8, elements_arc=2), RUBBER)
-    Loader(Equilibrium(made, rolling), lambda progress: None).inflate(2e5)
+    LoadStepper(Equilibrium(made, rolling), lambda progress: None).inflate(2e5)
     operators = Operators(made, 2e5, Support("free"), rolling)
     rigid, mass = rigid_space(operators), operators.mass[:, None]
     assert rigid.shape[1] == 6

@@ -13,12 +13,12 @@ from tireroad.fem.matrices import probe
 from tireroad.fem.matrices.compliance import receptance
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
 from tireroad.greens.coupling import Basis, Wheel
 from tireroad.greens.responses import Cutoff, estimate, estimate_axle, relative
-from tireroad.modal.basis import joined, project
+from tireroad.modal.basis import extended, project
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.fields import gram, multiply
 from tireroad.modal.solver.slicing import Modes
@@ -41,7 +41,7 @@ def tire():
     comm = MPI.COMM_WORLD
     section = thesis_torus(segments=16, elements_arc=6)
     body = Body(comm, section, compound(**MATERIAL))
-    Loader(Equilibrium(body), lambda progress: None).inflate(2e5)
+    LoadStepper(Equilibrium(body), lambda progress: None).inflate(2e5)
     operators = Operators(body, 2e5)
     modes = undamped.solve(operators.stiffness, operators.mass, COUNT)
     weights = [probe.spot(body.lattice, *spot) for spot in SPOTS]
@@ -146,7 +146,7 @@ def test_attachments_keep_the_modes_and_the_orthonormality() -> None:
     comm = operators.body.comm
     idle = np.zeros((len(shapes.columns), 1))  # a load on the rim
     columns = np.hstack([idle, shapes.columns])
-    grown = joined(modes, columns, operators)
+    grown = extended(modes, columns, operators)
     assert len(grown.squares) == COUNT + len(SPOTS)
     assert grown.squares[COUNT:].min() > modes.squares[-1]
     weighted = operators.mass[:, None] * grown.vectors

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from systems import make
 from test_recursion import STEPS, march, some_force
 
-from tireroad.contact.loop import Solved, Together
+from tireroad.contact.loop import RootSolve, Solved
 from tireroad.greens import recursion
 from tireroad.greens.recursion import Recursion, sharers
 
@@ -58,7 +58,7 @@ def test_looking_ahead_changes_nothing(scheme) -> None:
         tire.start(force[0])
         for k, new in enumerate(force[1:]):
             solved = Solved(new, new, np.zeros((0, 2)), 0.0, 0.0)
-            together = Together(comm, len(new), tire.ahead)
+            together = RootSolve(comm, len(new), tire.ahead)
             free, _ = together(tire.predict, partial(choose, solved), False)
             tire.advance(new)
             found.append(free + tire.same_step @ new)
@@ -68,7 +68,7 @@ def test_looking_ahead_changes_nothing(scheme) -> None:
                 tire = made()
                 tire.restore(kept)
         tire.keep_samples()
-        Together(comm, len(new), tire.ahead)(tire.predict, partial(choose, solved), False)
+        RootSolve(comm, len(new), tire.ahead)(tire.predict, partial(choose, solved), False)
         tire.advance(force[0])
         assert comm.size == 1 or comm.rank or all(len(state) == 0 for state, *_ in tire.samples())
     for values in (found, rates):

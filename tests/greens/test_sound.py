@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import tireroad as tr
-from tireroad.greens.sound import MIRROR, Body, potentials, solid_angles, transfer
+from tireroad.greens.sound import MIRROR, SoundBody, potentials, solid_angles, transfer
 from tireroad.tests.bench.sound import ball
 
 C, RHO = 343.0, 1.2
@@ -53,7 +53,7 @@ def test_sources_inside_a_body_on_the_road(height: float) -> None:
     points, quads = ball(10, height=height)
     points[:, 2] = np.maximum(points[:, 2], 0.0)
     f = np.array([100.0, 400.0, 1000.0])
-    k, body = 2 * np.pi * f / C, Body(points[quads], np.arange(len(quads)), True)
+    k, body = 2 * np.pi * f / C, SoundBody(points[quads], np.arange(len(quads)), True)
     place, weight = body.points_and_weights(4)
     area = np.linalg.norm(weight, axis=2)[..., None]
     step = 1e-5 * body.normal[:, None]
@@ -68,7 +68,7 @@ def test_sources_inside_a_body_on_the_road(height: float) -> None:
 
 def test_many_frequencies_are_interpolated() -> None:
     points, quads = ball(5, height=0.31)
-    body = Body.of(points, quads, True)
+    body = SoundBody.of(points, quads, True)
     f = np.linspace(100.0, 500.0, 81)
     every = transfer(body, f, BESIDE, C)
     for j in (13, 40, 77):
@@ -83,7 +83,7 @@ def test_low_tones_depend_on_the_volume_alone() -> None:
     velocity = np.zeros((len(quads), 1))
     velocity[:40] = 1.0
     found = tr.radiate(points, quads, velocity, np.array([10.0]), place)
-    flow = Body.of(points, quads, True).area[:40].sum()
+    flow = SoundBody.of(points, quads, True).area[:40].sum()
     far = np.linalg.norm(place)
     assert db(found[0], 20 * np.pi * RHO * flow / (2 * np.pi * far)) < 0.05
 

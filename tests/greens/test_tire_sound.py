@@ -12,7 +12,7 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.static.road import FLAT, RoadShape
 from tireroad.greens.tire_sound import (
     FAR,
-    Air,
+    SoundAir,
     SoundingTire,
     Transfer,
     directions,
@@ -22,7 +22,7 @@ from tireroad.greens.tire_sound import (
     transfer,
 )
 
-AIR = Air.at(293.15)
+AIR = SoundAir.at(293.15)
 MICROPHONES = np.array([[0.2, 0.33, 0.1], [-0.2, 0.33, 0.1], [0.0, 7.5, 1.2], [1.0, 0.0, 0.2]])
 
 

@@ -20,7 +20,7 @@ def profile(depth=0.0, count=24, at=0.0, width=0.5):
     distance = (angle - at + np.pi) % (2 * np.pi) - np.pi
     area = AREA * (1 - depth * np.exp(-((distance / width) ** 2)))
     chi = duct.waves(count, angle) * 2 * np.pi / t
-    return duct.Profile(chi.T @ (area * RADIUS), chi.T @ area), angle, area
+    return duct.DuctProfile(chi.T @ (area * RADIUS), chi.T @ area), angle, area
 
 
 def states(own: duct.Duct, speed: float):
@@ -130,7 +130,7 @@ def coupled(depth=0.2, m=6, seed=4):
 
 def test_standing_coupled_problem_is_symmetric_and_positive():
     found, _, _, stiffness, _ = coupled()
-    drag, whole = found.joined(np.zeros((6, 6)), stiffness, 0.0)
+    drag, whole = found.with_tire(np.zeros((6, 6)), stiffness, 0.0)
     assert np.array_equal(whole, whole.T)
     assert not drag.any()
     assert np.linalg.eigvalsh(whole).min() > 0
@@ -139,7 +139,7 @@ def test_standing_coupled_problem_is_symmetric_and_positive():
 def test_potential_form_with_gyroscopic_coupling_has_the_same_frequencies():
     """The published form, potentials coupled through the damping matrix, as another method."""
     found, own, flux, stiffness, _ = coupled()
-    _, whole = found.joined(np.zeros((6, 6)), stiffness, 0.0)
+    _, whole = found.with_tire(np.zeros((6, 6)), stiffness, 0.0)
     e = own.coupling(flux)
     size = 6 + found.count
     gyroscopic = np.zeros((size, size))
@@ -155,7 +155,7 @@ def test_potential_form_with_gyroscopic_coupling_has_the_same_frequencies():
 def test_uniform_compression_has_the_adiabatic_stiffness():
     """gamma p / V (dV)^2 at rest, whatever the duct's other modes do: exact."""
     found, own, flux, stiffness, _ = coupled()
-    _, whole = found.joined(np.zeros((6, 6)), stiffness, 0.0)
+    _, whole = found.with_tire(np.zeros((6, 6)), stiffness, 0.0)
     condensed = whole[:6, :6] - whole[:6, 6:] @ np.linalg.solve(whole[6:, 6:], whole[6:, :6])
     adiabatic = 1.4 * GAS.pressure / own.volume * np.outer(flux[0], flux[0])
     assert condensed - stiffness == pytest.approx(adiabatic, rel=1e-9, abs=1e-9 * adiabatic.max())
@@ -167,7 +167,7 @@ def test_energy_is_kept_standing_and_only_the_turning_wheel_feeds_it():
     """Undamped: every state on the axis, standing and rolling; identities of the decoupled states."""
     found, _, _, stiffness, skew = coupled()
     for speed in (0.0, 60.0):
-        pencil = found.joined(2 * speed * skew, stiffness, speed)
+        pencil = found.with_tire(2 * speed * skew, stiffness, speed)
         modes = rotating(*pencil)
         assert np.abs(modes.eigenvalue.real).max() < 1e-9 * np.abs(modes.eigenvalue).max()
         checks(modes, *pencil)
@@ -180,7 +180,7 @@ def test_one_mode_and_the_air_veer_as_two_oscillators_do():
     flux[1] = 0.01  # a cos theta
     found = Air(own, own.coupling(flux))
     square = np.array([[own.circular[0] ** 2 * 1.02]])
-    _, whole = found.joined(np.zeros((1, 1)), square, 0.0)
+    _, whole = found.with_tire(np.zeros((1, 1)), square, 0.0)
     e, w = np.linalg.norm(found.coupling[1:]), own.circular[0]
     two = np.array([[square[0, 0] + e**2, -e * w], [-e * w, w**2]])
     expected = np.sort(np.append(np.linalg.eigvalsh(two), w**2))

@@ -7,8 +7,8 @@ from mpi4py import MPI
 from scipy import linalg
 
 from tireroad.modal.solver import undamped
-from tireroad.modal.solver.fields import ordered, turn_to_rule
-from tireroad.modal.solver.symmetry import Sites
+from tireroad.modal.solver.fields import normalise_modes, ordered
+from tireroad.modal.solver.symmetry import DofPositions
 
 COMM = MPI.COMM_WORLD
 
@@ -28,7 +28,7 @@ def test_the_basis_depends_on_the_space_alone(width):
     found = []
     for turn in turns:
         mine = (fields @ np.kron(np.eye(10 // width), turn))[low:high].copy()
-        turn_to_rule(COMM, mine, np.arange(low, high), group)
+        normalise_modes(COMM, mine, np.arange(low, high), group)
         found.append(np.concatenate(COMM.allgather(mine)))
     np.testing.assert_allclose(found[0], found[1], atol=1e-12)
     largest = found[0][np.abs(found[0]).argmax(axis=0), np.arange(10)]
@@ -44,7 +44,7 @@ def test_equal_components_are_told_apart_by_position():
     vector = np.zeros(40)
     vector[[11, 28]] = 1.0, -1.0 - 1e-9
     mine = -np.sign(rank[28] - rank[11]) * vector[low:high, None]
-    turn_to_rule(COMM, mine, rank[low:high], np.array([0]))
+    normalise_modes(COMM, mine, rank[low:high], np.array([0]))
     whole = np.concatenate(COMM.allgather(mine))[:, 0]
     assert whole[11 if rank[11] < rank[28] else 28] > 0
 
@@ -61,14 +61,14 @@ def numbered(order: np.ndarray) -> np.ndarray:
     matrix = spatial(chain(61)[0], (1.0, 2.0, 3.0)).tocsr()[order][:, order]
     points = np.zeros((61, 3))
     points[:, 0] = np.linspace(-1, 1, 61)
-    every = Sites.of_nodes(points)
+    every = DofPositions.of_nodes(points)
     low, high = own_rows(183, unit=3)
     mine = order[low:high]
     modes = undamped.solve(
         distributed(matrix, unit=3),
         np.ones(len(mine)),
         40,
-        sites=Sites(every.place[mine], every.component[mine]),
+        sites=DofPositions(every.place[mine], every.component[mine]),
     )
     out = np.empty((183, 40))
     out[order] = np.concatenate(COMM.allgather(modes.vectors))
@@ -90,5 +90,5 @@ def test_a_repeated_frequency_without_symmetry_has_one_basis():
     for k in range(1, 31, 2):
         pair = modes.vectors[:, k : k + 2].copy()
         again = pair @ np.array([[0.6, -0.8], [0.8, 0.6]])
-        turn_to_rule(COMM, again, np.arange(120), np.zeros(2, int))
+        normalise_modes(COMM, again, np.arange(120), np.zeros(2, int))
         np.testing.assert_allclose(again, pair, atol=1e-6)

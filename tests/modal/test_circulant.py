@@ -9,7 +9,7 @@ from scipy import sparse
 from tireroad.fem.errors import ConvergenceError
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.circulant import repeated
-from tireroad.modal.solver.symmetry import Sites
+from tireroad.modal.solver.symmetry import DofPositions
 
 COMM = MPI.COMM_WORLD
 
@@ -64,7 +64,7 @@ def ring(segments: int, mirrored: bool, soft: float = 0.0) -> tuple[sparse.csr_m
 def test_against_the_dense_problem(segments, mirrored, count):
     matrix, points = ring(segments, mirrored)
     low, high = own_rows(matrix.shape[0], unit=3)
-    mine = Sites.of_nodes(points[low // 3 : high // 3])
+    mine = DofPositions.of_nodes(points[low // 3 : high // 3])
     stiffness = distributed(matrix, unit=3)
     modes = undamped.solve(stiffness, np.ones(high - low), count, sites=mine)
     exact, shapes = np.linalg.eigh(matrix.toarray())
@@ -85,7 +85,7 @@ def test_against_the_dense_problem(segments, mirrored, count):
 def test_the_mirrored_ring_needs_no_complex_numbers():
     for mirrored in (True, False):
         matrix, points = ring(8, mirrored)
-        found = repeated(distributed(matrix), Sites.of_nodes(points))
+        found = repeated(distributed(matrix), DofPositions.of_nodes(points))
         assert (found.kept is not None) == mirrored
         assert found.wave(2).matrix.shape == ((12, 12) if mirrored else (24, 24))
 
@@ -126,7 +126,7 @@ def test_belts_at_an_angle_leave_the_half_turn(segments):
     the period is not used. Against the dense problem.
     """
     matrix, points = twisted(segments)
-    sites, stiffness = Sites.of_nodes(points), distributed(matrix)
+    sites, stiffness = DofPositions.of_nodes(points), distributed(matrix)
     found = repeated(stiffness, sites)
     assert found.segments == segments
     assert found.kept is not None
@@ -146,7 +146,9 @@ def test_belts_at_an_angle_leave_the_half_turn(segments):
 def test_pairs_are_cos_and_sin_about_the_lowest_point():
     """Of each pair the first is its own image in the half turn about z, the second its own negative one."""
     matrix, points = twisted(9)
-    modes = undamped.solve(distributed(matrix), np.ones(135), 40, sites=Sites.of_nodes(points))
+    modes = undamped.solve(
+        distributed(matrix), np.ones(135), 40, sites=DofPositions.of_nodes(points)
+    )
     flip = np.array([-1.0, -1.0, 1.0])
     image = np.linalg.norm(points[:, None] - points * flip, axis=2).argmin(axis=1)
     shapes = modes.vectors.reshape(-1, 3, 40)
@@ -164,17 +166,21 @@ def test_pairs_are_cos_and_sin_about_the_lowest_point():
 
 def test_one_odd_spring_is_noticed():
     matrix, points = ring(8, True)
-    assert repeated(distributed(matrix), Sites.of_nodes(points)).segments == 8
+    assert repeated(distributed(matrix), DofPositions.of_nodes(points)).segments == 8
     matrix[30, 30] += 1e-8
-    assert repeated(distributed(matrix), Sites.of_nodes(points)) is None
+    assert repeated(distributed(matrix), DofPositions.of_nodes(points)) is None
     matrix, points = ring(8, True)
-    assert repeated(distributed(matrix), Sites.of_nodes(points + [0.01, 0.0, 0.0])) is None
+    assert repeated(distributed(matrix), DofPositions.of_nodes(points + [0.01, 0.0, 0.0])) is None
 
 
 def test_all_below_a_frequency_and_none():
     matrix, points = ring(9, False)
     exact = np.linalg.eigvalsh(matrix.toarray())
-    sites, ones, stiffness = Sites.of_nodes(points), np.ones(matrix.shape[0]), distributed(matrix)
+    sites, ones, stiffness = (
+        DofPositions.of_nodes(points),
+        np.ones(matrix.shape[0]),
+        distributed(matrix),
+    )
     limit = np.sqrt((exact[24] + exact[25]) / 2) / (2 * np.pi)
     wanted = exact[exact < (2 * np.pi * limit) ** 2]
     modes = undamped.solve(stiffness, ones, up_to=limit, sites=sites)
@@ -189,4 +195,4 @@ def test_negative_stiffness_is_named():
     count = int((np.linalg.eigvalsh(matrix.toarray()) < 0).sum())
     assert count > 0
     with pytest.raises(ConvergenceError, match=f"{count} negative eigenvalue.*buckles"):
-        undamped.solve(distributed(matrix), np.ones(96), 4, sites=Sites.of_nodes(points))
+        undamped.solve(distributed(matrix), np.ones(96), 4, sites=DofPositions.of_nodes(points))

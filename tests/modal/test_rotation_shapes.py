@@ -14,7 +14,7 @@ from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.model import SmallMotions, TireModel
 from tireroad.fem.sections.grid import PlyLine
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.state import static_state
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
@@ -47,7 +47,7 @@ def pressed(comm: MPI.Comm) -> SmallMotions:
     lines = [cords(90, "ply", **PLY), cords(20, "one", **STEEL), cords(-20, "two", **STEEL)]
     ring = thesis_torus(segments=20, elements_arc=8, elements_thickness=2, order=2).ring([], places)
     tire = TireModel(ring, lambda: Body(comm, ring, compounds(SOFT, ()), cords=lines))
-    loader = Loader(Equilibrium(tire.body), lambda progress: None)
+    loader = LoadStepper(Equilibrium(tire.body), lambda progress: None)
     loader.inflate(2e5)
     loader.deflect(0.01)
     return SmallMotions(tire, static_state(loader.equilibrium, loader.touch))

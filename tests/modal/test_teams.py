@@ -9,14 +9,14 @@ from mpi4py import MPI
 from test_circulant import ring
 
 from tireroad.modal.solver import undamped
-from tireroad.modal.solver.slicing import Shifted, Team, how_many
-from tireroad.modal.solver.symmetry import Sites, sectors, symmetries
+from tireroad.modal.solver.slicing import ProcessGroup, Shifted, how_many
+from tireroad.modal.solver.symmetry import DofPositions, sectors, symmetries
 
 COMM = MPI.COMM_WORLD
 NODES, COUNT = 520, 90
 
 
-def beam() -> tuple[np.ndarray, Sites, np.ndarray]:
+def beam() -> tuple[np.ndarray, DofPositions, np.ndarray]:
     """Three chains along x, of unlike stiffness: the matrix, own sites, exact eigenvalues, all simple."""
     stiffness, exact = chain(NODES)
     low, high = own_rows(3 * NODES, unit=3)
@@ -24,7 +24,7 @@ def beam() -> tuple[np.ndarray, Sites, np.ndarray]:
     points[:, 0] = np.linspace(-1, 1, NODES)
     factors = (1.0, math.sqrt(2.1), math.sqrt(3.3))
     everything = np.sort(np.concatenate([factor * exact for factor in factors]))
-    sites = Sites.of_nodes(points[low // 3 : high // 3])
+    sites = DofPositions.of_nodes(points[low // 3 : high // 3])
     return distributed(spatial(stiffness, factors), unit=3), sites, everything
 
 
@@ -49,7 +49,7 @@ def test_the_same_modes_for_any_grouping(mirrors: bool) -> None:
 def test_wave_numbers_in_any_grouping() -> None:
     matrix, points = ring(9, True)
     low, high = own_rows(matrix.shape[0], unit=3)
-    sites = Sites.of_nodes(points[low // 3 : high // 3])
+    sites = DofPositions.of_nodes(points[low // 3 : high // 3])
     exact = np.linalg.eigvalsh(matrix.toarray())
     for teams in range(1, COMM.size + 1):
         modes = undamped.solve(
@@ -64,7 +64,7 @@ def test_a_process_holds_its_share() -> None:
     """Rows of every part, and of what is solved for; inertia is that of the whole."""
     matrix, sites, exact = beam()
     found = symmetries(matrix, sites.everywhere(COMM))
-    team = Team.of(COMM, 1)
+    team = ProcessGroup.of(COMM, 1)
     parts = sectors(matrix, [one.image for one in found], team)
     assert len(parts) == 4 and sum(part.matrix.shape[1] for part in parts) == 3 * NODES
     below = 0

@@ -10,7 +10,7 @@ from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.fields import gram, multiply
 from tireroad.modal.solver.slicing import Modes, merged
-from tireroad.modal.solver.symmetry import Sites
+from tireroad.modal.solver.symmetry import DofPositions
 from tireroad.modal.standing import solved
 
 COMM = MPI.COMM_WORLD
@@ -164,7 +164,7 @@ def test_mirror_planes_split_a_symmetric_chain():
         distributed(matrix, unit=3),
         ones(183, unit=3),
         40,
-        sites=Sites.of_nodes(points[low // 3 : high // 3]),
+        sites=DofPositions.of_nodes(points[low // 3 : high // 3]),
     )
     assert sorted(modes.sectors) == [30, 31, 61, 61]
     everything = np.sort(np.concatenate([exact, 2 * exact, 3 * exact]))
@@ -180,7 +180,7 @@ def test_one_odd_spring_breaks_the_mirror():
     matrix = spatial(stiffness.tocsr(), (1.0, 2.0, 3.0))
     points = np.zeros((61, 3))
     points[:, 0] = np.linspace(-1, 1, 61)
-    modes = undamped.solve(distributed(matrix), ones(183), 40, sites=Sites.of_nodes(points))
+    modes = undamped.solve(distributed(matrix), ones(183), 40, sites=DofPositions.of_nodes(points))
     assert sorted(modes.sectors) == [61, 122]
     dense = np.linalg.eigvalsh(matrix.toarray())
     np.testing.assert_allclose(modes.squares, dense[:40], rtol=ROUNDING)

@@ -11,10 +11,10 @@ from tireroad.contact.roads.kinds.shapes import Flat
 from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.tread.compliance import half_space_compliance
 from tireroad.greens.recursion import Recursion
-from tireroad.runs.validation.cases import Strip, oval_patch
+from tireroad.runs.validation.cases import RollingStrip, oval_patch
 from tireroad.runs.validation.stability import (
     CRITICAL,
-    Rolled,
+    RolledCase,
     cases,
     one_mode,
     rolled,
@@ -48,14 +48,14 @@ def test_thousands_of_steps_gain_no_energy() -> None:
 
 
 def test_what_is_not_finite_counts_as_not_caught() -> None:
-    assert Rolled("made up", 1, float("nan"), 0.0, 0.0, False).row[-1] == "not caught"
+    assert RolledCase("made up", 1, float("nan"), 0.0, 0.0, False).row[-1] == "not caught"
 
 
 def test_states_that_turn_far_in_a_step_are_static_or_blow_up() -> None:
     """Undamped, bouncing on a stiff tread: the default keeps its energy, without it there is no bound."""
     patch, step = oval_patch((9, 7), (0.015, 0.02), 500.0), 1e-4
     tread = half_space_compliance(patch.points[:, :2], patch.half_sizes, 1e8, 0.45)
-    whole = Strip(damping=0.0, wave_speed=250.0).response(patch.points, 40, 8, residual=10)
+    whole = RollingStrip(damping=0.0, wave_speed=250.0).response(patch.points, 40, 8, residual=10)
     assert np.abs(whole.eigenvalue).max() * step > 4.0
 
     def bump(t: float) -> float:
@@ -76,11 +76,11 @@ def test_states_that_turn_far_in_a_step_are_static_or_blow_up() -> None:
 def test_overdamped_strip_has_its_own_static_answer() -> None:
     """Poles and static flexibility of the made-up tire agree whatever its damping."""
     points = np.array([[0.0, 0.0, 0.0], [0.03, 0.02, 0.0]])
-    soft = Strip(damping=1.0).response(points, 4, 3).static()
+    soft = RollingStrip(damping=1.0).response(points, 4, 3).static()
     for damping in (100.0, 2e3, 1e5):
-        hard = Strip(damping=damping).response(points, 4, 3)
+        hard = RollingStrip(damping=damping).response(points, 4, 3)
         assert np.allclose(hard.static(), soft, rtol=1e-5, atol=0)
         # A unit impulse starts with the rate 1/m of the kept waves: g'(0) = Re[C s P].
         rate = ((hard.output * hard.eigenvalue) @ hard.input).real
-        light = Strip(damping=1.0).response(points, 4, 3)
+        light = RollingStrip(damping=1.0).response(points, 4, 3)
         assert np.allclose(rate, ((light.output * light.eigenvalue) @ light.input).real)

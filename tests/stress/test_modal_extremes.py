@@ -8,7 +8,7 @@ from scipy.linalg import eigh
 
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
 from tireroad.modal.basis import project
@@ -29,7 +29,7 @@ SOFT = {"model": "neo-hookean", "youngs_modulus": 48e6, "poisson_ratio": 0.45, "
 def operators() -> Operators:
     section = thesis_torus(segments=8, elements_arc=2)
     body = Body(COMM, section, compound(**SOFT))
-    loader = Loader(Equilibrium(body), lambda progress: None)
+    loader = LoadStepper(Equilibrium(body), lambda progress: None)
     loader.inflate(2e5)
     loader.deflect(0.003)
     return Operators(body, 2e5)

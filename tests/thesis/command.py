@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.runs.files.cache import Cache
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.process.mpi import on_root
 from tireroad.tests.thesis import figures, output
 from tireroad.tests.thesis.figure import FIGURES, Figure, chosen
@@ -48,8 +48,8 @@ def reproduce(names: Sequence[str], directory: Path, comm: MPI.Comm) -> None:
             comm,
             lambda: output.write(entries, directory, time.perf_counter() - began, comm.size),
         )
-        observe.say(f"{one.name:12s} {entries[-1].verdict:20s} {entries[-1].seconds:7.1f} s")
-    observe.say(
+        console.say(f"{one.name:12s} {entries[-1].verdict:20s} {entries[-1].seconds:7.1f} s")
+    console.say(
         f"{page} and reproduce.json, reproduce.csv beside it: {time.perf_counter() - began:.1f} s"
     )
     failed = [f"{entry.figure.name}: {entry.failed}" for entry in entries if entry.failed]

@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.files.folder import claimed
-from tireroad.runs.process import mpi, observe
+from tireroad.runs.process import console, mpi
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.stages.pipeline import Finished, run_scene
@@ -48,7 +48,7 @@ class Scenes:
             mpi.on_root(
                 self.comm, lambda: stack.enter_context(claimed(folder, scene.name)) and None
             )
-            stack.enter_context(observe.quiet())
+            stack.enter_context(console.quiet())
             return run_scene(
                 scene,
                 folder,

@@ -6,7 +6,7 @@ from mpi4py import MPI
 
 from tireroad.fem.matrices.operators import Operators
 from tireroad.modal.solver import undamped
-from tireroad.modal.solver.symmetry import Sites
+from tireroad.modal.solver.symmetry import DofPositions
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.stage import make_body
 
@@ -44,7 +44,7 @@ def test_frequencies_of_the_belted_torus(tmp_path):
     tire = load(path, ["tire.segments=8", "tire.order=3"]).tire
     body = make_body(MPI.COMM_WORLD, tire, tire.ring())
     operators = Operators(body, 0.0)
-    sites = Sites(operators.unknowns.place, operators.unknowns.component)
+    sites = DofPositions(operators.unknowns.place, operators.unknowns.component)
     modes = undamped.solve(operators.stiffness, operators.mass, len(REFERENCE), sites=sites)
     assert modes.segments == 8
     np.testing.assert_allclose(modes.frequency, REFERENCE, rtol=0.006)

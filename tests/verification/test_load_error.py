@@ -13,7 +13,7 @@ from tireroad.fem.static import load_error as of_load
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.footprint import Footprint
 from tireroad.fem.static.load_error import ENOUGH, LoadError, at_finer_footprint, load_error
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.state import static_state
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.body import Body
@@ -33,8 +33,8 @@ def ring(segments, arc, order=2):
     return thesis_torus(segments=segments, elements_arc=arc, order=order, footprint_size=0.25)
 
 
-def pressed(section, rolling=AT_REST, comm=MPI.COMM_SELF, regions=(), height=HEIGHT) -> Loader:
-    loader = Loader(Equilibrium(Body(comm, section, RUBBER, regions), rolling), lambda _: None)
+def pressed(section, rolling=AT_REST, comm=MPI.COMM_SELF, regions=(), height=HEIGHT) -> LoadStepper:
+    loader = LoadStepper(Equilibrium(Body(comm, section, RUBBER, regions), rolling), lambda _: None)
     loader.inflate(2e5)
     loader.deflect(height - loader.touch)
     return loader
@@ -75,7 +75,7 @@ def test_the_tire_is_left_as_it_was_and_the_companion_rolls_too():
     wide = np.pad(force, ((0, 0), (2, 2))).any(axis=0)
     along = [wide[2 * j : 2 * j + 7].any() for j in range(len(finer.outer))]
     halved = split_ring(loader.body.ring, np.array(around), np.array(along))
-    other = Loader(
+    other = LoadStepper(
         Equilibrium(Body(MPI.COMM_SELF, halved, loader.body.materials), rolling), lambda _: None
     )
     other.inflate(2e5)
@@ -90,7 +90,7 @@ def test_half_the_ring_tells_what_the_whole_does(monkeypatch):
     """Load, traction and its reading are shared out between the halves and their cut faces."""
     loader = pressed(ring(12, 6))
     half = load_error(loader, AT_REST)
-    monkeypatch.setattr(Loader, "halved", None)
+    monkeypatch.setattr(LoadStepper, "halved", None)
     monkeypatch.setattr(of_load, "looks_the_same", lambda ring, rolling: False)
     whole = load_error(loader, AT_REST)
     assert half.bulk == pytest.approx(whole.bulk, rel=1e-6)
@@ -101,13 +101,13 @@ def test_half_the_ring_tells_what_the_whole_does(monkeypatch):
 def test_a_state_that_half_a_turn_changes_is_taken_whole():
     loader = pressed(ring(12, 6))
     given = of_load.Balance.of(loader, AT_REST)
-    assert isinstance(given.near(given.ring), of_load.HalfTurnEquilibrium)
+    assert isinstance(given.near(given.ring), of_load.HalfModelEquilibrium)
     bent = given.displacement.copy()
     ahead = loader.body.lattice.points(np.arange(len(bent)))[:, 0] > 0
     bent[ahead, 0] += 1e-3 * loader.body.ring.thickness
     loader.body.set_displacement(bent)
     given = of_load.Balance.of(loader, AT_REST)
-    assert not isinstance(given.near(given.ring), of_load.HalfTurnEquilibrium)
+    assert not isinstance(given.near(given.ring), of_load.HalfModelEquilibrium)
 
 
 @pytest.mark.long
@@ -118,7 +118,7 @@ def test_cords_between_whose_points_long_elements_are_strained(tmp_path, monkeyp
     path = tmp_path / "radial.toml"
     path.write_text('[tire]\nsection = "radial"\n')
     tire = load(path, ["tire.segments=16", "tire.elements_arc=12"]).tire
-    loader = Loader(Equilibrium(make_body(MPI.COMM_SELF, tire, tire.ring())), lambda _: None)
+    loader = LoadStepper(Equilibrium(make_body(MPI.COMM_SELF, tire, tire.ring())), lambda _: None)
     loader.inflate(2.2e5)
     loader.carry(4000.0)
     finer = at_finer_footprint(of_load.Balance.of(loader, AT_REST))

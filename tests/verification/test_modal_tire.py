@@ -8,7 +8,7 @@ from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.matrices.compliance import rotating_stiffness
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
 from tireroad.modal.basis import project
@@ -30,7 +30,7 @@ SMALL = thesis_torus(segments=16, elements_arc=4)
 
 def tire(deflection: float) -> Operators:
     body = Body(COMM, SMALL, compound(**SOFT))
-    loader = Loader(Equilibrium(body), lambda progress: None)
+    loader = LoadStepper(Equilibrium(body), lambda progress: None)
     loader.inflate(INFLATION)
     if deflection:
         loader.deflect(deflection)
@@ -119,7 +119,7 @@ def test_a_light_load_keeps_both_mirror_planes():
     """
     section = thesis_torus(segments=24, elements_arc=6, order=3)
     body = Body(COMM, section, compound(**SOFT | {"youngs_modulus": 4.8e8}))
-    loader = Loader(Equilibrium(body), lambda progress: None)
+    loader = LoadStepper(Equilibrium(body), lambda progress: None)
     loader.inflate(0.0)
     loader.carry(1.0)
     operators = Operators(body, 0.0)

@@ -8,12 +8,12 @@ from scipy import sparse
 from tireroad.contact.loop import Drive, roll
 from tireroad.contact.patch import Patch
 from tireroad.contact.solver.active_set import ActiveSet
-from tireroad.contact.solver.stick_slip import Friction
+from tireroad.contact.solver.stick_slip import BrushFriction
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.matrices.probe import nodes
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.state import static_state
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
@@ -34,7 +34,7 @@ def pressed(deflection: float):
         section,
         compound("neo-hookean", 1200.0, youngs_modulus=4.8e7, poisson_ratio=0.45),
     )
-    loader = Loader(Equilibrium(body), lambda progress: None)
+    loader = LoadStepper(Equilibrium(body), lambda progress: None)
     loader.inflate(INFLATION)
     loader.deflect(deflection)
     return loader
@@ -69,7 +69,7 @@ def shaken(full, patch) -> np.ndarray:
     drive = Drive(lambda x, y: np.zeros(x.shape), lambda t: 1e-5 * np.sin(2 * np.pi * 100 * t), 0.0)
     solver = ActiveSet(full.same_step[:count, :count])
     brush = Brush(BrushLaw(1e5, 0.5, kind="spring"), patch.points[:, 0], patch.line, 0.0, STEP)
-    friction = Friction(brush, full.same_step, None)
+    friction = BrushFriction(brush, full.same_step, None)
     steps = roll(full, solver, patch, drive, STEP, 50, friction)
     return np.array([instant.change for instant in steps])
 

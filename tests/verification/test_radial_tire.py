@@ -11,10 +11,10 @@ from tireroad.fem.matrices.road_stiffness import road_stiffness
 from tireroad.fem.sections.inflated import InflatedRing, lowest
 from tireroad.fem.sections.radial import radial
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.modal.basis import project
 from tireroad.modal.solver import undamped
-from tireroad.modal.solver.symmetry import Sites
+from tireroad.modal.solver.symmetry import DofPositions
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.stage import make_body
 
@@ -40,7 +40,7 @@ def test_loaded_stiffness_beside_the_public_one(tmp_path):
     mesh = ["tire.segments=14", "tire.elements_arc=14", "tire.footprint_size=0.4"]
     tire = load(path, mesh).tire
     body = make_body(MPI.COMM_SELF, tire, tire.ring())
-    loader = Loader(Equilibrium(body), lambda progress: None)
+    loader = LoadStepper(Equilibrium(body), lambda progress: None)
     loader.inflate(PRESSURE)
     first, last = [loader.load() for _ in loader.visit((10.5e-3, 20.3e-3))]
     assert first == pytest.approx(2000.0, rel=0.13)
@@ -60,9 +60,9 @@ def test_three_dimensional_elements_against_fourier_series(tmp_path):
     path.write_text('[tire]\nsection = "radial"\n')
     tire = load(path, ["tire.segments=8", "tire.elements_arc=14", "tire.order=2"]).tire
     body = make_body(MPI.COMM_SELF, tire, tire.ring())
-    Loader(Equilibrium(body), lambda progress: None).inflate(PRESSURE)
+    LoadStepper(Equilibrium(body), lambda progress: None).inflate(PRESSURE)
     operators = Operators(body, PRESSURE)
-    sites = Sites(operators.unknowns.place, operators.unknowns.component)
+    sites = DofPositions(operators.unknowns.place, operators.unknowns.component)
     modes = undamped.solve(operators.stiffness, operators.mass, 6, sites=sites)
     given = operators.compounds()
     projection = project(modes, None, operators.carried, MPI.COMM_SELF, compounds=given)

@@ -5,7 +5,7 @@ import pytest
 
 from tireroad.contact.closed_forms import brush_force, carter_force, carter_traction, hertz_cylinder
 from tireroad.contact.solver.active_set import ActiveSet
-from tireroad.contact.solver.stick_slip import Friction
+from tireroad.contact.solver.stick_slip import BrushFriction
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import rectangle_potential
 
@@ -22,7 +22,7 @@ def steady(x, normal, way, slip, stiffness, compliance):
     tire[c : 2 * c, c : 2 * c] = tire[2 * c :, 2 * c :] = compliance
     brush = Brush(BrushLaw(stiffness, FRICTION, (slip, 0.0)), x, np.zeros(c, int), way, 1.0)
     brush.begin(normal > 0)
-    friction, solver = Friction(brush, tire, None), ActiveSet(np.eye(c))
+    friction, solver = BrushFriction(brush, tire, None), ActiveSet(np.eye(c))
     gap, free = np.where(normal > 0, 0.0, 1.0), np.zeros(2 * c)
     for _ in range(10 * round(HALF / way)):
         force, horizontal = friction.solve(solver, gap, normal > 0, normal, free)

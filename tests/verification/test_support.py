@@ -9,7 +9,7 @@ from petsc4py import PETSc
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.matrices.operators import Operators, Support
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
@@ -29,7 +29,7 @@ def tire(inflation: float, deflection: float = 0.0, speed: float = 0.0) -> tuple
     section = thesis_torus(segments=16, elements_arc=4)
     body = Body(COMM, section, RUBBER)
     equilibrium = Equilibrium(body, Rolling(speed=speed))
-    loader = Loader(equilibrium, lambda progress: None)
+    loader = LoadStepper(equilibrium, lambda progress: None)
     loader.inflate(inflation)
     if deflection:
         loader.deflect(deflection)

@@ -29,12 +29,12 @@ class Iso8608(Levelled):
     )
     seed: int = integer(0, "seed of the random generator", least=0, most=2**31 - 1)
 
-    def make(self) -> "Profile":
+    def make(self) -> "IsoProfile":
         """The road of this class."""
-        return Profile(self)
+        return IsoProfile(self)
 
 
-class Profile:
+class IsoProfile:
     """z(x) = sum_k sqrt(2 G_d(n_k) dn_k) cos(2 pi n_k x + phase_k), n_k in equal bands of log n.
 
     G_d by road class, n up to 1/shortest wave, phases by seed. The profile is generated in chunks
@@ -110,6 +110,6 @@ class Profile:
         # z'' p^2/8 of all waves together bounds the excess between two points.
         return worst + float(self._amplitude @ self._wavenumber**2) * self._pitch**2 / 8.0
 
-    def prepare(self, x0: float, x1: float, y0: float, y1: float) -> "Profile":
+    def prepare(self, x0: float, x1: float, y0: float, y1: float) -> "IsoProfile":
         """Nothing to prepare: chunks are generated as needed."""
         return self

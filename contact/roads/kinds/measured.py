@@ -16,7 +16,7 @@ _LAYOUT = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Measured(Levelled):
+class MeasuredRoad(Levelled):
     """Common parameters of roads in files; `file` is required, `what` names its content."""
 
     what = "the road"
@@ -44,7 +44,7 @@ class Measured(Levelled):
 
 
 @road_kind("grid", "heights measured on a regular grid, in a .npz, .csv or .h5 file")
-class GridFile(Measured):
+class GridFile(MeasuredRoad):
     """Heights on a grid, bilinear in between."""
 
     what = "the measured grid"
@@ -68,7 +68,7 @@ class GridFile(Measured):
 
 
 @road_kind("crg", "a measured road in an OpenCRG file")
-class CrgFile(Measured):
+class CrgFile(MeasuredRoad):
     """Heights along the reference line of an OpenCRG file."""
 
     what = "the OpenCRG road (crg)"

@@ -85,7 +85,7 @@ class Edges(RoadKind):
 
 
 @road_kind("step", "a step up or down")
-class Step(Edges):
+class StepRoad(Edges):
     """A single edge."""
 
     def make(self) -> "Obstacle":

@@ -6,7 +6,7 @@ from tireroad.fem.parameters import ParameterError, integer, number
 
 
 @road_kind("texture", "an isotropic, self-affine random texture")
-class Texture(RoadKind):
+class TextureRoad(RoadKind):
     """Spectrum and seed of a texture."""
 
     rms: float = number(2e-4, "m", "root mean square of the heights", least=0, most=1)

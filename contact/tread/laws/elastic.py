@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Elastic(TreadLaw):
+class ElasticTread(TreadLaw):
     """An isotropic rubber."""
 
     youngs_modulus: float = number(
@@ -24,7 +24,7 @@ class Elastic(TreadLaw):
 
 
 @tread_law("half-space", "elastic half-space (Love's formula)")
-class HalfSpace(Elastic):
+class HalfSpace(ElasticTread):
     """Uniform pressure on the rectangle of each point."""
 
     def influence(self, farthest: float) -> Influence:
@@ -47,7 +47,7 @@ class HalfSpace(Elastic):
 
 
 @tread_law("layer", "elastic layer bonded to a stiff base")
-class Layer(Elastic):
+class ElasticLayer(ElasticTread):
     """A tread of finite thickness on the belt."""
 
     thickness: float = number(0.010, "m", "thickness of the layer", least=1e-4, most=1)

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from tireroad.contact.tread.compliance import Influence
 from tireroad.contact.tread.law import tread_law
-from tireroad.contact.tread.laws.elastic import Elastic, HalfSpace, Layer
+from tireroad.contact.tread.laws.elastic import ElasticLayer, ElasticTread, HalfSpace
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Limits, ParameterError, number, numbers
 
@@ -17,7 +17,7 @@ _TERMS = 3
     "viscoelastic",
     "viscoelastic rubber, on a grid of points: the history of the pressure travels with the tread",
 )
-class Viscoelastic(Elastic):
+class Viscoelastic(ElasticTread):
     """E(t) = E [1 - sum_k g_k (1 - exp(-t/t_k))] at constant Poisson's ratio.
 
     E is the instantaneous modulus.
@@ -46,7 +46,7 @@ class Viscoelastic(Elastic):
     @property
     def creep(self) -> tuple[Array, Array]:
         """Shares and times (k,), - and s, of the creep."""
-        from tireroad.contact.tread.creep import creep_of
+        from tireroad.contact.tread.memory import creep_of
 
         return creep_of(np.array(self.relaxation), np.array(self.relaxation_time))
 
@@ -58,6 +58,10 @@ class Viscoelastic(Elastic):
         """The shear at the instantaneous modulus."""
         return self._at_once().shear(farthest)
 
-    def _at_once(self) -> Elastic:
+    def _at_once(self) -> ElasticTread:
         rubber = {"youngs_modulus": self.youngs_modulus, "poisson_ratio": self.poisson_ratio}
-        return Layer(thickness=self.thickness, **rubber) if self.thickness else HalfSpace(**rubber)
+        return (
+            ElasticLayer(thickness=self.thickness, **rubber)
+            if self.thickness
+            else HalfSpace(**rubber)
+        )

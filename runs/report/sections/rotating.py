@@ -14,7 +14,7 @@ from tireroad.fem.errors import InputError
 from tireroad.modal.states import growing
 from tireroad.runs.report import live
 from tireroad.runs.report.figures import COLOURS, MUTED, WIDE, canvas, encode, line_canvas, styled
-from tireroad.runs.report.read import Absent, Results, Section, Table, attributes, quantity
+from tireroad.runs.report.read import Absent, Results, Section, TextTable, attributes, quantity
 from tireroad.runs.report.sections import tire
 from tireroad.runs.report.sections.tire import LISTED
 
@@ -128,7 +128,7 @@ def rotating(results: Results) -> Section:
         )
         for q in rising[:LISTED]
     ]
-    section.table = Table(("frequency", "Re s", "of critical damping", *present), rows)
+    section.table = TextTable(("frequency", "Re s", "of critical damping", *present), rows)
     tire.resonances(results, section, name, "air_share", value)
     if len(rising) > LISTED:
         listed = f"The table lists {LISTED} of {len(rising)} pairs, by frequency."

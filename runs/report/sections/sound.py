@@ -23,7 +23,7 @@ from tireroad.runs.report.figures import (
     styled,
     third_octaves,
 )
-from tireroad.runs.report.read import Results, Section, Table, digits
+from tireroad.runs.report.read import Results, Section, TextTable, digits
 
 FILE = "sound.h5"
 _CHARTED = 4  # microphones in one chart of bars
@@ -42,7 +42,7 @@ def sound(results: Results) -> Section:
         results.array(FILE, f"total/{key}") for key in ("level", "level_a", "level_error")
     )
     band = f"{digits(float(frequency[0]))} to {digits(float(frequency[-1]))} Hz"
-    section.table = Table(
+    section.table = TextTable(
         ("microphone", f"dB re 20 µPa, {band}", "dB(A)", "error, dB"),
         [
             (name, f"{a:.1f}", f"{b:.1f}", f"± {c:.1f}" if np.isfinite(c) else "unknown")

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from tireroad.contact.results.spectra import FEW, SILENT, heard, nominal
 from tireroad.runs.report import figures, live
-from tireroad.runs.report.read import Results, Section, Table, quantity
-from tireroad.runs.scene.tables.scene import Accuracy
+from tireroad.runs.report.read import Results, Section, TextTable, quantity
+from tireroad.runs.scene.tables.scene import AccuracyTable
 from tireroad.runs.search.journal import CAUSES, NAME, Trial, read_trials, worst
 from tireroad.runs.search.settings import MARGIN, aim
 
@@ -29,12 +29,12 @@ def add(results: Results, section: Section) -> None:
             _show(section, wanted, trials)
 
 
-def _wanted(scene: Mapping[str, Any]) -> Accuracy | None:
-    wanted = Accuracy(**scene.get("accuracy", {}))
+def _wanted(scene: Mapping[str, Any]) -> AccuracyTable | None:
+    wanted = AccuracyTable(**scene.get("accuracy", {}))
     return None if wanted.target is None and wanted.target_db is None else wanted
 
 
-def _show(section: Section, wanted: Accuracy, trials: list[Trial]) -> None:
+def _show(section: Section, wanted: AccuracyTable, trials: list[Trial]) -> None:
     over = [_errors(trial, wanted) for trial in trials]
     cost = np.array([sum(trial.seconds.values()) for trial in trials])
     section.facts += [
@@ -49,7 +49,7 @@ def _show(section: Section, wanted: Accuracy, trials: list[Trial]) -> None:
     )  # fmt: skip
 
 
-def _errors(trial: Trial, wanted: Accuracy) -> NDArray:
+def _errors(trial: Trial, wanted: AccuracyTable) -> NDArray:
     assert trial.found is not None
     return trial.found.over(wanted)
 
@@ -240,7 +240,7 @@ def _table(
     level: NDArray,
     weighted: NDArray | None,
     error: NDArray | None,
-) -> Table:
+) -> TextTable:
     """The vertical levels, their errors and confidence intervals."""
     sure = results.optional(_FILE, "third_octave/confidence")
     head = ["band, Hz", "z, dB re 1 N"]
@@ -254,7 +254,7 @@ def _table(
     if sure is not None:
         head.append("95 %, by length, dB")
         columns.append([f"{low:+.1f} to {high:+.1f}".replace("-", "−") for low, high in sure])
-    return Table(tuple(head), list(zip(*columns, strict=True)))
+    return TextTable(tuple(head), list(zip(*columns, strict=True)))
 
 
 def _texts(level: NDArray) -> list[str]:

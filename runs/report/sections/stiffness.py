@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.runs.report.figures import COLOURS, MUTED, canvas, encode, styled
-from tireroad.runs.report.read import Results, Section, Table, quantity
+from tireroad.runs.report.read import Results, Section, TextTable, quantity
 
 _FILE = "stiffness.h5"
 _FACTS = (
@@ -44,7 +44,7 @@ def section(results: Results) -> Section:
             made.facts.append((title, quantity(float(value), unit)))
     columns = [scale * results.array(_FILE, f"curve/{name}") for name, scale, _ in _COLUMNS]
     head = tuple(title for *_, title in _COLUMNS)
-    made.table = Table(head, [tuple(f"{v:.4g}" for v in row) for row in np.transpose(columns)])
+    made.table = TextTable(head, [tuple(f"{v:.4g}" for v in row) for row in np.transpose(columns)])
     picture = curve(columns[0], columns[1], columns[5], load)
     made.show(picture, "Load and contact area over deflection; dashed: the scene's load.")
     _slides(results, made)

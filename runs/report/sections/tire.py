@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.runs.report import live, surface_figures
-from tireroad.runs.report.read import Results, Section, Table, attributes, quantity
+from tireroad.runs.report.read import Results, Section, TextTable, attributes, quantity
 from tireroad.runs.report.realism import mean_pressure
 
 _MOSTLY = 0.3  # of a state's kinetic energy
@@ -128,7 +128,7 @@ def cords(results: Results, section: Section) -> None:
         section.notes.append(
             "Force of one cord, tension positive; compressed: share of the ply's area whose cords are."
         )
-        section.table = Table(("cords", "largest", "mean", "least", "compressed"), rows)
+        section.table = TextTable(("cords", "largest", "mean", "least", "compressed"), rows)
 
 
 def footprint(results: Results, section: Section) -> None:
@@ -182,7 +182,7 @@ def modes(results: Results) -> Section:
     if len(frequency) > LISTED:
         section.notes.append(f"The table lists {LISTED} of {len(frequency)} modes.")
     numbers = [str(n + 1) for n in range(min(LISTED, len(frequency)))]
-    section.table = Table(tuple(head), list(zip(numbers, *columns, strict=True)))
+    section.table = TextTable(tuple(head), list(zip(numbers, *columns, strict=True)))
     points, quads = (
         results.array(name, "surface/points"),
         results.borrowed("static.h5", "surface/quads"),

@@ -33,7 +33,7 @@ Where = Callable[[tuple[str, ...], str], InputError]
 
 
 @dataclass(frozen=True)
-class Groove:
+class GrooveTable:
     direction: str = choice(
         "lateral",
         ("lateral", "circumferential"),
@@ -88,11 +88,11 @@ class PatternTable:
         0.008, "m", "depth that black stands for in an image", least=1e-6, most=0.1
     )
     width: float = number(0.15, "m", "width of an image, across the tire", least=1e-6, most=10)
-    groove: tuple[Groove, ...] = tables(Groove, "a groove of the tread")
+    groove: tuple[GrooveTable, ...] = tables(GrooveTable, "a groove of the tread")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Contact(Variants):
+class ContactTable(Variants):
     tread: str = registered(
         TREADS,
         "half-space",
@@ -164,21 +164,21 @@ class Contact(Variants):
         return self.points == "nodes" or (self.points == "auto" and counted)
 
     @property
-    def rubs(self) -> bool:
+    def has_friction(self) -> bool:
         """Whether the road exerts horizontal forces on the tire."""
         bristles = (self.brush_stiffness, self.brush_stiffness_per_area) != (None, None)
-        return bristles or self.sheared
+        return bristles or self.has_shear
 
     @property
-    def sheared(self) -> bool:
+    def has_shear(self) -> bool:
         """Whether the tread deforms under horizontal forces."""
         return (
             self.shear and self.friction is not None and self.brush == "rolling" and self.law.shears
         )
 
 
-def check_tread(contact: Contact, standing: bool, error: Where, rubs: bool) -> None:
-    """Raise an error for invalid treads and brushes; `rubs`: the static state has friction."""
+def check_tread(contact: ContactTable, standing: bool, error: Where, has_friction: bool) -> None:
+    """Raise an error for invalid treads and brushes; `has_friction`: the static state has friction."""
     if contact.law.creep is not None and contact.on_nodes:
         raise error(
             ("contact", "tread"),
@@ -188,12 +188,12 @@ def check_tread(contact: Contact, standing: bool, error: Where, rubs: bool) -> N
         raise error(
             ("contact", "brush_stiffness_per_area"), "and brush_stiffness are two brushes: keep one"
         )
-    if not contact.rubs and contact.friction is not None:
+    if not contact.has_friction and contact.friction is not None:
         raise error(
             ("contact", "friction"),
             "needs a tread that shears, or brush_stiffness_per_area (N/m³), to carry it",
         )
-    if any(contact.slip) and (not (contact.rubs or rubs) or standing):
+    if any(contact.slip) and (not (contact.has_friction or has_friction) or standing):
         raise error(
             ("contact", "slip"),
             "needs contact.friction, brush_stiffness_per_area (N/m³) or static.friction, and a rolling tire",
@@ -201,7 +201,7 @@ def check_tread(contact: Contact, standing: bool, error: Where, rubs: bool) -> N
 
 
 @dataclass(frozen=True)
-class Time:
+class TimeTable:
     duration: float = number(0.1, "s", "duration of the run", least=1e-7, most=1e5)
     step: float | str = number(
         "auto", "s", "step of the time integration", least=1e-9, most=1e3, word="auto"

@@ -29,8 +29,7 @@ from tireroad.fem.axle import DIRECTIONS, Axle
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Key, Limits, OnlyFor, described, finite, parameter, text
 from tireroad.fem.turning import SHAPE_TOLERANCE
-from tireroad.runs.scene.outputs import OUTPUTS
-from tireroad.runs.scene.outputs import Output as PointOutput
+from tireroad.runs.scene.outputs import OUTPUTS, Output
 from tireroad.runs.scene.schema import (
     Collects,
     Variants,
@@ -45,13 +44,13 @@ from tireroad.runs.scene.schema import (
     variant,
     vector,
 )
-from tireroad.runs.scene.tables.contact import Contact, PatternTable, Time
-from tireroad.runs.scene.tables.sound import HEARD, Sound
-from tireroad.runs.scene.tables.tire import Cavity, Tire
+from tireroad.runs.scene.tables.contact import ContactTable, PatternTable, TimeTable
+from tireroad.runs.scene.tables.sound import HEARD, SoundTable
+from tireroad.runs.scene.tables.tire import CavityTable, TireTable
 
 
 @dataclass(frozen=True)
-class Static:
+class StaticTable:
     inflation: float = number(
         2.0e5, "Pa", "inflation pressure on the inner face", least=0, most=1e8
     )
@@ -112,7 +111,7 @@ class Static:
 
 
 @dataclass(frozen=True)
-class Modal:
+class ModalTable:
     count: int = integer(500, "number of modes, from the lowest", least=1, most=100000)
     up_to: float | None = number(
         None, "Hz", "all modes below this frequency, instead of count", least=1e-3, most=1e6
@@ -147,7 +146,7 @@ class Modal:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Road(Variants, Placement):
+class RoadTable(Variants, Placement):
     """The road driven over; `surface` is the kind with its parameters."""
 
     kind: str = registered(ROADS, "flat", "type of road")
@@ -330,7 +329,7 @@ def _check_company(scene: Scene, axle: Axle, error: Where) -> None:
 
 
 @dataclass(frozen=True)
-class Accuracy:
+class AccuracyTable:
     estimate: bool = flag(
         True,
         "error bars of contact and axle force by cheaper companion runs: elements of twice the size, fewer modes, twice "
@@ -453,7 +452,7 @@ def _ascending(doc: str, unit: str, limits: Limits) -> Any:
 
 
 @dataclass(frozen=True)
-class Stiffness:
+class StiffnessTable:
     deflections: tuple[float, ...] = _ascending(
         "deflections at which load and footprint are computed; empty: equal steps up to up_to",
         "m",
@@ -492,7 +491,7 @@ class Stiffness:
     )
 
 
-def deflections(wanted: Stiffness, own: float | None) -> list[float]:
+def deflections(wanted: StiffnessTable, own: float | None) -> list[float]:
     """The deflections (m) to compute; `own` is that of the scene's static state."""
     if wanted.deflections:
         return list(wanted.deflections)
@@ -513,7 +512,7 @@ def check_stiffness(scene: Scene, raw: dict[str, Any], error: Where) -> None:
 
 
 @dataclass(frozen=True)
-class Damping:
+class DampingTable:
     mass: float = number(
         500.0,
         "1/s",
@@ -528,14 +527,14 @@ class Damping:
 
 
 @dataclass(frozen=True)
-class Campbell:
+class CampbellTable:
     to: float = number(200.0, "rad/s", "highest speed", least=1e-3, most=2000)
     step: float = number(10.0, "rad/s", "step between two speeds", least=1e-3, most=2000)
     branches: int = integer(20, "number of branches followed, from the lowest", least=1, most=1000)
 
 
 @dataclass(frozen=True)
-class Rotation:
+class RotationTable:
     speed: float = number(
         100.0, "rad/s", "speed of rotation of the wheel; 0: standing", least=0, most=2000
     )
@@ -597,13 +596,15 @@ class Rotation:
         least=1e-3,
         most=10,
     )
-    campbell: Campbell | None = table(
-        Campbell, "eigenvalues over speed, on the modes of this one static state", optional=True
+    campbell: CampbellTable | None = table(
+        CampbellTable,
+        "eigenvalues over speed, on the modes of this one static state",
+        optional=True,
     )
 
 
 @dataclass(frozen=True)
-class Greens:
+class GreensTable:
     residual: str = choice(
         "static",
         ("none", "dirac", "static", "second-order", "attachment"),
@@ -630,7 +631,7 @@ class Greens:
 
 
 @dataclass(frozen=True)
-class PointForce:
+class PointForceTable:
     angle: float = number(
         0.0,
         "deg",
@@ -662,7 +663,7 @@ class PointForce:
 
 
 @dataclass(frozen=True)
-class Output(Collects):
+class OutputTable(Collects):
     spectra: bool = flag(True, "spectra of the contact force and the axle force")
     axle_force: bool = flag(True, "axle force, from the momentum of the tire")
     vibration: bool = flag(
@@ -671,50 +672,56 @@ class Output(Collects):
     fields: bool = flag(
         False, "motion of the outer face at the end of the run, also as XDMF for ParaView"
     )
-    kinds: tuple[tuple[str, PointOutput], ...] = collection(OUTPUTS)
+    kinds: tuple[tuple[str, Output], ...] = collection(OUTPUTS)
 
 
 @dataclass(frozen=True)
 class Scene:
     name: str = text("scene", "name of the scene and its result folder")
-    tire: Tire = table(Tire, "geometry, mesh and materials of the tire")
-    static: Static = table(Static, "inflation and load of the static state")
-    stiffness: Stiffness | None = table(
-        Stiffness, "load over deflection, and the stiffness of the standing tire", optional=True
+    tire: TireTable = table(TireTable, "geometry, mesh and materials of the tire")
+    static: StaticTable = table(StaticTable, "inflation and load of the static state")
+    stiffness: StiffnessTable | None = table(
+        StiffnessTable,
+        "load over deflection, and the stiffness of the standing tire",
+        optional=True,
     )
-    modal: Modal | None = table(
-        Modal,
+    modal: ModalTable | None = table(
+        ModalTable,
         "modes at the static state; absent: with its defaults where anything needs modes",
         optional=True,
     )
-    damping: Damping | None = table(
-        Damping,
+    damping: DampingTable | None = table(
+        DampingTable,
         "Rayleigh damping of the material; absent: by the loss factors of the compounds, where "
         "there are any, else with its defaults",
         optional=True,
     )
-    rotation: Rotation | None = table(Rotation, "rotation of the wheel", optional=True)
+    rotation: RotationTable | None = table(RotationTable, "rotation of the wheel", optional=True)
     axle: AxleTable = table(AxleTable, "support of the wheel")
-    greens: Greens = table(Greens, "Green's functions")
-    force: tuple[PointForce, ...] = tables(PointForce, "a prescribed force on the outer face")
-    contact: Contact | None = table(Contact, "contact with the road in time", optional=True)
+    greens: GreensTable = table(GreensTable, "Green's functions")
+    force: tuple[PointForceTable, ...] = tables(
+        PointForceTable, "a prescribed force on the outer face"
+    )
+    contact: ContactTable | None = table(
+        ContactTable, "contact with the road in time", optional=True
+    )
     pattern: PatternTable | None = table(
         PatternTable,
         "grooves of the tread, which rotate with the tire; absent: a slick",
         optional=True,
     )
-    road: Road | None = table(Road, "the road driven over", optional=True)
-    time: Time | None = table(Time, "the run in time", optional=True)
-    accuracy: Accuracy = table(Accuracy, "error bars, and the search for settings")
-    sound: Sound | None = table(
-        Sound, "sound pressure at microphones, of the tire's vibrations alone", optional=True
+    road: RoadTable | None = table(RoadTable, "the road driven over", optional=True)
+    time: TimeTable | None = table(TimeTable, "the run in time", optional=True)
+    accuracy: AccuracyTable = table(AccuracyTable, "error bars, and the search for settings")
+    sound: SoundTable | None = table(
+        SoundTable, "sound pressure at microphones, of the tire's vibrations alone", optional=True
     )
-    output: Output = table(Output, "what is computed and kept")
+    output: OutputTable = table(OutputTable, "what is computed and kept")
 
     @property
-    def modes(self) -> Modal:
+    def modes(self) -> ModalTable:
         """The table [modal], or its defaults."""
-        return self.modal or Modal()
+        return self.modal or ModalTable()
 
     @property
     def in_contact(self) -> bool:
@@ -724,7 +731,7 @@ class Scene:
     @property
     def horizontal_forces(self) -> bool:
         """Whether the contact has horizontal forces: of bristles, or of a road that leans."""
-        if self.contact is None or self.contact.rubs:
+        if self.contact is None or self.contact.has_friction:
             return self.contact is not None
         rotation, road = self.rotation, self.road
         rolls = rotation is not None and (rotation.travel_speed or rotation.speed) > 0
@@ -753,7 +760,7 @@ def filled(scene: Scene) -> Scene:
     tire = scene.tire
     if not tire.shape.air or tire.cavity is not None:
         return scene
-    return replace(scene, tire=replace(tire, cavity=Cavity()))
+    return replace(scene, tire=replace(tire, cavity=CavityTable()))
 
 
 def has_air(scene: Scene) -> bool:

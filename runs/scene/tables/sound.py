@@ -51,7 +51,7 @@ def _microphones() -> Any:
 
 
 @dataclass(frozen=True)
-class Sound:
+class SoundTable:
     microphones: tuple[str | tuple[float, ...], ...] = _microphones()
     temperature: float = number(293.15, "K", "temperature of the air outside", least=200, most=350)
     up_to: float | None = number(

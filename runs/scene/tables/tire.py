@@ -39,8 +39,8 @@ from tireroad.runs.scene.source import Source
 if TYPE_CHECKING:
     from tireroad.fem.sections.mesh2d import SectionMesh
     from tireroad.fem.sections.ring import Ring
-    from tireroad.fem.tire.cords import Cords as BodyCords
-    from tireroad.fem.tire.material import Material as BodyMaterial
+    from tireroad.fem.tire.cords import Cords
+    from tireroad.fem.tire.material import Material
 
 
 # Elements around in the meshes of a search, unless a kind has its own.
@@ -80,39 +80,39 @@ class SectionKind(Parameters):
     tread_law: ClassVar[str] = "layer"
     without: ClassVar[tuple[str, ...]] = ()
 
-    def elements(self, tire: Tire) -> tuple[Self, int, int]:
+    def elements(self, tire: TireTable) -> tuple[Self, int, int]:
         """The kind with its number of elements set; order and segments, given or by default."""
         return self, tire.order or self.order, tire.segments or self.segments
 
-    def check(self, tire: Tire, source: Source) -> None:
+    def check(self, tire: TireTable, source: Source) -> None:
         """Note problems of [tire] in `source`."""
 
-    def proportions(self, tire: Tire) -> Proportions:
+    def proportions(self, tire: TireTable) -> Proportions:
         """Sizes of the section."""
         raise NotImplementedError
 
-    def ring(self, tire: Tire) -> Ring:
+    def ring(self, tire: TireTable) -> Ring:
         """The ring of elements from the revolved section."""
         raise NotImplementedError
 
-    def rubbers(self, tire: Tire) -> dict[str, BodyMaterial]:
+    def rubbers(self, tire: TireTable) -> dict[str, Material]:
         """The compound of each region of the section, by name."""
         raise NotImplementedError
 
-    def cords(self, tire: Tire) -> list[BodyCords]:
+    def cords(self, tire: TireTable) -> list[Cords]:
         """The cords on the plies of the section."""
         raise NotImplementedError
 
-    def angles(self, tire: Tire) -> dict[str, float]:
+    def angles(self, tire: TireTable) -> dict[str, float]:
         """Angle to the circumference (deg) of each line of cords, for drawings."""
         return {line.name: line.angle for line in tire.cords}
 
-    def rubber(self, tire: Tire) -> tuple[float, float, float]:
+    def rubber(self, tire: TireTable) -> tuple[float, float, float]:
         """Dynamic modulus (Pa), Poisson's ratio and density (kg/m³) of the wall, for estimates."""
         law = tire.material.law
         return tire.dynamic * law.youngs, law.poisson, tire.material.density
 
-    def free_unknowns(self, tire: Tire) -> int:
+    def free_unknowns(self, tire: TireTable) -> int:
         """Displacement unknowns of the mesh, without those held by the rim."""
         import numpy as np
 
@@ -120,11 +120,11 @@ class SectionKind(Parameters):
         held = len(np.unique(section.side(section.rim)))
         return 3 * tire.segments * tire.order * (len(section.nodes) - held)
 
-    def coarser(self, tire: Tire) -> Self:
+    def coarser(self, tire: TireTable) -> Self:
         """The kind with half the elements along the section, however few that leaves."""
         raise NotImplementedError
 
-    def meshes(self, tire: Tire) -> tuple[tuple[int, int], ...]:
+    def meshes(self, tire: TireTable) -> tuple[tuple[int, int], ...]:
         """(elements around, along the section) for a search of settings, from coarse to fine.
 
         Each is about 1.2 times finer than the one before; the coarsest can be halved.
@@ -132,7 +132,7 @@ class SectionKind(Parameters):
         along = self.proportions(tire).along
         return tuple((around, along) for around in AROUND)
 
-    def search_order(self, tire: Tire) -> int:
+    def search_order(self, tire: TireTable) -> int:
         """Element order used by a search."""
         return tire.order
 
@@ -140,19 +140,19 @@ class SectionKind(Parameters):
         """The kind with that many elements along its section, if the number can be chosen."""
         return self
 
-    def has_losses(self, tire: Tire) -> bool:
+    def has_losses(self, tire: TireTable) -> bool:
         """Whether any compound has a loss factor."""
         return any(one.loss_factor for one in self.rubbers(tire).values())
 
-    def varies(self, tire: Tire) -> bool:
+    def varies(self, tire: TireTable) -> bool:
         """Whether any modulus depends on frequency."""
         return any(one.spectrum != CONSTANT for one in self.rubbers(tire).values())
 
-    def fingerprint(self, tire: Tire) -> str | None:
+    def fingerprint(self, tire: TireTable) -> str | None:
         """Hash of what a run takes from the section's files; None without files."""
         return None
 
-    def described(self, tire: Tire) -> list[str]:
+    def described(self, tire: TireTable) -> list[str]:
         """Lines for `check`: which parts of a file are used and which are not."""
         return []
 
@@ -167,7 +167,7 @@ Where = Callable[[tuple[str, ...], str], InputError]
 
 
 @dataclass(frozen=True)
-class Cavity:
+class CavityTable:
     gas: str = choice(
         "air",
         ("air", "none"),
@@ -195,7 +195,7 @@ AROUND_CROWN = (0.0, 45.0)  # deg: arc of a region of a torus that has none
 
 
 @dataclass(frozen=True, kw_only=True)
-class Material(Variants):
+class MaterialTable(Variants):
     model: str = registered(MATERIALS, "neo-hookean", "strain energy")
     law: MaterialLaw = variant("model", MATERIALS)
     density: float = number(1200.0, "kg/m³", "density, undeformed", least=1, most=3e4)
@@ -236,7 +236,7 @@ def _loss_factor():
 
 
 @dataclass(frozen=True)
-class Region:
+class RegionTable:
     name: str | None = text(
         None,
         "region of a file, or compound of a radial tire, that this changes; absent: all compounds of a radial tire; not "
@@ -258,8 +258,8 @@ class Region:
         least=0,
         most=1,
     )
-    material: Material | None = table(
-        Material,
+    material: MaterialTable | None = table(
+        MaterialTable,
         "material of the region; absent: that of the file, or of [tire.material] in a torus",
         optional=True,
     )
@@ -271,7 +271,7 @@ class Region:
 
 
 @dataclass(frozen=True)
-class Cords:
+class CordsTable:
     name: str = text(
         "ply",
         "name of this line of cords in results and messages; the name of a line of a file or of the radial tire replaces "
@@ -315,7 +315,7 @@ class Cords:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Tire(Variants):
+class TireTable(Variants):
     section: str = registered(SECTIONS, "torus", "shape of the section")
     shape: SectionKind = variant("section", SECTIONS)
     segments: int | None = integer(
@@ -337,21 +337,25 @@ class Tire(Variants):
         least=SIZE.least,
         most=SIZE.most,
     )
-    material: Material = table(Material, "material of the wall")
+    material: MaterialTable = table(MaterialTable, "material of the wall")
     dynamic: float = _dynamic()
     loss_factor: float = _loss_factor()
     exponent: float | None = _exponent()
     prony_shares: tuple[float, ...] = _shares()
     prony_times: tuple[float, ...] = _times()
-    region: tuple[Region, ...] = tables(
-        Region, "a part of the section that is made of another material"
+    region: tuple[RegionTable, ...] = tables(
+        RegionTable, "a part of the section that is made of another material"
     )
-    cords: tuple[Cords, ...] = tables(Cords, "a line of cords in the wall: a ply or a belt")
-    cavity: Cavity | None = table(
-        Cavity, "the air inside; absent: none in a torus, else this table's defaults", optional=True
+    cords: tuple[CordsTable, ...] = tables(
+        CordsTable, "a line of cords in the wall: a ply or a belt"
+    )
+    cavity: CavityTable | None = table(
+        CavityTable,
+        "the air inside; absent: none in a torus, else this table's defaults",
+        optional=True,
     )
 
-    def with_elements(self, on_road: bool) -> Tire:
+    def with_elements(self, on_road: bool) -> TireTable:
         """The tire with open mesh keys set; on a road, elements are smaller at the footprint."""
         shape, order, segments = self.shape.elements(self)
         near = self.footprint_size or (NEAR_ROAD if on_road else 1.0)
@@ -370,21 +374,21 @@ class Tire(Variants):
         return self.shape.free_unknowns(self)
 
 
-def cords_of(line: Cords) -> BodyCords:
+def cords_of(line: CordsTable) -> Cords:
     """The cords of a [[tire.cords]], without their place in the section."""
-    from tireroad.fem.tire.cords import Cords as BodyCords
+    from tireroad.fem.tire.cords import Cords
 
     values = {k: v for k, v in vars(line).items() if k not in ("depth", "arc", "angle")}
-    return BodyCords(angle=float(np.radians(line.angle)), **values)
+    return Cords(angle=float(np.radians(line.angle)), **values)
 
 
-def spelt(lines: Sequence[Cords], names: Iterable[str]) -> list[Cords]:
+def spelt(lines: Sequence[CordsTable], names: Iterable[str]) -> list[CordsTable]:
     """The [[tire.cords]] with names spelt as the section's plies are."""
     own = {name.upper(): name for name in names}
     return [replace(line, name=own.get(line.name.upper(), line.name)) for line in lines]
 
 
-def region_of(tire: Tire, name: str) -> Region | None:
+def region_of(tire: TireTable, name: str) -> RegionTable | None:
     """The scene's [[tire.region]] of that name, or None."""
     return next((r for r in tire.region if r.name and r.name.upper() == name.upper()), None)
 
@@ -396,7 +400,7 @@ def stated(dynamic: float, loss_factor: float, spectrum: Spectrum | None) -> dic
     return {key: value for key, value in given.items() if value != neutral[key]}
 
 
-def losses_of(part: Tire | Region | None) -> dict[str, Any]:
+def losses_of(part: TireTable | RegionTable | None) -> dict[str, Any]:
     """What [tire] or a region states of small motions. A Prony series gives all of it."""
     if part is None:
         return {}
@@ -406,9 +410,9 @@ def losses_of(part: Tire | Region | None) -> dict[str, Any]:
     return stated(part.dynamic, part.loss_factor, law)
 
 
-def check_series(tire: Tire, source: Source) -> None:
+def check_series(tire: TireTable, source: Source) -> None:
     """Note Prony series that are none, or that stand beside an exponent."""
-    parts: list[tuple[tuple[str, ...], Tire | Region]] = [(("tire",), tire)]
+    parts: list[tuple[tuple[str, ...], TireTable | RegionTable]] = [(("tire",), tire)]
     parts += [(("tire", "region", str(n)), one) for n, one in enumerate(tire.region)]
     for path, part in parts:
         if not (part.prony_shares or part.prony_times):

@@ -14,9 +14,9 @@ from mpi4py import MPI
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.timing import by_processor
 from tireroad.runs.files.cache import Cache
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.scene.estimate import estimate
-from tireroad.runs.search.journal import Journal, Trial, worst
+from tireroad.runs.search.journal import SearchJournal, Trial, worst
 from tireroad.runs.search.search import Search, seconds
 from tireroad.runs.search.settings import Ladders, Settings, applied
 from tireroad.runs.stages.rolling import run_in
@@ -144,11 +144,13 @@ def _searched(folder: Path, scene) -> tuple[bool, list[Trial]]:
     folder.mkdir(parents=True, exist_ok=True)
     ended = True
     try:
-        with observe.quiet():
+        with console.quiet():
             Search(scene, folder, MPI.COMM_WORLD, [], _cache(folder.parent)).run()
     except ConvergenceError:
         ended = False
-    return ended, [trial for trial in Journal(folder, scene).trials if trial.found is not None]
+    return ended, [
+        trial for trial in SearchJournal(folder, scene).trials if trial.found is not None
+    ]
 
 
 def _driven(folder: Path, ladders: Ladders, settings: Settings) -> Driven:

@@ -17,7 +17,7 @@ from tireroad.contact.results.spectra import distance
 from tireroad.fem.timing import by_processor
 from tireroad.runs.files.cache import Cache
 from tireroad.runs.files.store import identity
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.validation.tables import Table
 from tireroad.tests.bench.accuracy.rough_road import TEXTURE, Mesh, Rolled, rolled
 from tireroad.tests.bench.parts.kept import read_kept, write_kept
@@ -122,11 +122,11 @@ def _kept(folder: Path, road: str, kept: Path) -> Table:
 
 def table(folder: Path, road: str, finest: dict, base: dict, changes: dict) -> Table:
     """The table of one road: `finest` mesh and `base` keys of the converged run, and `changes`."""
-    observe.say(f"  {road}: the converged run ...")
+    console.say(f"  {road}: the converged run ...")
     exact = _rolled(folder, road, finest, base, {})
     rows: list[list] = [["converged", "", "", *[""] * 6, exact.cost]]
     for what, changed in _each(changes):
-        observe.say(f"  {road}: {what} {_named(changed)}")
+        console.say(f"  {road}: {what} {_named(changed)}")
         plain = what == DEFAULT
         mesh, keys = (dict.fromkeys(own) if plain else own for own in (finest, base))
         found = _rolled(folder, road, mesh, keys, changed)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.validation.cases import thesis_torus
 from tireroad.runs.validation.tables import Table
 from tireroad.tests.bench.parts import converged_load
@@ -66,7 +66,7 @@ def run() -> list[Table]:
     for mesh in MESHES:
         answers[mesh] = _answer(_section(*mesh), consistent=mesh[4:] == ("bead", 0.25))
         worst = _errors(answers[mesh], exact).max()
-        observe.say(f"  {mesh}: {answers[mesh].seconds:.1f} s, worst frequency {worst:.2g} %")
+        console.say(f"  {mesh}: {answers[mesh].seconds:.1f} s, worst frequency {worst:.2g} %")
     loads = converged_load.table(
         {_named(mesh): _section(*mesh) for mesh in LOADED}, _named(DEFAULT), _inflated
     )
@@ -82,9 +82,9 @@ def _fourier() -> np.ndarray:
 def _inflated(section):
     """A loader with the tire inflated. Collective."""
     from tireroad.fem.static.equilibrium import Equilibrium
-    from tireroad.fem.static.load_steps import Loader
+    from tireroad.fem.static.load_steps import LoadStepper
 
-    loader = Loader(Equilibrium(_body(section)), lambda progress: None)
+    loader = LoadStepper(Equilibrium(_body(section)), lambda progress: None)
     loader.inflate(INFLATION)
     return loader
 
@@ -197,7 +197,7 @@ def _locking() -> Table:
             section = _section(order, segments, arc, 1, "bead", 1.0)
             row += [_first(section, ratio, full) for full in (True, False)]
         rows.append(row)
-        observe.say(f"  Poisson's ratio {ratio}")
+        console.say(f"  Poisson's ratio {ratio}")
     columns = [
         (f"order {order}, {segments} x {arc}, {kind}", "Hz")
         for order, segments, arc in meshes

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from tireroad.contact.results.spectra import distance
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.validation.tables import Table
 from tireroad.tests.bench.accuracy.rough_road import BAND, SPEED, Mesh, Rolled, rolled
 
@@ -31,13 +31,13 @@ def run() -> list[Table]:
 
 def table(folder: Path, mesh: Mesh, modes: int, duration: float, choices) -> Table:
     """The whole contact stage of a user's run, including files and checks, choice by choice."""
-    observe.say("  modes of the tire and the reference ...")
+    console.say("  modes of the tire and the reference ...")
     keys: dict[str, Any] = {"modes": modes, "residual": RESIDUAL, "duration": duration}
     exact = rolled(folder, mesh, step=FINEST, **keys)
     rows = []
     for states, rate in choices:
         step = 1.0 / rate
-        observe.say(f"  {states or 'all'} states, {step:g} s ...")
+        console.say(f"  {states or 'all'} states, {step:g} s ...")
         sets = (f"greens.dynamic={states}", f"greens.band={BAND:g}") if states else ()
         found = rolled(folder, mesh, *sets, step=step, **keys)
         off = [_error(exact, found, name, duration) for name in ("total_force", "axle_force")]

@@ -12,8 +12,8 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from tireroad.fem.errors import ConvergenceError, InputError
-from tireroad.runs.process import observe
-from tireroad.runs.validation.full_elements import History, follow
+from tireroad.runs.process import console
+from tireroad.runs.validation.full_elements import FullHistory, follow
 from tireroad.runs.validation.tables import Table
 from tireroad.tests.bench.accuracy.rough_road import (
     BAND,
@@ -91,15 +91,17 @@ def tables(
     ]
 
 
-def _reference(folder: Path, mesh: Mesh, modes: int) -> tuple[Prepared, History]:
-    observe.say(f"  {mesh} elements: modes and reference ...")
+def _reference(folder: Path, mesh: Mesh, modes: int) -> tuple[Prepared, FullHistory]:
+    console.say(f"  {mesh} elements: modes and reference ...")
     keys = {"modes": modes, "residual": "attachment", "duration": DURATION, "step": FINEST}
     sets = f"tire.order={ORDER}", "static.error_estimate=false"
     given = prepared(folder / str(mesh), mesh, *sets, pitch=PITCH, **keys)
     return given, modal(given, given.run.greens.contact, FINEST)
 
 
-def _choices(given: Prepared, exact: History, mesh: str, counts, residuals, steps) -> list[Choice]:
+def _choices(
+    given: Prepared, exact: FullHistory, mesh: str, counts, residuals, steps
+) -> list[Choice]:
     out = []
     for count in counts:
         for residual in residuals:
@@ -109,20 +111,20 @@ def _choices(given: Prepared, exact: History, mesh: str, counts, residuals, step
                 try:
                     found = modal(given, response, step)
                 except (ConvergenceError, InputError) as refused:
-                    observe.say(f"  {count} modes, {residual}, {step:g} s: {refused}")
+                    console.say(f"  {count} modes, {residual}, {step:g} s: {refused}")
                     continue
                 cost, off = found.seconds / DURATION, errors(exact, found, DURATION)
                 out.append(Choice(mesh, count, residual, states, step, cost, *off))
     return out
 
 
-def _full(given: Prepared, exact: History, mesh: str, step: float) -> Choice:
+def _full(given: Prepared, exact: FullHistory, mesh: str, step: float) -> Choice:
     """All degrees of freedom of the same mesh, integrated in time."""
     from tireroad.fem.matrices.probe import nodes
     from tireroad.fem.transient.linear import FullTire
     from tireroad.modal.damping import StrainEnergy
 
-    observe.say(f"  full finite elements, {step:g} s ...")
+    console.say(f"  full finite elements, {step:g} s ...")
     wheel, turning = given.run.wheel, ("operators", "rotation", "speed", "damping")
     points = nodes(given.trial.setup.patch.index, len(given.run.static.points))
     assert not isinstance(wheel.damping, StrainEnergy), "the scene gives [damping]"

@@ -21,10 +21,10 @@ from tireroad.modal.rolling import rolling_modes
 from tireroad.modal.standing import fewer
 from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.files.store import opened
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.stages.pipeline import Finished, run_scene
 from tireroad.runs.stages.setup import leaning, leaning_loads
-from tireroad.runs.validation.full_elements import History, Trial, follow
+from tireroad.runs.validation.full_elements import Conditions, FullHistory, follow
 
 BAND = 500.0  # Hz: upper frequency of the errors
 SPEED = 100.0  # rad/s
@@ -95,7 +95,7 @@ class Prepared:
     """A `run` up to its Green's functions, and the `trial` with its road and settled points."""
 
     run: Finished
-    trial: Trial
+    trial: Conditions
 
 
 def prepared(folder: Path, mesh: Mesh, *sets: str, **keys: object) -> Prepared:
@@ -104,12 +104,12 @@ def prepared(folder: Path, mesh: Mesh, *sets: str, **keys: object) -> Prepared:
 
     folder.mkdir(parents=True, exist_ok=True)
     scene = load(write_scene(folder / "given.toml", mesh, **keys), list(sets))
-    with observe.quiet():
+    with console.quiet():
         run = run_scene(
             scene, folder, MPI.COMM_WORLD, until="greens", fresh=False, petsc_options=[]
         )
     setup, _ = run.setup.settled(run.greens.contact, run.static.force, scene.contact)
-    return Prepared(run, Trial(scene.contact, setup, scene.time.duration))
+    return Prepared(run, Conditions(scene.contact, setup, scene.time.duration))
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ def rolled(folder: Path, mesh: Mesh, *sets: str, cache: Cache = NO_CACHE, **keys
 
     folder.mkdir(parents=True, exist_ok=True)
     scene = load(write_scene(folder / "given.toml", mesh, **keys), list(sets))
-    with observe.quiet():
+    with console.quiet():
         run_scene(
             scene,
             folder,
@@ -172,7 +172,7 @@ def fewer_modes(given: Prepared, count: int, residual: str) -> Response:
     return make_response(lambda: run.wheel, rolling, *several).response
 
 
-def modal(given: Prepared, response: Response, step: float) -> History:
+def modal(given: Prepared, response: Response, step: float) -> FullHistory:
     """The loop on the states that the step resolves, without readings of the wheel."""
     points = slice(len(given.trial.setup.patch.index))
     alone = response.between(points, slice(None)).resolved(step)
@@ -181,7 +181,7 @@ def modal(given: Prepared, response: Response, step: float) -> History:
         return follow(given.trial, tire, step, 0.0)
 
 
-def errors(reference: History, found: History, duration: float) -> tuple[float, float]:
+def errors(reference: FullHistory, found: FullHistory, duration: float) -> tuple[float, float]:
     """Relative L2 error up to BAND of the varying contact force and axle force, %."""
     contact, axle = (
         100 * distance(reference.values[name], found.values[name], duration, BAND).mean

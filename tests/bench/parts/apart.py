@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from tireroad.fem.errors import ConvergenceError
-from tireroad.runs.process import mpi, observe, signals
+from tireroad.runs.process import console, mpi, signals
 from tireroad.runs.process.signals import BUG, DONE
 
 
@@ -35,7 +35,7 @@ def apart(task: Callable[..., Any], *given: Any) -> Any:
         if done.returncode == DONE:
             return pickle.loads(answer.read_bytes())
     if done.returncode == BUG:
-        observe.say(done.stderr.rstrip())
+        console.say(done.stderr.rstrip())
     raise ConvergenceError(_reason(done.returncode, done.stderr))
 
 

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 from scipy import sparse
 
-from tireroad.contact.roads.kinds.texture import Texture
+from tireroad.contact.roads.kinds.texture import TextureRoad
 from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.solver.projected_cg import ProjectedCG, SpreadCompliance
 from tireroad.contact.tread.compliance import half_space_influence
@@ -51,7 +51,7 @@ def large() -> Table:
         nodes = np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1).reshape(-1, 2)
         away = ((nodes[:, None] - nodes) ** 2).sum(axis=-1)
         tire = 1e-6 * (np.exp(-away / 0.0018) + 0.01 * np.eye(len(nodes)))
-        road = Texture(seed=1).make()
+        road = TextureRoad(seed=1).make()
         for solver in (
             ActiveSet(SpreadCompliance(tire, weights, kernel)),
             ProjectedCG(SpreadCompliance(tire, weights, kernel)),
@@ -75,7 +75,7 @@ def rough() -> Table:
     """128 x 128 points without a starting guess; the last row is tamaas, if installed."""
     n = 128
     x, y, kernel = _grid_case(n)
-    road = Texture(seed=2).make()
+    road = TextureRoad(seed=2).make()
     q = -2e-4 - road.height(x, y)
     weights, tire = _none(n * n)
     compliance = SpreadCompliance(tire, weights, kernel)

@@ -8,13 +8,13 @@ from itertools import chain
 import numpy as np
 from mpi4py import MPI
 
-from tireroad.contact.loop import Drive, Tire, roll
+from tireroad.contact.loop import Drive, LinearTire, roll
 from tireroad.contact.roads.kinds.shapes import Flat
 from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.tread.compliance import half_space_compliance
 from tireroad.greens.convolution import Convolution
 from tireroad.greens.recursion import Recursion
-from tireroad.runs.validation.cases import Strip, oval_patch
+from tireroad.runs.validation.cases import RollingStrip, oval_patch
 from tireroad.runs.validation.tables import Table
 from tireroad.tests.bench.parts.contact_points import median
 
@@ -25,7 +25,7 @@ _SCHEMES = ("linear", "damped", "constant")
 
 def orders() -> Table:
     """Forces of a shaken, rolling strip with residual flexibility by step size, all schemes."""
-    response = Strip(speed=20.0).response(PATCH.points, 5, 2, residual=6)
+    response = RollingStrip(speed=20.0).response(PATCH.points, 5, 2, residual=6)
     exact = _forces(response, "linear", 6400)
     rows, before = [], None
     for steps in (100, 200, 400, 800):
@@ -69,7 +69,7 @@ def convolution() -> Table:
     its cost per lag, which grows with the number of steps.
     """
     patch = oval_patch((10, 6), (0.015, 0.02), 500.0)
-    response = Strip(speed=20.0).response(patch.points, 12, 5)
+    response = RollingStrip(speed=20.0).response(patch.points, 12, 5)
     rows: list[list] = []
     before: list[float] = []
     for steps in (200, 400, 800, 1600):
@@ -106,7 +106,7 @@ def _both(response, shape: np.ndarray, duration: float, steps: int, shown: int):
     m, and the largest displacement, m.
     """
     h = duration / steps
-    tires: tuple[Tire, ...] = (
+    tires: tuple[LinearTire, ...] = (
         Recursion(response=response, step=h, scheme="linear", comm=MPI.COMM_SELF),
         Convolution(response=response, step=h, steps=steps),
     )
@@ -130,7 +130,7 @@ def _many_steps(steps: int) -> list:
     points, lags = 500, 20
     patch = oval_patch((25, 20), (0.006, 0.006), 500.0)
     tire = Recursion(
-        response=Strip(speed=20.0).response(patch.points, 24, 10),
+        response=RollingStrip(speed=20.0).response(patch.points, 24, 10),
         step=1e-4,
         scheme="linear",
         comm=MPI.COMM_SELF,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.validation.tables import Table
 
 if TYPE_CHECKING:
@@ -108,14 +108,14 @@ def table(meshes: dict[str, object], reference: str, make) -> Table:
     """
     exact = make(meshes[reference])
     cuts = {exact.touch + height: count for height, count in HEIGHTS.items()}
-    observe.say("  loads: the sequence that converges ...")
+    console.say("  loads: the sequence that converges ...")
     truth = at_heights(exact, cuts)
     rows = []
     for name, section in meshes.items():
         began = time.process_time()
         found = truth if name == reference else at_heights(make(section), dict.fromkeys(cuts, 0))
         seconds = time.process_time() - began
-        observe.say(f"  loads: {name}, {seconds:.1f} s")
+        console.say(f"  loads: {name}, {seconds:.1f} s")
         for height, one, exact_one in zip(HEIGHTS, found, truth, strict=True):
             limit = exact_one.limit.values
             off = 100 * (one.own.values / limit - 1)

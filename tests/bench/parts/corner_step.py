@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.pipeline import run_scene
 from tireroad.runs.validation.tables import Table
@@ -33,7 +33,7 @@ TURNS = 5
 def corner() -> Table:
     """Contact stages of two durations, alternately: their difference is that of the extra steps."""
     costs: dict[str, list[float]] = {name: [] for name in AXLES}
-    with tempfile.TemporaryDirectory() as folder, observe.quiet():
+    with tempfile.TemporaryDirectory() as folder, console.quiet():
         points = {name: _run(Path(folder) / name, name, SHORT)[1] for name in AXLES}
         for _ in range(TURNS):
             for name, kept in costs.items():

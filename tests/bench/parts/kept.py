@@ -10,7 +10,7 @@ from typing import Any
 from tireroad.fem.errors import ConvergenceError
 from tireroad.runs.files.disk import write_text
 from tireroad.runs.files.store import identity
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.tests.bench.parts import apart
 from tireroad.tests.bench.parts.rolling_cases import Case
 
@@ -39,16 +39,16 @@ def every_case(
         of = [identity("accuracy").code, *case.given, *settings(case)]
         known = read_kept(file, of)
         if known is None:
-            observe.say(f"  {case} ...")
+            console.say(f"  {case} ...")
             try:
                 known = apart.apart(task, case, folder / case.wheel, kept, *settings(case))
             except ConvergenceError as error:
                 failed.append(f"{case}: {error}")
-                observe.say(f"  {failed[-1]}")
+                console.say(f"  {failed[-1]}")
                 continue
             write_kept(file, of, known)
         found[case] = known
-        observe.say(f"  {case}: {told(known)}")
+        console.say(f"  {case}: {told(known)}")
     return found, failed
 
 

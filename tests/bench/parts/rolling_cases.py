@@ -18,9 +18,9 @@ from mpi4py import MPI
 
 from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.files.disk import replacing
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.scene.resolved import dumps
-from tireroad.runs.scene.tables.scene import Accuracy, Scene
+from tireroad.runs.scene.tables.scene import AccuracyTable, Scene
 from tireroad.runs.stages.pipeline import Finished, run_scene
 from tireroad.tests.bench.parts.apart import apart
 
@@ -215,7 +215,7 @@ class Driven(Recorded):
 def driven(scene: Scene, folder: Path, until: str, cache: Cache = NO_CACHE) -> Driven:
     """Run a scene without terminal output; stages are shared through a `cache`. Collective."""
     folder.mkdir(parents=True, exist_ok=True)
-    with observe.quiet():
+    with console.quiet():
         done = run_scene(
             scene, folder, MPI.COMM_WORLD, until=until, fresh=False, petsc_options=[], cache=cache
         )
@@ -227,7 +227,7 @@ def driven(scene: Scene, folder: Path, until: str, cache: Cache = NO_CACHE) -> D
 def recorded(scene: Scene, folder: Path, kept: Path, cache: Cache = NO_CACHE) -> Recorded:
     """The forces of a run in a separate process, or those stored in the folder `kept` for the same
     scene (used whatever program version computed them, until deleted)."""
-    bare = replace(scene, accuracy=Accuracy(estimate=False))
+    bare = replace(scene, accuracy=AccuracyTable(estimate=False))
     values = json.dumps(tomllib.loads(dumps(bare)), sort_keys=True)  # without the keys' comments
     file = kept / f"{hashlib.sha256(values.encode()).hexdigest()[:16]}.npz"
     if not file.exists():

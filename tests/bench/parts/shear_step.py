@@ -10,17 +10,17 @@ import numpy as np
 from mpi4py import MPI
 from scipy import sparse
 
-from tireroad.contact.grid_patch import OnPoints
+from tireroad.contact.grid_patch import PointTire
 from tireroad.contact.loop import Drive, roll
 from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.solver.projected_cg import SpreadCompliance
-from tireroad.contact.solver.stick_slip import Friction
+from tireroad.contact.solver.stick_slip import BrushFriction
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import half_space_compliance, half_space_influence
 from tireroad.contact.tread.kernel import GridPlaces, KernelTread
 from tireroad.contact.tread.shear import KernelShear, half_space_shear
 from tireroad.greens.recursion import Recursion
-from tireroad.runs.validation.cases import Strip, oval_patch
+from tireroad.runs.validation.cases import RollingStrip, oval_patch
 from tireroad.runs.validation.tables import Table
 
 STEP = 1e-4
@@ -34,7 +34,7 @@ def parts_of(shape: tuple[int, int], modes: int, horizontal: bool = False):
     """Patch, tire with `modes` complex states, tread; 500 N on an oval of about 0.1 m."""
     patch = oval_patch(shape, (0.15 / shape[0], 0.12 / shape[1]), 500.0)
     around = max(modes // 20, 2)
-    strip = Strip(speed=20.0)
+    strip = RollingStrip(speed=20.0)
     if horizontal:
         response = strip.horizontal_response(patch.points, around // 2, 10, 1e2)
         response = replace(response, residual=_local(patch.points))
@@ -55,7 +55,7 @@ def wavy(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return 2e-4 * np.minimum(np.maximum(x, 0) / 0.3, 1.0) ** 3 * np.sin(80 * x + 10 * y)
 
 
-def on_a_grid(brush: float | None, sheared: bool = False):
+def on_a_grid(brush: float | None, has_shear: bool = False):
     """The loop on a grid `FINER` times finer than the nodes that carry it, and its friction.
 
     `brush`: bristle stiffness N/m, inf if rigid, None: frictionless. `sheared`: the tread shears
@@ -82,19 +82,19 @@ def on_a_grid(brush: float | None, sheared: bool = False):
     drive = Drive(wavy, lambda t: 0.0, 20.0)
     if brush is None:
         tire = Recursion(
-            response=Strip(speed=20.0).response(patch.points, STATES // 20, 10),
+            response=RollingStrip(speed=20.0).response(patch.points, STATES // 20, 10),
             step=STEP,
             scheme="linear",
             comm=MPI.COMM_SELF,
         )
-        return roll(OnPoints(tire, weights), solver, points, drive, STEP, 10**6), None
+        return roll(PointTire(tire, weights), solver, points, drive, STEP, 10**6), None
     bristles = Brush(
         BrushLaw(brush, 0.8, (0.02, 0.01)), points.points[:, 0], points.line, 20.0, STEP
     )
     bristles.begin(points.force > 0)
-    shear = KernelShear(places, dragged) if sheared else None
-    coupling = Friction(bristles, tire.same_step, weights, shear)
-    loop = roll(OnPoints(tire, weights, 3), solver, points, drive, STEP, 1000, coupling)
+    shear = KernelShear(places, dragged) if has_shear else None
+    coupling = BrushFriction(bristles, tire.same_step, weights, shear)
+    loop = roll(PointTire(tire, weights, 3), solver, points, drive, STEP, 1000, coupling)
     return loop, coupling
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from tireroad.contact.results.energy import Motion, Work, energy_left, springs
+from tireroad.contact.results.energy import StateMotion, Work, energy_left, springs
 from tireroad.fem.turning import Turning
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import couple
@@ -45,7 +45,7 @@ def terms(tire: RollingModes, steps: int, comm=MPI.COMM_SELF, counted: RollingMo
     response = replace(response, residual=springs_of)
     step = DURATION / steps
     march, work = Recursion(response=response, step=step, scheme="linear", comm=comm), Work()
-    motion = Motion(counted or tire, response.slow(step), step)
+    motion = StateMotion(counted or tire, response.slow(step), step)
     time = step * np.arange(1, steps + 1)[:, None]
     force = (
         np.sin(np.array([90.0, 250.0, 400.0]) * time + np.array([0.0, 1.0, 2.0])) * time / DURATION

@@ -8,7 +8,7 @@ from scipy import signal
 
 from tireroad.contact.roads.kinds.iso8608 import CHUNK, CLASSES, Iso8608
 from tireroad.contact.roads.kinds.shapes import Cleat
-from tireroad.contact.roads.kinds.texture import Texture
+from tireroad.contact.roads.kinds.texture import TextureRoad
 from tireroad.contact.roads.road import make_road
 from tireroad.fem.errors import InputError
 
@@ -100,7 +100,7 @@ def test_ten_kilometres_take_no_more_memory_than_ten_metres() -> None:
 
 
 def test_texture_spectrum() -> None:
-    road = Texture(roll_off=0.02, cut_off=0.002, seed=1).make()
+    road = TextureRoad(roll_off=0.02, cut_off=0.002, seed=1).make()
     tile = road._tile(3)
     assert tile.std() == pytest.approx(2e-4)
     assert abs(tile.mean()) < 1e-12
@@ -117,12 +117,12 @@ def test_texture_spectrum() -> None:
     assert slope == pytest.approx(-3.6, abs=0.15)
     assert power[(q > 510) | ((q < 49) & (q > 0))].max() < 1e-20 * power.max()
     with pytest.raises(InputError, match="cut_off"):
-        Texture(roll_off=1.0, cut_off=1e-5)
+        TextureRoad(roll_off=1.0, cut_off=1e-5)
 
 
 @pytest.mark.slow
 def test_texture_is_continuous_repeatable_and_bounded() -> None:
-    road, again = (Texture(roll_off=0.02, cut_off=0.002, seed=1).make() for _ in range(2))
+    road, again = (TextureRoad(roll_off=0.02, cut_off=0.002, seed=1).make() for _ in range(2))
     half = 0.16
     for seam in (-half, 0.0, 3 * half):
         x = seam + np.array([-1e-9, 1e-9])
@@ -136,7 +136,7 @@ def test_texture_is_continuous_repeatable_and_bounded() -> None:
 @pytest.mark.slow
 def test_texture_never_repeats_and_keeps_its_variance_along() -> None:
     """The mean over many places of z(x) z(x + lag) is near 0 at every lag, that of z z near rms²."""
-    road = Texture(roll_off=0.02, cut_off=0.002, seed=1).make()
+    road = TextureRoad(roll_off=0.02, cut_off=0.002, seed=1).make()
     pitch = 0.0005
     x = pitch * np.arange(round(8.0 / pitch))
     rows = road.height(*np.broadcast_arrays(x, 0.029 * np.arange(20)[:, None])) / 2e-4

@@ -23,24 +23,24 @@ from tireroad.contact.results.chatter import (
 )
 from tireroad.contact.roads.kinds.shapes import Flat
 from tireroad.contact.solver.active_set import ActiveSet
-from tireroad.contact.solver.stick_slip import Friction
+from tireroad.contact.solver.stick_slip import BrushFriction
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.law import TREADS
 from tireroad.greens.recursion import Recursion, alternating
-from tireroad.runs.validation.cases import Strip, oval_patch
+from tireroad.runs.validation.cases import RollingStrip, oval_patch
 
 PATCH = oval_patch((9, 7), (0.015, 0.02), 500.0)
 TREAD = SimpleNamespace(
     law=TREADS["half-space"](youngs_modulus=3.4e8, poisson_ratio=0.49), solver="active-set"
 )
 # Light, undamped and fast: at a step of 0.2 ms two thirds of its states are static, at 0.1 ms a seventh.
-LIVELY = Strip(mass=2.0, wave_speed=150.0, speed=20.0, damping=0.0)
+LIVELY = RollingStrip(mass=2.0, wave_speed=150.0, speed=20.0, damping=0.0)
 DURATION = 0.024
 STIFF = 1e8  # N/m, of a point's bristle
 
 
 def test_alternating_forces_settle_at_what_is_said() -> None:
-    response, step = Strip(damping=3e3).response(PATCH.points, 4, 2), 1e-4
+    response, step = RollingStrip(damping=3e3).response(PATCH.points, 4, 2), 1e-4
     tire, force = (
         Recursion(response=response, step=step, scheme="linear", comm=MPI.COMM_SELF),
         np.linspace(-1.0, 2.0, 63),
@@ -55,7 +55,9 @@ def test_alternating_forces_settle_at_what_is_said() -> None:
 
 def test_a_mass_is_a_negative_spring() -> None:
     """-h^2/12 times its inverse mass: one state far slower than the step."""
-    response = Strip(lowest=1e-3, wave_speed=1e-3, damping=0.0).response(PATCH.points[:1], 0, 1)
+    response = RollingStrip(lowest=1e-3, wave_speed=1e-3, damping=0.0).response(
+        PATCH.points[:1], 0, 1
+    )
     inverse = float((response.output * response.eigenvalue @ response.input).real[0, 0])
     assert alternating(response, 1e-4)[0, 0] == pytest.approx(-1e-8 / 12 * inverse, rel=1e-6)
 
@@ -88,7 +90,7 @@ def test_two_steps_an_oscillation_blow_up_where_forces_are_linear(scheme: str, g
         return heavy.points[:, :2], heavy.half_sizes, 1.0
 
     heavy = oval_patch((5, 4), (0.015, 0.02), 1e5)
-    response = Strip(mass=0.02, damping=0.0).response(heavy.points, 3, 3)
+    response = RollingStrip(mass=0.02, damping=0.0).response(heavy.points, 3, 3)
     steps = np.array([oscillation(TREAD, heavy, response, h) for h in (1e-4, 1e-5)])
     assert steps[0] == 2.0 and steps[1] > FEWEST
     assert (largest(1e-4, scheme) > 1e3 * largest(1e-5, "linear")) == grows
@@ -109,16 +111,16 @@ def test_bristles_too_stiff_for_the_step_blow_up_where_forces_are_linear(scheme,
         )
         brush = Brush(BrushLaw(STIFF), heavy.points[:, 0], heavy.line, 0.0, step)
         brush.begin(heavy.force > 0)
-        friction = Friction(brush, tire.same_step, None)
+        friction = BrushFriction(brush, tire.same_step, None)
         drive = Drive(Flat().height, lambda t: 1e-7 * np.sin(900.0 * t), 0.0)
         run = roll(tire, solver, heavy, drive, step, 40, friction)
         return max(float(np.abs(i.horizontal).max()) for i in run)
 
     heavy, spec = (
         oval_patch((5, 4), (0.015, 0.02), 1e5),
-        SimpleNamespace(**vars(TREAD), sheared=False),
+        SimpleNamespace(**vars(TREAD), has_shear=False),
     )
-    response = Strip(mass=2.0, damping=0.0).horizontal_response(heavy.points, 3, 3, 1.0)
+    response = RollingStrip(mass=2.0, damping=0.0).horizontal_response(heavy.points, 3, 3, 1.0)
     steps = [oscillation(spec, heavy, response, h, STIFF) for h in (1e-4, 1e-5)]
     assert oscillation(spec, heavy, response, 1e-4) > FEWEST  # normal forces alone
     assert steps[0] == 2.0 and steps[1] > FEWEST

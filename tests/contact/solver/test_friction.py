@@ -10,12 +10,12 @@ from tireroad.contact.loop import Drive, Loop, roll
 from tireroad.contact.roads.kinds.shapes import Flat
 from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.solver.projected_cg import MatrixCompliance, ProjectedCG
-from tireroad.contact.solver.stick_slip import Carcass, Friction, Stiffness, stick_slip
+from tireroad.contact.solver.stick_slip import BrushFriction, Carcass, SlidingStiffness, stick_slip
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import half_space_compliance, rectangle_potential
 from tireroad.fem.errors import ConvergenceError
 from tireroad.greens.recursion import Recursion
-from tireroad.runs.validation.cases import Strip, oval_patch
+from tireroad.runs.validation.cases import RollingStrip, oval_patch
 
 PATCH = oval_patch((9, 7), (0.015, 0.02), 500.0)
 TREAD = half_space_compliance(PATCH.points[:, :2], PATCH.half_sizes, 5e6, 0.45)
@@ -27,7 +27,7 @@ def run(law, steps, speed=20.0, motion=lambda t: 0.0, tire=None, height=None, to
     count = len(PATCH.points)
     if tire is None:
         tire = Recursion(
-            response=Strip(speed=speed).horizontal_response(PATCH.points, 3, 2, 1e3),
+            response=RollingStrip(speed=speed).horizontal_response(PATCH.points, 3, 2, 1e3),
             step=STEP,
             scheme="linear",
             comm=MPI.COMM_SELF,
@@ -35,7 +35,7 @@ def run(law, steps, speed=20.0, motion=lambda t: 0.0, tire=None, height=None, to
     solver = ActiveSet(tire.same_step[:count, :count] + TREAD)
     brush = Brush(law, PATCH.points[:, 0], PATCH.line, speed, STEP)
     brush.begin(PATCH.force > 0)
-    friction = Friction(brush, tire.same_step, None, tolerance=tolerance)
+    friction = BrushFriction(brush, tire.same_step, None, tolerance=tolerance)
     drive = Drive(height or Flat().height, motion, speed)
     return (
         list(roll(tire, solver, PATCH, drive, STEP, steps, friction)),
@@ -149,9 +149,9 @@ def test_answer_is_the_same_from_any_start() -> None:
     factor = rng.standard_normal((2 * a, 2 * a))
     matrix = factor @ factor.T / a + 0.2 * np.eye(2 * a)
     constant, bound = rng.standard_normal((a, 2)), rng.random(a)
-    first = stick_slip(Stiffness(Carcass(matrix)), constant, bound, np.zeros((a, 2)))
+    first = stick_slip(SlidingStiffness(Carcass(matrix)), constant, bound, np.zeros((a, 2)))
     second = stick_slip(
-        Stiffness(Carcass(matrix)), constant, bound, 10 * rng.standard_normal((a, 2))
+        SlidingStiffness(Carcass(matrix)), constant, bound, 10 * rng.standard_normal((a, 2))
     )
     assert np.allclose(first, second, atol=1e-8)
     rate = (matrix @ first.ravel()).reshape(-1, 2) + constant
@@ -181,7 +181,7 @@ def test_cattaneo_mindlin() -> None:
         shift = 3 * friction * total / (8 * radius * shear) * (1 - (1 - share) ** (2 / 3))
         constant = np.tile([-shift, 0.0], (len(x), 1))
         force = stick_slip(
-            Stiffness(Carcass(matrix)), constant, friction * normal, np.zeros((len(x), 2))
+            SlidingStiffness(Carcass(matrix)), constant, friction * normal, np.zeros((len(x), 2))
         )
         assert force[:, 0].sum() == pytest.approx(share * friction * total, rel=0.01)
         sticks = np.linalg.norm(force, axis=1) < friction * normal * (1 - 1e-6)
@@ -205,7 +205,7 @@ def test_a_point_that_its_own_bristle_lifts_off_bears_nothing() -> None:
     for pushed, bears in ((-4e-6, False), (4e-6, True)):
         brush = Brush(BrushLaw(1e6, kind="spring"), one, np.zeros(1, int), 10.0, 1e-4)
         brush.begin(np.ones(1, bool))
-        friction, solver = Friction(brush, tire, None), ActiveSet(tire[:1, :1])
+        friction, solver = BrushFriction(brush, tire, None), ActiveSet(tire[:1, :1])
         force, t = friction.solve(solver, one - 1e-8, None, one, np.array([pushed, 0.0]))
         assert force[0] == pytest.approx(0.01 - (0.3 * t[0, 0] if bears else 0.0))
         assert (t[0, 0] != 0) == bears
@@ -219,7 +219,7 @@ def test_a_loop_goes_on_with_the_same_bits(iterative: bool, pulse: bool) -> None
     """Stopped after 40 steps and taken up by new objects: as if nothing had happened."""
     count, steps = len(PATCH.points), 80
     drive = Drive(wavy, lambda t: 0.0, 20.0)
-    response = Strip(speed=20.0).horizontal_response(PATCH.points, 3, 2, 1e3)
+    response = RollingStrip(speed=20.0).horizontal_response(PATCH.points, 3, 2, 1e3)
     response = replace(response, residual=1e-8 * np.eye(3 * count), pulse=3 * count * pulse)
 
     def loop() -> Loop:
@@ -228,7 +228,7 @@ def test_a_loop_goes_on_with_the_same_bits(iterative: bool, pulse: bool) -> None
         solver = ProjectedCG(MatrixCompliance(matrix)) if iterative else ActiveSet(matrix)
         brush = Brush(BrushLaw(1e5, 0.5, (0.02, 0.0)), PATCH.points[:, 0], PATCH.line, 20.0, STEP)
         brush.begin(PATCH.force > 0)
-        return Loop(tire, solver, Friction(brush, tire.same_step, None))
+        return Loop(tire, solver, BrushFriction(brush, tire.same_step, None))
 
     def go(loop: Loop, until: int, done: int = 0) -> list:
         parts = loop.tire, loop.solver, PATCH, drive, STEP, until, loop.friction, done

@@ -4,37 +4,37 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from tireroad.contact.loop import Drive, Driven, Solved, Together, roll
+from tireroad.contact.loop import Drive, DrivenTire, RootSolve, Solved, roll
 from tireroad.contact.solver.active_set import make_solver
 from tireroad.contact.solver.projected_cg import MatrixCompliance
-from tireroad.contact.solver.stick_slip import Friction
+from tireroad.contact.solver.stick_slip import BrushFriction
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import half_space_compliance
 from tireroad.fem.errors import ConvergenceError
 from tireroad.greens.recursion import Recursion
-from tireroad.runs.validation.cases import Strip, oval_patch
+from tireroad.runs.validation.cases import RollingStrip, oval_patch
 
 PATCH = oval_patch((13, 9), (0.012, 0.012), 500.0)
 COUNT = len(PATCH.points)
 STEP, STEPS, SPEED = 2e-4, 40, 20.0
 
 
-def rolled(comm: MPI.Comm, solver: str, rubs: bool, driven: bool = False) -> np.ndarray:
+def rolled(comm: MPI.Comm, solver: str, has_friction: bool, driven: bool = False) -> np.ndarray:
     """Forces, horizontal forces, motions and axle force of each step, (STEPS, n); `driven` as a run drives it."""
-    strip = Strip(speed=SPEED)
+    strip = RollingStrip(speed=SPEED)
     response = strip.response(PATCH.points, 6, 4, 4)
-    if rubs:
+    if has_friction:
         response = strip.horizontal_response(PATCH.points, 6, 4, 3.0)
     tire = Recursion(response=response, step=STEP, scheme="linear", comm=comm, look_ahead=True)
     tread = half_space_compliance(PATCH.points[:, :2], PATCH.half_sizes, 5e6, 0.45)
     normal = make_solver(solver, tire.same_step[:COUNT, :COUNT] + tread)
     friction = None
-    if rubs:
+    if has_friction:
         brush = Brush(BrushLaw(3e4, 0.6, (0.02, 0.01)), PATCH.points[:, 0], PATCH.line, SPEED, STEP)
         brush.begin(PATCH.force > 0)
-        friction = Friction(brush, tire.same_step, None)
+        friction = BrushFriction(brush, tire.same_step, None)
     if driven:
-        tire = Driven(tire, np.zeros((STEPS + 1, 0)), np.zeros((0, 3)))
+        tire = DrivenTire(tire, np.zeros((STEPS + 1, 0)), np.zeros((0, 3)))
     drive = Drive(lambda x, y: 1e-4 * np.sin(80 * x + 10 * y), lambda t: 0.0, SPEED)
     steps = roll(tire, normal, PATCH, drive, STEP, STEPS, friction)
     parts = ([s.force, s.horizontal.ravel(), s.moved, s.gap, s.axle_force] for s in steps)
@@ -43,7 +43,7 @@ def rolled(comm: MPI.Comm, solver: str, rubs: bool, driven: bool = False) -> np.
 
 @pytest.mark.mpi
 @pytest.mark.parametrize(
-    ("solver", "rubs", "driven"),
+    ("solver", "has_friction", "driven"),
     [
         ("active-set", False, False),
         ("active-set", True, False),
@@ -52,12 +52,12 @@ def rolled(comm: MPI.Comm, solver: str, rubs: bool, driven: bool = False) -> np.
     ],
 )
 def test_processes_find_together_what_each_finds_alone(
-    solver: str, rubs: bool, driven: bool
+    solver: str, has_friction: bool, driven: bool
 ) -> None:
     comm = MPI.COMM_WORLD
-    alone, together = (rolled(c, solver, rubs, driven) for c in (MPI.COMM_SELF, comm))
+    alone, together = (rolled(c, solver, has_friction, driven) for c in (MPI.COMM_SELF, comm))
     # Conjugate gradients end at 1e-10 of the scale, the turns of friction at 1e-8.
-    tolerance = 1e-10 if solver == "active-set" and not rubs else 1e-6
+    tolerance = 1e-10 if solver == "active-set" and not has_friction else 1e-6
     forces = np.abs(alone[:, :COUNT]).max()
     assert np.abs(together[:, :COUNT] - alone[:, :COUNT]).max() < tolerance * forces
     np.testing.assert_allclose(together, alone, atol=tolerance * forces, rtol=1e-5)
@@ -83,7 +83,7 @@ def test_what_stops_the_root_process_stops_all() -> None:
     """And a number that is not a number from one solve leaves none behind for the next. The root predicts before it solves,
     the others once they have met."""
     comm, ahead = MPI.COMM_WORLD, Looking()
-    together = Together(comm, 2, ahead)
+    together = RootSolve(comm, 2, ahead)
     force, gap = np.array([1.0, 0.0]), np.array([0.0, 2.0])
     answer = Solved(force, gap, np.zeros((0, 2)), 1e-12, 3e-13)
 

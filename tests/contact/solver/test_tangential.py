@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from tireroad.contact.solver.stick_slip import Carcass, Stiffness, gmres, stick_slip
+from tireroad.contact.solver.stick_slip import Carcass, SlidingStiffness, gmres, stick_slip
 
 
 @pytest.mark.parametrize("skew", [0.0, 1.0, 30.0])
@@ -43,7 +43,9 @@ def case(rng: np.random.Generator, points: int, nodes: int):
     weights /= weights.sum(axis=1, keepdims=True)
     lift = np.kron(weights, np.eye(2))
     dense = lift @ matrix @ lift.T + np.diag(np.repeat(spring, 2))
-    return Stiffness(Carcass(matrix, sparse.csr_matrix(weights)), spring), Stiffness(Carcass(dense))
+    return SlidingStiffness(Carcass(matrix, sparse.csr_matrix(weights)), spring), SlidingStiffness(
+        Carcass(dense)
+    )
 
 
 def test_stiffness_through_nodes_is_the_matrix() -> None:

@@ -5,7 +5,7 @@ import pytest
 
 from tireroad.contact.tread.pattern import Heights, Pattern, pitch_starts
 from tireroad.fem.errors import InputError
-from tireroad.runs.scene.tables.contact import Groove, PatternTable
+from tireroad.runs.scene.tables.contact import GrooveTable, PatternTable
 from tireroad.runs.stages.setup import make_pattern
 from tireroad.runs.validation import contact_closed_forms
 from tireroad.runs.validation.contact_closed_forms import AROUND, grooves, rolled
@@ -37,7 +37,10 @@ def test_a_slick_is_the_limit() -> None:
 def test_it_comes_again_after_one_turn_and_turns_with_the_tire() -> None:
     pattern = Pattern(
         AROUND,
-        [Groove(width=0.01, angle=30.0, span=(-0.02, 0.05)), Groove(direction="circumferential")],
+        [
+            GrooveTable(width=0.01, angle=30.0, span=(-0.02, 0.05)),
+            GrooveTable(direction="circumferential"),
+        ],
         pitch_starts(23, [1.0, 1.3], 4, AROUND),
     )
     s, y = np.meshgrid(np.linspace(0, AROUND, 400), np.linspace(-0.06, 0.06, 30), indexing="ij")
@@ -57,7 +60,7 @@ def test_pitches_in_random_order_spread_the_tone() -> None:
     assert not np.array_equal(mixed, pitch_starts(60, [1.0, 1.25, 1.5], 2, AROUND))
     s, strongest = np.arange(8192) * AROUND / 8192, []
     for starts in (even, mixed):
-        depth = Pattern(AROUND, [Groove()], starts).depth(s, 0 * s)
+        depth = Pattern(AROUND, [GrooveTable()], starts).depth(s, 0 * s)
         strongest.append(np.abs(np.fft.rfft(depth)[1:]).max())
     assert strongest[1] < 0.6 * strongest[0]
 

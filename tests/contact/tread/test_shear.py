@@ -8,15 +8,15 @@ from mpi4py import MPI
 
 from tireroad.contact.loop import Drive, Loop, roll
 from tireroad.contact.solver.active_set import ActiveSet
-from tireroad.contact.solver.stick_slip import Friction, gmres
+from tireroad.contact.solver.stick_slip import BrushFriction, gmres
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import half_space_compliance, half_space_influence
-from tireroad.contact.tread.creep import TreadMemory
 from tireroad.contact.tread.kernel import GridPlaces
 from tireroad.contact.tread.layer import LayerInfluence, LayerShear, transforms
+from tireroad.contact.tread.memory import TreadMemory
 from tireroad.contact.tread.shear import KernelShear, MatrixShear, half_space_shear
 from tireroad.greens.recursion import Recursion
-from tireroad.runs.validation.cases import Strip, oval_patch
+from tireroad.runs.validation.cases import RollingStrip, oval_patch
 
 YOUNG = 1e6
 
@@ -147,7 +147,7 @@ def test_a_loop_goes_on_with_the_same_bits_on_a_shearing_tread() -> None:
     """Half-space alone, no bristles, pressure and friction coupled; in the middle of it new objects take over."""
     patch, step, nu = oval_patch((9, 7), (0.015, 0.02), 500.0), 1e-4, 0.3
     count, steps = len(patch.points), 60
-    response = Strip(speed=20.0).horizontal_response(patch.points, 3, 2, 1e3)
+    response = RollingStrip(speed=20.0).horizontal_response(patch.points, 3, 2, 1e3)
     normal = half_space_compliance(patch.points[:, :2], patch.half_sizes, 5e6, nu)
 
     def influence(x, y, a, b):
@@ -163,7 +163,7 @@ def test_a_loop_goes_on_with_the_same_bits_on_a_shearing_tread() -> None:
             BrushLaw(np.inf, 0.5, (2e-3, 1e-3)), patch.points[:, 0], patch.line, 20.0, step
         )
         brush.begin(patch.force > 0)
-        friction = Friction(brush, tire.same_step, None, shear)
+        friction = BrushFriction(brush, tire.same_step, None, shear)
         return Loop(tire, ActiveSet(tire.same_step[:count, :count] + normal), friction)
 
     def go(one: Loop, until: int, done: int = 0) -> list:

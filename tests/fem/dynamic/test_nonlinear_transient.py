@@ -9,7 +9,7 @@ from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.matrices import probe
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
 from tireroad.fem.transient.linear import FullTire
@@ -30,7 +30,7 @@ def inflated(comm):
     body = Body(
         comm, section, compound("neo-hookean", 1200.0, youngs_modulus=4.8e6, poisson_ratio=0.45)
     )
-    Loader(Equilibrium(body), lambda progress: None).inflate(INFLATION)
+    LoadStepper(Equilibrium(body), lambda progress: None).inflate(INFLATION)
     weights = probe.spot(body.lattice, 0.0, 0.0)
     return Operators(body, INFLATION), sparse.csr_matrix(probe.directed(weights, (0.0, 0.0, 1.0)))
 

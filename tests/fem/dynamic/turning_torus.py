@@ -6,7 +6,7 @@ from scipy import sparse
 from tireroad.fem.matrices import probe
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
 from tireroad.runs.validation.cases import thesis_torus
@@ -19,7 +19,7 @@ def inflated(comm):
     section = thesis_torus(segments=12, elements_arc=4)
     material = compound("neo-hookean", 1200.0, youngs_modulus=4.8e7, poisson_ratio=0.45)
     body = Body(comm, section, material)
-    Loader(Equilibrium(body), lambda progress: None).inflate(2e5)
+    LoadStepper(Equilibrium(body), lambda progress: None).inflate(2e5)
     operators = Operators(body, 2e5)
     weights = probe.spot(body.lattice, 0.0, 0.0)
     load = sparse.csr_matrix(probe.directed(weights, (0.0, 0.0, 1.0)))

@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.press import place
 from tireroad.fem.static.road import FLAT, RoadShape
 from tireroad.fem.static.state import static_state
@@ -21,7 +21,7 @@ SHAPES = {
 def pressed(make_body, road, comm=MPI.COMM_SELF, **given):
     """(state, loader) of the tire under 1500 N, or as given."""
     equilibrium = Equilibrium(make_body(comm=comm, segments=16, footprint_size=0.3), shape=road)
-    loader = Loader(equilibrium, lambda progress: None)
+    loader = LoadStepper(equilibrium, lambda progress: None)
     loader.inflate(2e5)
     wanted = {"load": None, "deflection": None, "road_height": None} | (given or {"load": 1500.0})
     place(loader, **wanted)

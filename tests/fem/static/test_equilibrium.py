@@ -7,7 +7,7 @@ from petsc4py import PETSc
 
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.state import static_state
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.material import compound
@@ -16,7 +16,7 @@ from tireroad.fem.tire.material import compound
 def loaded(make_body, load=400.0, comm=MPI.COMM_SELF, rolling=None, **more):
     equilibrium = Equilibrium(make_body(comm=comm, **more), rolling or Rolling())
     steps = []
-    loader = Loader(equilibrium, steps.append)
+    loader = LoadStepper(equilibrium, steps.append)
     loader.inflate(2e5)
     loader.carry(load)
     return static_state(equilibrium, loader.touch), steps, loader
@@ -56,7 +56,7 @@ def test_damping_of_the_rolling_shape_tilts_the_footprint_forward(make_body):
 
 def test_the_way_to_a_deflection_does_not_matter(make_body):
     equilibrium = Equilibrium(make_body())
-    loader = Loader(equilibrium, lambda progress: None)
+    loader = LoadStepper(equilibrium, lambda progress: None)
     loader.inflate(2e5)
     loader.deflect(0.004)
     load, shape = loader.load(), equilibrium.body.u.x.array.copy()
@@ -80,7 +80,7 @@ def test_a_step_that_fails_leaves_the_state_as_it_was(make_body):
 def test_the_road_finds_its_height_for_a_load(make_body):
     """Load and height in one Newton loop; the height then gives the load back."""
     equilibrium = Equilibrium(make_body(segments=16, footprint_size=0.3))
-    loader = Loader(equilibrium, lambda progress: None)
+    loader = LoadStepper(equilibrium, lambda progress: None)
     loader.inflate(2e5)
     loader.deflect(0.002)
     step = equilibrium.solve(equilibrium.road_height, load=1.3 * loader.load())
@@ -112,7 +112,7 @@ def test_a_factorisation_out_of_memory_says_so(make_body):
 
 
 def test_no_load_below_zero(make_body):
-    loader = Loader(Equilibrium(make_body(segments=8, arc=2)), lambda progress: None)
+    loader = LoadStepper(Equilibrium(make_body(segments=8, arc=2)), lambda progress: None)
     loader.inflate(0.0)
     with pytest.raises(InputError, match="positive load"):
         loader.carry(-1.0)

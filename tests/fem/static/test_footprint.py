@@ -5,7 +5,7 @@ import pytest
 
 from tireroad.fem.compat import field_nodes
 from tireroad.fem.static.footprint import Footprint, evenness, footprint, nodal_area
-from tireroad.fem.tire.mesh import Lattice, Torus, _edge
+from tireroad.fem.tire.mesh import NodeGrid, Torus, _edge
 
 A, B = 0.03, 0.02  # m, half axes of the known footprint
 
@@ -26,7 +26,7 @@ def plane():
             order=order,
             grading="uniform",
         )
-        lattice = Lattice(section, _edge(field_nodes(order)))
+        lattice = NodeGrid(section, _edge(field_nodes(order)))
         x = 0.05 * (np.where(lattice.ring > np.pi, lattice.ring - 2 * np.pi, lattice.ring))
         grid = np.stack(np.meshgrid(x, 0.05 * lattice.arc, [0.0], indexing="ij"), axis=-1)
         return lattice, grid.reshape(-1, 3)

@@ -9,9 +9,9 @@ from mpi4py import MPI
 from tireroad.fem.sections.grid import PlyLine
 from tireroad.fem.static import load_steps
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.symmetric import looks_the_same
-from tireroad.fem.static.tangent import HeldSystem
+from tireroad.fem.static.tangent import ConstrainedSystem
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.cords import Cords
 from tireroad.fem.tire.material import compound
@@ -30,8 +30,8 @@ def _tire(make_body, comm=MPI.COMM_SELF):
     return make_body(segments=8, material=SOFT, plies=plies, cords=cords, comm=comm)
 
 
-def _loaded(body, rolling=AT_REST) -> Loader:
-    loader = Loader(Equilibrium(body, rolling), lambda progress: None)
+def _loaded(body, rolling=AT_REST) -> LoadStepper:
+    loader = LoadStepper(Equilibrium(body, rolling), lambda progress: None)
     loader.inflate(PRESSURE)
     loader.carry(LOAD)
     return loader
@@ -42,9 +42,11 @@ def _loaded(body, rolling=AT_REST) -> Loader:
 def test_half_the_ring_finds_the_state_of_the_whole(make_body, monkeypatch, rolling):
     """Displacement, force of every node and deflection; the whole factorises no tangent of its own, inflated or loaded."""
     taken, factorised = [], []
-    take = HeldSystem.take
+    take = ConstrainedSystem.take
     monkeypatch.setattr(
-        HeldSystem, "take", lambda *given: factorised.append(given[1].getSize()[0]) or take(*given)
+        ConstrainedSystem,
+        "take",
+        lambda *given: factorised.append(given[1].getSize()[0]) or take(*given),
     )
     resume = Equilibrium.resume
     monkeypatch.setattr(
@@ -79,7 +81,7 @@ def test_a_curve_by_halves_is_that_of_the_whole(make_body, monkeypatch):
     """Loads at three deflections, and what the whole finds out of balance between them: nothing."""
 
     def loads():
-        loader = Loader(Equilibrium(_tire(make_body), AT_REST), lambda progress: None)
+        loader = LoadStepper(Equilibrium(_tire(make_body), AT_REST), lambda progress: None)
         loader.inflate(PRESSURE)
         return [loader.load() for _ in loader.visit((1e-3, 2e-3, 4e-3))]
 

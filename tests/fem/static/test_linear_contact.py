@@ -6,7 +6,7 @@ from mpi4py import MPI
 
 from tireroad.fem.static import tangent
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.tangent import LinearContact, held_step
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.material import compound
@@ -18,7 +18,7 @@ ROLLING = Rolling(speed=40.0, damping=2000.0, stiffness_damping=0.0)
 
 def inflated(make_body, comm=MPI.COMM_SELF, rolling=AT_REST):
     body = make_body(segments=9, material=SOFT, comm=comm)
-    loader = Loader(Equilibrium(body, rolling), lambda _: None)
+    loader = LoadStepper(Equilibrium(body, rolling), lambda _: None)
     loader.inflate(1.5e5)
     return loader
 
@@ -44,13 +44,13 @@ def test_columns_are_as_good_as_a_factorisation(make_body, monkeypatch, load, ro
     some, others = gap < level[5], (gap > level[1]) & (gap < level[9])  # in the factor, in the step
     out = problem._assemble_residual().copy()
     system = taken(problem, others)
-    wanted = held_step(problem.body.comm, system, road, (out, system.closing, load))
+    wanted = held_step(problem.body.comm, system, road, (out, system.gap_closure, load))
     reaction, rise, road.height = wanted[1], road.height - height, height
     monkeypatch.setattr(tangent, "_ROUNDS", 0)
     system = taken(problem, some)
     contact = LinearContact(problem.body.comm, system, road)
     road.active = others.copy()
-    found = contact.step(out, system.closing, load)
+    found = contact.step(out, system.gap_closure, load)
     everywhere = problem.body.comm.allreduce(abs(wanted[0]).max(), op=MPI.MAX)
     np.testing.assert_allclose(found[0], wanted[0], atol=1e-9 * everywhere)
     np.testing.assert_allclose(found[1], reaction, rtol=1e-7, atol=1e-6)
@@ -69,7 +69,7 @@ def test_the_step_leaves_no_node_pulled_and_none_below_the_road(make_body):
     system = taken(problem, road.gap() < 0)
     before = int(road.active.sum())
     motion, reaction = LinearContact(problem.body.comm, system, road).step(
-        out, system.closing, None
+        out, system.gap_closure, None
     )
     gap = road.gap() + motion[road.dofs]
     assert 0 < road.active.sum() < before  # what penetrates is more than what will touch

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.press import Near, place
 from tireroad.fem.static.road import FLAT, RoadShape
 from tireroad.fem.static.state import static_state
@@ -19,7 +19,7 @@ WANTED = {"load": None, "deflection": None, "road_height": None}
 def pressed(body, speed, road, near=None, **given):
     """(state, what the next can start from, the loads told) of a tire that turns."""
     told = []
-    loader = Loader(Equilibrium(body, Rolling(speed=speed, damping=200.0), road), told.append)
+    loader = LoadStepper(Equilibrium(body, Rolling(speed=speed, damping=200.0), road), told.append)
     loader.inflate(2e5, near and near.inflated)
     place(loader, **WANTED | given, near=near)
     state = static_state(loader.equilibrium, loader.touch)

@@ -11,7 +11,7 @@ from tireroad.fem.matrices.operators import Operators, rigid_motions
 from tireroad.fem.matrices.road_stiffness import road_stiffness
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.load_curve import load_curve, slopes
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import LoadStepper
 
 pytestmark = pytest.mark.slow
 
@@ -19,7 +19,7 @@ PRESSURE = 2e5
 
 
 def loaded(body, deflection):
-    loader = Loader(Equilibrium(body), lambda progress: None)
+    loader = LoadStepper(Equilibrium(body), lambda progress: None)
     loader.inflate(PRESSURE)
     loader.deflect(deflection)
     return loader
@@ -40,7 +40,7 @@ def stiffness(loader):
 def test_curve_is_that_of_single_runs_and_its_tangent_that_of_differences(make_body):
     """Loads as from runs of their own; the slope against central differences of 0.1 mm steps."""
     tire = {"segments": 16, "arc": 6, "footprint_size": 0.4}
-    loader = Loader(Equilibrium(make_body(**tire)), lambda progress: None)
+    loader = LoadStepper(Equilibrium(make_body(**tire)), lambda progress: None)
     loader.inflate(PRESSURE)
     wanted = [0.004, 0.0079, 0.008, 0.0081]
     curve = load_curve(loader, wanted)

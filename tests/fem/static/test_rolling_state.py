@@ -8,7 +8,7 @@ from tireroad.fem.matrices.direct import solve_all
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.matrices.probe import nodes
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.state import static_state
 from tireroad.fem.static.virtual_work import Rolling
 
@@ -24,7 +24,7 @@ def test_a_little_more_load_moves_it_as_the_rotating_stiffness_says(make_body, i
     equilibrium = Equilibrium(
         body, Rolling(speed=SPEED, damping=DAMPING, stiffness_damping=0.0, inertia=inertia)
     )
-    loader = Loader(equilibrium, lambda progress: None)
+    loader = LoadStepper(equilibrium, lambda progress: None)
     loader.inflate(INFLATION)
     loader.deflect(0.006)
     before = static_state(equilibrium, loader.touch)
@@ -57,7 +57,7 @@ def test_without_centrifugal_forces_a_round_tire_does_not_grow(make_body) -> Non
         "full": Rolling(speed=150.0, damping=500.0),
     }.items():
         equilibrium = Equilibrium(make_body(segments=24), rolling)
-        loader = Loader(equilibrium, lambda progress: None)
+        loader = LoadStepper(equilibrium, lambda progress: None)
         loader.inflate(INFLATION)
         crown[name] = -loader.touch
     grown = crown["full"] - crown["rest"]

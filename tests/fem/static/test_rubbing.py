@@ -7,7 +7,7 @@ import pytest
 
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.friction_press import Friction
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.press import place
 from tireroad.fem.static.road import FLAT
 from tireroad.fem.static.state import static_state
@@ -20,7 +20,7 @@ TURNING = Rolling(speed=40.0)
 
 def pressed(body, friction, rolling=AT_REST, road=FLAT):
     """(state, loader) of a torus under LOAD."""
-    loader = Loader(Equilibrium(body, rolling, road), lambda progress: None)
+    loader = LoadStepper(Equilibrium(body, rolling, road), lambda progress: None)
     loader.inflate(2e5)
     loader = place(loader, LOAD, None, None, friction)
     return static_state(loader.equilibrium, loader.touch), loader

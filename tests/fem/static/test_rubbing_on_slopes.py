@@ -7,7 +7,7 @@ from petsc4py import PETSc
 
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.friction_press import Friction
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.press import place
 from tireroad.fem.static.road import FLAT, RoadShape
 from tireroad.fem.static.state import static_state
@@ -30,10 +30,10 @@ def pressed(make_body):
 
     def press(road=FLAT, rolling=AT_REST, friction=FRICTION, comm=MPI.COMM_SELF, **more):
         body = make_body(segments=12, arc=6, footprint_size=0.25, comm=comm)
-        loader = Loader(Equilibrium(body, rolling, road), lambda progress: None)
+        loader = LoadStepper(Equilibrium(body, rolling, road), lambda progress: None)
         loader.inflate(2e5)
-        rubs = friction and Friction(**({"coefficient": friction, "steps": 3} | more))
-        loader = place(loader, LOAD, None, None, rubs)
+        has_friction = friction and Friction(**({"coefficient": friction, "steps": 3} | more))
+        loader = place(loader, LOAD, None, None, has_friction)
         return static_state(loader.equilibrium, loader.touch), loader
 
     return press

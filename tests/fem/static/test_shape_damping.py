@@ -9,7 +9,7 @@ from scipy.sparse.linalg import eigs
 from tireroad.fem.static import shape_damping
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.friction_press import Friction
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.press import place
 from tireroad.fem.static.road import FLAT, RoadShape
 from tireroad.fem.static.virtual_work import Rolling
@@ -59,7 +59,7 @@ def test_the_state_is_that_of_the_complete_tangent(make_body, monkeypatch, road)
         monkeypatch.setattr(shape_damping, "_WEAK", weak)
         equilibrium = problem(make_body, 1.2e-3, road, MPI.COMM_WORLD)
         assert (equilibrium.lag > 0.5) == (weak > 0)
-        loader = Loader(equilibrium, lambda progress: None)
+        loader = LoadStepper(equilibrium, lambda progress: None)
         loader.inflate(2e5)
         place(loader, 800.0, None, None)
         body = equilibrium.body
@@ -78,7 +78,7 @@ def test_what_a_step_with_friction_gains_is_that_of_the_complete_tangent(
     found = []
     for weak in (shape_damping._WEAK, 0.0):
         monkeypatch.setattr(shape_damping, "_WEAK", weak)
-        loader = Loader(problem(make_body, 1.2e-3), lambda progress: None)
+        loader = LoadStepper(problem(make_body, 1.2e-3), lambda progress: None)
         loader.inflate(2e5)
         friction = Friction(coefficient=0.5, radius=0.31, slip=(0.01, 0.005))
         rubbing = place(loader, 800.0, None, None, friction).equilibrium

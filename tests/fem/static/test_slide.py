@@ -10,7 +10,7 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.road_stiffness import road_stiffness
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.friction_press import Friction, Slide
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.press import place
 from tireroad.fem.static.road import FLAT, RoadShape
 from tireroad.fem.static.state import static_state
@@ -25,7 +25,7 @@ TILTED = RoadShape(camber=np.radians(3.0), drum_radius=0.85)
 def pressed(make_body):
     def press(rolling=AT_REST, road=FLAT, friction=FRICTION, comm=MPI.COMM_SELF):
         body = make_body(segments=12, arc=6, footprint_size=0.25, comm=comm)
-        loader = Loader(Equilibrium(body, rolling, road), lambda progress: None)
+        loader = LoadStepper(Equilibrium(body, rolling, road), lambda progress: None)
         loader.inflate(2e5)
         loader = place(loader, LOAD, None, None, Friction(coefficient=friction, steps=3))
         return body, static_state(loader.equilibrium, loader.touch)
@@ -132,7 +132,7 @@ def test_a_state_is_found_again_at_once(pressed) -> None:
 
 def test_a_state_without_friction_has_no_slide(make_body) -> None:
     body = make_body()
-    loader = Loader(Equilibrium(body), lambda progress: None)
+    loader = LoadStepper(Equilibrium(body), lambda progress: None)
     loader.inflate(2e5)
     loader.deflect(0.005)
     with pytest.raises(InputError, match="with friction"):

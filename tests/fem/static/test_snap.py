@@ -5,8 +5,8 @@ import pytest
 from mpi4py import MPI
 
 from tireroad.fem.static import load_steps
-from tireroad.fem.static.equilibrium import Equilibrium, Step
-from tireroad.fem.static.load_steps import Loader, Show, march
+from tireroad.fem.static.equilibrium import Equilibrium, SolveOutcome
+from tireroad.fem.static.load_steps import LoadStepper, Show, march
 from tireroad.fem.tire.material import compound
 
 SOFT = compound("neo-hookean", 1100.0, youngs_modulus=5e6, poisson_ratio=0.49)
@@ -16,7 +16,7 @@ DEEP = 0.03  # m
 @pytest.fixture
 def loader(make_body):
     body = make_body(segments=9, material=SOFT, comm=MPI.COMM_WORLD)
-    loader = Loader(Equilibrium(body), lambda _: None)
+    loader = LoadStepper(Equilibrium(body), lambda _: None)
     loader.inflate(1.5e5)
     return loader
 
@@ -59,11 +59,11 @@ def test_a_march_falls_where_small_steps_fail_and_goes_on_by_steps():
     def attempt(target):
         asked.append(target)
         good = target < 0.4 or bool(fallen)
-        return Step(good, 3, 0.0, "converged" if good else "circles")
+        return SolveOutcome(good, 3, 0.0, "converged" if good else "circles")
 
     def fall(target):
         fallen.append(target)
-        return Step(True, 20, 0.0, "snapped through")
+        return SolveOutcome(True, 20, 0.0, "snapped through")
 
     march(attempt, 0.0, 1.0, 0.3, Show("deflection", 1.0, "m"), fall)
     assert len(fallen) == 1 and 0.4 <= fallen[0] < 0.5
@@ -76,7 +76,7 @@ def test_a_march_goes_either_way():
 
     def attempt(target):
         asked.append(target)
-        return Step(True, 30, 0.0, "converged")
+        return SolveOutcome(True, 30, 0.0, "converged")
 
     march(attempt, 0.0, -1.0, 0.3, Show("deflection", 1.0, "m"))
     assert asked == pytest.approx([-0.3, -0.6, -0.9, -1.0])

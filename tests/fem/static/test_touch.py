@@ -5,8 +5,8 @@ import pytest
 
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.footprint import TreadSurface
-from tireroad.fem.static.load_steps import Loader
-from tireroad.fem.tire.mesh import Lattice, position
+from tireroad.fem.static.load_steps import LoadStepper
+from tireroad.fem.tire.mesh import NodeGrid, position
 from tireroad.runs.validation.cases import thesis_torus
 
 
@@ -23,7 +23,7 @@ def test_the_lowest_point_of_a_turned_wheel(order, turn):
     for segments in (16, 32):
         section = thesis_torus(segments=segments, elements_arc=segments // 2, order=order)
         edge = {1: [0, 1], 2: [0, 0.5, 1], 3: [0, 0.27639320225, 0.72360679775, 1]}[order]
-        lattice = Lattice(section, np.array(edge))
+        lattice = NodeGrid(section, np.array(edge))
         ring, arc = np.meshgrid(lattice.ring, lattice.arc, indexing="ij")
         face = torus(ring.ravel() + turn * 2 * np.pi / segments, arc.ravel())
         errors.append(abs(TreadSurface(lattice, face).lowest() + 0.32))
@@ -34,7 +34,7 @@ def test_the_lowest_point_of_a_turned_wheel(order, turn):
 def test_no_place_on_the_face_is_lower():
     rng = np.random.default_rng(3)
     section = thesis_torus(segments=12, elements_arc=6, order=3)
-    lattice = Lattice(section, np.array([0, 0.27639320225, 0.72360679775, 1]))
+    lattice = NodeGrid(section, np.array([0, 0.27639320225, 0.72360679775, 1]))
     ring, arc = np.meshgrid(lattice.ring, lattice.arc, indexing="ij")
     face = torus(ring.ravel(), arc.ravel())
     surface = TreadSurface(lattice, face + 5e-4 * rng.standard_normal(face.shape))
@@ -45,7 +45,7 @@ def test_no_place_on_the_face_is_lower():
 @pytest.mark.slow
 def test_a_tire_whose_crown_is_no_node_touches_below_its_nodes(make_body):
     equilibrium = Equilibrium(make_body(order=3, segments=8, arc=5))
-    loader = Loader(equilibrium, lambda progress: None)
+    loader = LoadStepper(equilibrium, lambda progress: None)
     loader.inflate(2e5)
     assert loader.touch < equilibrium.road.tread_height().min() - 1e-5
     loader.carry(50.0)
@@ -54,7 +54,7 @@ def test_a_tire_whose_crown_is_no_node_touches_below_its_nodes(make_body):
 
 def test_a_tread_wide_for_its_height_is_found_to_its_ends():
     """Beyond 75 degrees of the section too, where it still faces down; not where it has turned up."""
-    lattice = Lattice(thesis_torus(segments=32, elements_arc=12, order=2), np.array([0, 0.5, 1]))
+    lattice = NodeGrid(thesis_torus(segments=32, elements_arc=12, order=2), np.array([0, 0.5, 1]))
     ring, arc = (part.ravel() for part in np.meshgrid(lattice.ring, lattice.arc, indexing="ij"))
     end = lattice.arc.max()
     assert end > np.radians(85)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tireroad.fem.errors import ConvergenceError
-from tireroad.fem.static.equilibrium import Step
-from tireroad.fem.static.load_steps import Loader, Way
+from tireroad.fem.static.equilibrium import SolveOutcome
+from tireroad.fem.static.load_steps import LoadPath, LoadStepper
 from tireroad.fem.static.virtual_work import AT_REST
 
 # As measured on a torus of 16 x 6 elements: m, N. Its wall folds at 0.094 m.
@@ -23,7 +23,7 @@ class MadeUp:
     """
 
     touch, rounding, farthest, rolling = 0.0, 0.0, 0.13, AT_REST
-    march, _seen = Loader.march, Loader._seen
+    march, _seen = LoadStepper.march, LoadStepper._seen
 
     def __init__(self, curve) -> None:
         self.curve, self.equilibrium, self.body = curve, self, self
@@ -32,13 +32,13 @@ class MadeUp:
         self.road = SimpleNamespace(kept=lambda: None, put_back=lambda kept: None)
         self.road_height, self.newton_steps, self.visited = 0.0, 0, []
 
-    def solve(self, height, load=None, allowed=0.0) -> Step:
+    def solve(self, height, load=None, allowed=0.0) -> SolveOutcome:
         field = self.u.x.array
         if load is not None or not abs(field[0] ** 2 - height) <= REACH:
-            return Step(False, 25, 1.0, "circles")
+            return SolveOutcome(False, 25, 1.0, "circles")
         field[0], self.road_height = np.sqrt(height), height
         self.visited.append(height)
-        return Step(True, 9, 0.0, "converged")  # not easy enough for steps to grow
+        return SolveOutcome(True, 9, 0.0, "converged")  # not easy enough for steps to grow
 
     def predict(self, height) -> bool:
         return False
@@ -57,7 +57,7 @@ def snapping(deflection):
 def test_a_load_is_met_where_the_curve_first_crosses_it(load):
     """60 kN ended by a division by zero: the bracket reached from behind the snap to before it."""
     tire = MadeUp(snapping)
-    found = Way(tire).carry(load)
+    found = LoadPath(tire).carry(load)
     rising = LOAD.index(max(LOAD)) + 1
     assert found == pytest.approx(np.interp(load, LOAD[:rising], DEFLECTION[:rising]), rel=1e-8)
     assert found == tire.road_height and tire.load() == pytest.approx(load, rel=1e-9)
@@ -66,7 +66,7 @@ def test_a_load_is_met_where_the_curve_first_crosses_it(load):
 
 def test_a_load_above_the_peak_is_said_with_the_fall():
     with pytest.raises(ConvergenceError, match="out of reach; the load falls.*static.deflection"):
-        Way(MadeUp(snapping)).carry(70e3)
+        LoadPath(MadeUp(snapping)).carry(70e3)
 
 
 def test_a_load_that_the_curve_jumps_over_is_said_at_once():
@@ -78,13 +78,13 @@ def test_a_load_that_the_curve_jumps_over_is_said_at_once():
 
     tire = MadeUp(curve)
     with pytest.raises(ConvergenceError, match=r"where it jumps.*snap-through.*static\.deflection"):
-        Way(tire).carry(60e3)
+        LoadPath(tire).carry(60e3)
     assert len(tire.visited) < 80
 
 
 def test_a_deflection_that_is_visited_twice_is_solved_twice():
     tire = MadeUp(snapping)
-    way = Way(tire)
+    way = LoadPath(tire)
     for deflection in (0.0, 0.0, 0.01, 0.01, 0.02):
         way.to(deflection)
     assert tire.road_height == 0.02

@@ -88,10 +88,10 @@ def test_moduli_are_the_curvature_of_the_energy(model):
         total = sum(law.energy(deformed.T * deformed, *numbers))
         return fem.assemble_scalar(compat.form(total * ufl.dx(cube, degree=0)))
 
-    sheared, stretched, e = np.eye(3), np.eye(3) * (1 + 1e-4), 1e-4
-    sheared[0, 1] = e
+    has_shear, stretched, e = np.eye(3), np.eye(3) * (1 + 1e-4), 1e-4
+    has_shear[0, 1] = e
     at_rest = energy(np.eye(3))
-    assert energy(sheared) - at_rest == pytest.approx(law.shear * e**2 / 2, rel=1e-3)
+    assert energy(has_shear) - at_rest == pytest.approx(law.shear * e**2 / 2, rel=1e-3)
     assert energy(stretched) - at_rest == pytest.approx(9 * law.bulk * e**2 / 2, rel=1e-3)
     assert law.youngs == pytest.approx(2 * law.shear * (1 + law.poisson), rel=1e-12)
 

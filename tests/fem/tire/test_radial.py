@@ -128,9 +128,9 @@ def test_two_lines_of_cords_of_one_name_are_refused(tmp_path):
 def test_ranges_are_those_of_a_scene():
     """But for the density of a compound, which a scene knows in kg/m3."""
     from tireroad.fem.sections.section_file import COMPOUND_RANGES, CORD_RANGES
-    from tireroad.runs.scene.tables.tire import Cords
+    from tireroad.runs.scene.tables.tire import CordsTable
 
-    keys = {name: key_of(item) for name, item in Cords.__dataclass_fields__.items()}
+    keys = {name: key_of(item) for name, item in CordsTable.__dataclass_fields__.items()}
     for name, (least, most) in CORD_RANGES.items():
         assert (keys[name].limits.least, keys[name].limits.most) == (least, most), name
     assert COMPOUND_RANGES["youngs_modulus"] == CORD_RANGES["youngs_modulus"]

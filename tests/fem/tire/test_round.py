@@ -7,8 +7,8 @@ from mpi4py import MPI
 from tireroad.fem.errors import LoadingStopped
 from tireroad.fem.sections.grid import PlyLine
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.load_steps import Loader
-from tireroad.fem.static.symmetric import RoundEquilibrium, inflated
+from tireroad.fem.static.load_steps import LoadStepper
+from tireroad.fem.static.symmetric import AxisymmetricEquilibrium, inflated
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.cords import Cords
 from tireroad.fem.tire.material import compound
@@ -43,8 +43,8 @@ def belted(make_body):
     return make
 
 
-def _loader(body) -> Loader:
-    return Loader(Equilibrium(body, ROLLING), lambda progress: None)
+def _loader(body) -> LoadStepper:
+    return LoadStepper(Equilibrium(body, ROLLING), lambda progress: None)
 
 
 @pytest.mark.slow
@@ -72,8 +72,8 @@ def test_any_number_of_processes_inflates_alike(belted):
     np.testing.assert_allclose(shared.body.displacement(), wanted, atol=1e-10 * abs(wanted).max())
 
 
-def _inflate(section: RoundEquilibrium) -> None:
-    Loader(section, lambda progress: None)._inflate_in_steps(PRESSURE)
+def _inflate(section: AxisymmetricEquilibrium) -> None:
+    LoadStepper(section, lambda progress: None)._inflate_in_steps(PRESSURE)
 
 
 @pytest.mark.slow
@@ -81,7 +81,7 @@ def test_a_tire_that_does_not_inflate_while_it_turns_turns_when_it_is_inflated(b
     """Steps of pressure stop at 0 Pa at 150 rad/s; the state is that to which steps of the speed lead from rest."""
     body, tried = belted(), []
 
-    def inflate(section: RoundEquilibrium) -> None:
+    def inflate(section: AxisymmetricEquilibrium) -> None:
         tried.append(section.rolling.speed)
         _inflate(section)
 
@@ -90,7 +90,7 @@ def test_a_tire_that_does_not_inflate_while_it_turns_turns_when_it_is_inflated(b
     assert found.out_of_balance() < 1e-9 * found.force_scale
     wanted = np.zeros_like(found.body.u.x.array)
     for speed in (0.0, 60.0, 100.0, 125.0, 150.0):
-        section = RoundEquilibrium(body, Rolling(speed=speed))
+        section = AxisymmetricEquilibrium(body, Rolling(speed=speed))
         section.body.u.x.array[:] = wanted
         _inflate(section)
         wanted = section.body.u.x.array.copy()
@@ -101,7 +101,7 @@ def test_a_tire_that_does_not_inflate_while_it_turns_turns_when_it_is_inflated(b
 def test_what_does_not_inflate_at_rest_is_an_error(belted, rolling, tried):
     speeds = []
 
-    def stops(section: RoundEquilibrium) -> None:
+    def stops(section: AxisymmetricEquilibrium) -> None:
         speeds.append(section.rolling.speed)
         raise LoadingStopped("static: stops")
 

@@ -7,7 +7,7 @@ import pytest
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections import mesh2d
-from tireroad.fem.sections.grid import Patch, PlyLine, corners
+from tireroad.fem.sections.grid import PlyLine, RegionPatch, corners
 from tireroad.fem.sections.torus import Torus
 from tireroad.runs.validation.cases import thesis_torus
 
@@ -56,7 +56,7 @@ def test_without_an_exact_shape_a_raised_order_is_the_same_shape():
 @pytest.mark.parametrize("layers", [1, 2, 5])
 def test_a_region_has_its_area_on_every_mesh(arc, layers):
     """Closed form of the annular sector; edges at 0 and 45 degrees are no corners of plain meshes."""
-    sector = Patch("tread", ((0.0, np.radians(45)),), (0.4, 1.0))
+    sector = RegionPatch("tread", ((0.0, np.radians(45)),), (0.4, 1.0))
     mesh = torus(3, arc, layers).section([sector])
     low = 0.088 + 0.4 * 0.012
     expected = np.radians(45) * (0.1**2 - low**2) / 2

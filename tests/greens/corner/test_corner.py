@@ -15,7 +15,7 @@ from tireroad.fem.matrices.compliance import on_own_rows
 from tireroad.fem.matrices.operators import Operators, Support, rigid_motions
 from tireroad.fem.matrices.rim_motion import rim_motion
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.load_steps import Loader
+from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
@@ -45,7 +45,7 @@ def body(speed: float) -> Body:
         thesis_torus(segments=8, elements_arc=2),
         RUBBER,
     )
-    loader = Loader(Equilibrium(made, Rolling(speed=speed)), lambda progress: None)
+    loader = LoadStepper(Equilibrium(made, Rolling(speed=speed)), lambda progress: None)
     loader.inflate(2e5)
     loader.deflect(0.01)
     return made
@@ -128,8 +128,8 @@ def dense_receptance(speed: float, axle: Axle) -> np.ndarray:
     moved[:6, n : n + 6], moved[6, -1] = rim, 1.0
     stiffness = everywhere(held.stiffness).toarray()
     drag = DAMPING[0] * np.diag(held.mass) + DAMPING[1] * stiffness
-    D = against.T @ drag @ against + moved.T @ axle.joined(axle.damping) @ moved
-    K = moved.T @ axle.joined(axle.stiffness) @ moved
+    D = against.T @ drag @ against + moved.T @ axle.between_wheel_and_body(axle.damping) @ moved
+    K = moved.T @ axle.between_wheel_and_body(axle.stiffness) @ moved
     K[:-1, :-1] += everywhere(free.stiffness).toarray()
     if speed:
         turning, rate = free.rotation(), everywhere(held.rotation().body).toarray()

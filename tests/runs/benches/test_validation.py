@@ -7,7 +7,7 @@ from tireroad.contact.loop import Loop, roll
 from tireroad.contact.model import step_solver
 from tireroad.contact.results.spectra import distance
 from tireroad.runs.validation import closed_forms, passenger, rolling, schemes
-from tireroad.runs.validation.full_elements import Choice, Comparison, History, Tires, follow
+from tireroad.runs.validation.full_elements import Choice, Comparison, FullHistory, Tires, follow
 from tireroad.runs.validation.moved_road import SCENE
 from tireroad.runs.validation.tables import modules
 
@@ -35,8 +35,8 @@ def test_what_lies_above_the_band_does_not_count_nor_fold_down() -> None:
     assert distance(signal(5e-5), signal(2.5e-5, fast=3.0), DURATION).mean < 1e-3
 
 
-def made(step: float, amplitude: float, seconds: float) -> History:
-    return History(step, {"contact force": signal(step, amplitude)}, seconds, 0.1)
+def made(step: float, amplitude: float, seconds: float) -> FullHistory:
+    return FullHistory(step, {"contact force": signal(step, amplitude)}, seconds, 0.1)
 
 
 def test_the_fastest_run_within_an_error_is_held_against_full_elements_within_it() -> None:
@@ -140,8 +140,8 @@ def test_the_passenger_tire_is_compared_band_by_band() -> None:
     """A row a band, a column a history: forces a tenth larger are 0.83 dB off, and the worst is said."""
     step, random = 2e-4, np.random.default_rng(3).standard_normal((2000, 3))
 
-    def history(axle: float) -> History:
-        return History(step, {"contact force": random, "axle force": axle * random}, 0.8, 0.0)
+    def history(axle: float) -> FullHistory:
+        return FullHistory(step, {"contact force": random, "axle force": axle * random}, 0.8, 0.0)
 
     table = passenger.compared_table("tire", {"252 modes": history(1.1)}, history(1.0))
     assert [name for name, _ in table.columns] == ["force", "band", "252 modes"]

@@ -11,7 +11,7 @@ import pytest
 from tireroad.runs.files.disk import signed, write_text
 from tireroad.runs.files.folder import Summary
 from tireroad.runs.scene.resolved import dumps
-from tireroad.runs.search.journal import Journal, Trial
+from tireroad.runs.search.journal import SearchJournal, Trial
 from tireroad.runs.search.settings import Ladders, applied
 from tireroad.runs.sweep.definition import Sweep, read
 from tireroad.runs.sweep.page import gather, write
@@ -94,7 +94,7 @@ def test_a_search_leaves_the_scene_that_it_chose(folder: Path) -> None:
     for member, summary in zip(sweep.members, begin(sweep, folder), strict=True):
         scene, own = sweep.load(member), folder / "members" / member.name
         settings = Ladders.of(scene).first()
-        Journal(own, scene).add(Trial(settings, {}, 1.0, failed="no error bars"))
+        SearchJournal(own, scene).add(Trial(settings, {}, 1.0, failed="no error bars"))
         chosen = dumps(applied(scene, settings))
         finish(Summary(own, member.name, 1, chosen))
         if summary.path.parent.name == sweep.members[0].name:  # the other misses its target

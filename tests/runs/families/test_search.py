@@ -11,13 +11,13 @@ from wanted_scene import SCENE
 from tireroad.contact.results.error_bars import orders
 from tireroad.fem.errors import ConvergenceError
 from tireroad.runs.files.folder import check_kept_scene
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.process.signals import Stopped
 from tireroad.runs.scene.estimate import estimate
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.sections.kinds import torus
 from tireroad.runs.search import search as searching
-from tireroad.runs.search.journal import Found, Journal, Trial, to_resume, worst
+from tireroad.runs.search.journal import ErrorsByCause, SearchJournal, Trial, to_resume, worst
 from tireroad.runs.search.search import Search
 from tireroad.runs.search.settings import CAUSES, MARGIN, Ladders, Settings, applied, size_ratio
 
@@ -39,7 +39,7 @@ def modelled(scene, settings: Settings) -> Trial:
         for cause in CAUSES
     }
     seconds = estimate(applied(scene, settings)).work
-    found = Found(history, dict.fromkeys(CAUSES, 0.0), (), dict.fromkeys(CAUSES, ()))
+    found = ErrorsByCause(history, dict.fromkeys(CAUSES, 0.0), (), dict.fromkeys(CAUSES, ()))
     return Trial(settings, seconds, sum(seconds.values()), found, "linear")
 
 
@@ -59,7 +59,7 @@ def search(file, monkeypatch):
 
     def started(*sets: str):
         (file.parent / "out").mkdir(exist_ok=True)
-        with observe.quiet():
+        with console.quiet():
             Search(load(file, sets), file.parent / "out", MPI.COMM_SELF, []).run()
 
     return started, tried, final
@@ -206,7 +206,7 @@ def test_a_tiny_tire_from_its_scene_to_its_results(file, monkeypatch) -> None:
 
     def started(*sets: str) -> None:
         scene = load(file, [*smooth, *sets])
-        with observe.quiet():
+        with console.quiet():
             searching.run(scene, out, MPI.COMM_SELF, until=None, fresh=False, petsc_options=[])
 
     with pytest.raises(ConvergenceError, match="accuracy.trials = 1 are done. Reached"):
@@ -219,7 +219,7 @@ def test_a_tiny_tire_from_its_scene_to_its_results(file, monkeypatch) -> None:
     }
     assert load(out / "scene.toml") == load(out / "chosen.toml")
     assert not (out / "search").exists()
-    assert len(Journal(out, load(file, smooth)).trials) == 1
+    assert len(SearchJournal(out, load(file, smooth)).trials) == 1
 
 
 @pytest.mark.parametrize(
@@ -231,7 +231,7 @@ def test_no_rung_is_climbed_that_the_target_is_clearly_met_without(file, errors)
     ladders = Ladders.of(scene)
     first = ladders.first()
     history = dict(zip(CAUSES, errors, strict=True))
-    found = Found(history, dict.fromkeys(CAUSES, 0.0), (), dict.fromkeys(CAUSES, ()))
+    found = ErrorsByCause(history, dict.fromkeys(CAUSES, 0.0), (), dict.fromkeys(CAUSES, ()))
     trial = Trial(first, estimate(applied(scene, first)).work, 1.0, found, "linear")
     now = searching.planned(ladders, trial, 1)
 

@@ -9,11 +9,11 @@ from wanted_scene import SCENE
 
 from tireroad.fem.errors import ConvergenceError, InputError, UnsuitedSettings
 from tireroad.runs.files.disk import Refused
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.scene.check import explain
 from tireroad.runs.scene.load import load
 from tireroad.runs.search import search
-from tireroad.runs.search.journal import Found, Journal, worst
+from tireroad.runs.search.journal import ErrorsByCause, SearchJournal, worst
 from tireroad.runs.search.search import Search
 from tireroad.runs.search.settings import CAUSES, Ladders
 
@@ -35,20 +35,20 @@ def test_what_is_no_fault_of_the_settings_ends_the_search_and_is_not_kept(file, 
     out = file.parent / "out"
     out.mkdir()
     for raised in (InputError("0.02 GB of disk"), Refused("the disk is full")):
-        with observe.quiet(), pytest.raises(type(raised), match="disk"):
+        with console.quiet(), pytest.raises(type(raised), match="disk"):
             Search(load(file), out, MPI.COMM_SELF, []).run()
-        assert Journal(out, load(file)).trials == []
+        assert SearchJournal(out, load(file)).trials == []
     for number, raised in enumerate((UnsuitedSettings("grid"), ConvergenceError("static"))):
         sets = ["accuracy.trials=1", f"road.amplitude={2 + number}e-4"]
-        with observe.quiet(), pytest.raises(ConvergenceError, match=f"no trial .*{raised}"):
+        with console.quiet(), pytest.raises(ConvergenceError, match=f"no trial .*{raised}"):
             Search(load(file, sets), out, MPI.COMM_SELF, []).run()
-        assert [one.failed for one in Journal(out, load(file, sets)).trials] == [str(raised)]
+        assert [one.failed for one in SearchJournal(out, load(file, sets)).trials] == [str(raised)]
 
 
 def test_bands_count_each_by_itself(file) -> None:
     wanted = load(file, ["accuracy.target=", "accuracy.target_db=1"]).accuracy
     level = {cause: (0.1, 0.2) for cause in CAUSES} | {"mesh": (0.1, 3.0)}
-    found = Found({}, {}, (50.0, 63.1), level)
+    found = ErrorsByCause({}, {}, (50.0, 63.1), level)
     assert worst(found.over(wanted)) == (pytest.approx(np.sqrt(9.12)), 1)
     assert (
         worst(replace(found, centre=(), level=dict.fromkeys(CAUSES, ())).over(wanted))[0] == np.inf

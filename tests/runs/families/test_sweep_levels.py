@@ -6,8 +6,8 @@ from scipy import stats
 
 from tireroad.runs.sweep.page import (
     TOTAL,
-    Column,
     Gathered,
+    SweepColumn,
     _chosen,
     _page_figures,
     levels,
@@ -21,11 +21,12 @@ def table(settings: dict, level: np.ndarray, error: np.ndarray | None) -> Gather
     """Of members with two bands."""
     bands = "100 Hz", "125 Hz"
     columns = [
-        Column(f"axle force z, {band}", "dB re 1 N", level[:, k]) for k, band in enumerate(bands)
+        SweepColumn(f"axle force z, {band}", "dB re 1 N", level[:, k])
+        for k, band in enumerate(bands)
     ]
     if error is not None:
         columns += [
-            Column(f"error of the axle force z, {band}", "dB", error[:, k])
+            SweepColumn(f"error of the axle force z, {band}", "dB", error[:, k])
             for k, band in enumerate(bands)
         ]
     names = tuple(f"m{k}" for k in range(len(level)))
@@ -86,7 +87,7 @@ def test_members_without_bands_are_drawn_as_far_as_they_go(recwarn) -> None:
     level[0], level[2, 1] = np.nan, np.nan
     given = {"modal.count": (40, 40, 100, 100), "time.duration": (0.1, 0.5, 0.1, 0.5)}
     bands = table(given, level, None)
-    total = Column(TOTAL, "dB re 1 N", np.array([35.3, 35.2, 35.4, np.nan]))
+    total = SweepColumn(TOTAL, "dB re 1 N", np.array([35.3, 35.2, 35.4, np.nan]))
     full = Gathered(bands.names, given, (total, *bands.columns), ())
     apart, _ = levels(full).differences()
     np.testing.assert_allclose(apart[:, 0], [np.nan, 0.0, -2.0, -0.5])

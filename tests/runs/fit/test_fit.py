@@ -11,7 +11,7 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.sections.inflated import InflatedRing
 from tireroad.runs.cli import main
 from tireroad.runs.fit import fit as fitting
-from tireroad.runs.fit.figures import KINDS, Figures, read
+from tireroad.runs.fit.figures import KINDS, FitFigures, read
 from tireroad.runs.fit.fit import Model, construction, fit, report, tire_table
 from tireroad.runs.scene.load import load
 
@@ -53,11 +53,11 @@ def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fitting, "ELEMENTS", 10)
 
 
-def figures_of(factors: dict[str, float]) -> Figures:
-    model = Model(Figures(size="205/60 R15", inflation=2.2e5, load=4000.0))
+def figures_of(factors: dict[str, float]) -> FitFigures:
+    model = Model(FitFigures(size="205/60 R15", inflation=2.2e5, load=4000.0))
     found = model.free(factors)
     values = {name: found[name] for name in KINDS if name in found}
-    return Figures(size="205/60 R15", inflation=2.2e5, load=4000.0, values=values)
+    return FitFigures(size="205/60 R15", inflation=2.2e5, load=4000.0, values=values)
 
 
 def test_a_changed_tire_is_found_again(coarse: None) -> None:
@@ -82,7 +82,7 @@ def test_damping_ratios(coarse: None) -> None:
     """Linear in the loss factors: those of the tread half, the others doubled, come back."""
     figures = figures_of({"tread loss": 0.5, "other loss": 2.0})
     damping = {name: value for name, value in figures.values.items() if name.endswith("damping")}
-    found = fit(Figures(size="205/60 R15", inflation=2.2e5, load=4000.0, values=damping))
+    found = fit(FitFigures(size="205/60 R15", inflation=2.2e5, load=4000.0, values=damping))
     assert found.factors["other loss"] == pytest.approx(2.0, rel=0.05)
     for name, value in damping.items():
         assert found.reached[name] == pytest.approx(value, rel=0.05)
@@ -90,7 +90,7 @@ def test_damping_ratios(coarse: None) -> None:
 
 def test_what_cannot_be_reached_is_said(coarse: None) -> None:
     values = {"mass": 9.3, "windup_frequency": 200.0}
-    found = fit(Figures(size="205/60 R15", inflation=2.2e5, load=4000.0, values=values))
+    found = fit(FitFigures(size="205/60 R15", inflation=2.2e5, load=4000.0, values=values))
     told = report(found)
     assert "windup_frequency (-" in told.split("not reached within twice the tolerance: ")[1]
     assert "at the end of its range" in told
@@ -98,7 +98,7 @@ def test_what_cannot_be_reached_is_said(coarse: None) -> None:
 
 def test_the_scene_has_the_fitted_tire(tmp_path: Path) -> None:
     """The [tire] that is written: compounds, cords and modes of the construction."""
-    figures = Figures(size="205/60 R15", inflation=2.2e5, load=4000.0, values={"mass": 9.0})
+    figures = FitFigures(size="205/60 R15", inflation=2.2e5, load=4000.0, values={"mass": 9.0})
     factors = FACTORS | {"tread loss": 0.5, "dynamic": 1.2}
     text = (
         'name = "fit"\n'
@@ -218,10 +218,10 @@ def test_figures_on_the_road(monkeypatch: pytest.MonkeyPatch, coarse: None) -> N
     original = Model.pressed
     monkeypatch.setattr(Model, "pressed", lambda self, by, mesh: original(self, by, (10, 10)))
     size = {"size": "205/60 R15", "inflation": 2.2e5, "load": 3000.0}
-    model = Model(Figures(**size, loads=((0.01, 1.0),)))
+    model = Model(FitFigures(**size, loads=((0.01, 1.0),)))
     asked = model.pressed({"sidewall": 0.6}, None)
     values = {name: asked[name] for name in ("vertical_stiffness", "lateral_stiffness")}
-    found = fit(Figures(**size, values=values, loads=((0.01, asked["load at 10 mm"]),)))
+    found = fit(FitFigures(**size, values=values, loads=((0.01, asked["load at 10 mm"]),)))
     assert found.factors["sidewall"] == pytest.approx(0.6, rel=0.03)
     assert found.reached["load at 10 mm"] == pytest.approx(asked["load at 10 mm"], rel=0.01)
     assert found.start["lateral_stiffness"] > 1.05 * values["lateral_stiffness"]

@@ -7,7 +7,7 @@ def test_options_that_petsc_did_not_read_are_told(monkeypatch) -> None:
     from petsc4py import PETSc
 
     told = []
-    monkeypatch.setattr(pipeline.observe, "warn", told.append)
+    monkeypatch.setattr(pipeline.console, "warn", told.append)
     options = PETSc.Options()
     options["made_up_read"], options["made_up_unread"] = 3, 4
     assert options.getInt("made_up_read") == 3

@@ -6,7 +6,7 @@ import pytest
 
 from tireroad.contact.loop import equal_steps, steps_of
 from tireroad.fem.errors import InputError
-from tireroad.runs.scene.tables.scene import Motion, Road
+from tireroad.runs.scene.tables.scene import Motion, RoadTable
 from tireroad.runs.stages.contact import beyond_unique
 from tireroad.runs.stages.rolling import passing_period
 
@@ -77,8 +77,8 @@ def test_the_shortest_period_is_a_wave_of_the_road_or_of_its_motion() -> None:
     still, sine = Motion(), Motion(kind="sine", frequency=100.0)
     ramp = Motion(kind="ramp", duration=5e-3)
     for motion, period in ((still, 0.02), (sine, 0.01), (ramp, 5e-3)):
-        assert passing_period(Road(motion=motion), 0.1, 10.0) == pytest.approx(period)
-    assert passing_period(Road(), 0.1, 0.0) == np.inf
+        assert passing_period(RoadTable(motion=motion), 0.1, 10.0) == pytest.approx(period)
+    assert passing_period(RoadTable(), 0.1, 0.0) == np.inf
 
 
 @pytest.mark.long

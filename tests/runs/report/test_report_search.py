@@ -9,7 +9,7 @@ import pytest
 from written_page import page
 
 from tireroad.runs.report.sections import spectra
-from tireroad.runs.search.journal import Found, Trial
+from tireroad.runs.search.journal import ErrorsByCause, Trial
 from tireroad.runs.search.settings import CAUSES, Settings
 
 
@@ -22,8 +22,10 @@ def test_a_search_is_drawn_by_cost_and_error(
     settings = Settings((16, 8), 3, 200.0, "static", 0.01, 1e-3, dict.fromkeys(CAUSES, 0))
     parts = dict.fromkeys(CAUSES, 0.04)
     found = [
-        Found(parts, dict.fromkeys(CAUSES, 0.0), (), dict.fromkeys(CAUSES, ())),
-        Found(parts | {"mesh": 0.3}, dict.fromkeys(CAUSES, 0.0), (), dict.fromkeys(CAUSES, ())),
+        ErrorsByCause(parts, dict.fromkeys(CAUSES, 0.0), (), dict.fromkeys(CAUSES, ())),
+        ErrorsByCause(
+            parts | {"mesh": 0.3}, dict.fromkeys(CAUSES, 0.0), (), dict.fromkeys(CAUSES, ())
+        ),
     ]
     trials = [
         Trial(settings, {"static": 4.0, "contact": cost}, 3.0, one)

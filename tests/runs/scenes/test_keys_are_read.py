@@ -135,7 +135,7 @@ class Recorder:
                         seen.update(f"{label}.{n}" for n in switches)
             return plain(holder, name)
 
-        self._patch.setattr(of, "__getattribute__", reading, raising=False)
+        self._patch.setattr(of, "__getattribute__", reading, road_rise=False)
 
 
 def _run(folder: Path, text: str, *overrides: str) -> None:

@@ -13,7 +13,7 @@ from tireroad.contact.results.error_bars import CAUSES, bars, measured
 from tireroad.contact.tread.kernel import KernelTread
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.disk import Refused
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.accuracy import Given, backed, coarser, coarser_job, companions
 from tireroad.runs.stages.pipeline import run_scene
@@ -60,7 +60,7 @@ def run(tmp_path_factory):
     def started(name: str, until: str | None, *sets: str):
         scene = load(base / "scene.toml", list(sets))
         (base / name).mkdir(exist_ok=True)
-        with observe.quiet():
+        with console.quiet():
             return base / name, run_scene(
                 scene, base / name, MPI.COMM_SELF, until=until, fresh=False, petsc_options=[]
             )

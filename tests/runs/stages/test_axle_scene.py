@@ -9,7 +9,7 @@ import pytest
 from mpi4py import MPI
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.tables.scene import axle_of
 from tireroad.runs.stages import corner
@@ -220,7 +220,7 @@ def test_the_hub_moment_of_point_forces_is_that_of_a_held_axle_in_the_limit(
     found = []
     for name, more in (("held", []), ("corner", [stiff])):
         scene = load(tmp_path / "scene.toml", [f"rotation.speed={speed}", *more])
-        with observe.quiet():
+        with console.quiet():
             run_scene(
                 scene,
                 tmp_path / name,

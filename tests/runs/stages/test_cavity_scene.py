@@ -7,7 +7,7 @@ import pytest
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.tables.scene import has_air
-from tireroad.runs.scene.tables.tire import Cavity
+from tireroad.runs.scene.tables.tire import CavityTable
 
 SCENE = """
 [tire]
@@ -86,7 +86,7 @@ def test_torus_is_empty_and_other_sections_are_full_unless_told(tmp_path):
     assert has_air(load(path))
     path.write_text('[tire.cavity]\ngas = "none"\n')
     empty = load(path)
-    assert empty.tire.cavity == Cavity(gas="none")
+    assert empty.tire.cavity == CavityTable(gas="none")
     assert not has_air(empty)
 
 

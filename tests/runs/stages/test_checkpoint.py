@@ -16,7 +16,7 @@ from mpi4py import MPI
 
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.timing import Timing
-from tireroad.modal.solver.slicing import SOLVERS, Spectrum
+from tireroad.modal.solver.slicing import SOLVERS, SymmetricProblem
 from tireroad.runs.process.signals import Stopped
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages import stage as stages_stage
@@ -25,7 +25,7 @@ from tireroad.runs.stages.pipeline import run_scene
 ROUNDING = 0.0 if MPI.COMM_WORLD.size == 1 else 1e-9  # of factors on several processes, run by run
 pytestmark = [pytest.mark.slow, pytest.mark.mpi]
 COMM = MPI.COMM_WORLD
-SLICES = Spectrum.slices
+SLICES = SymmetricProblem.slices
 
 SCENE = """
 name = "stopped"
@@ -112,7 +112,7 @@ def _apart(one: Path, other: Path, rounding: float) -> list[str]:
     return wrong
 
 
-def sliced_and_stopped(of: Spectrum, boundaries) -> None:
+def sliced_and_stopped(of: SymmetricProblem, boundaries) -> None:
     SLICES(of, boundaries)
     raise Stopped("SIGTERM")
 
@@ -167,7 +167,7 @@ def test_modes(folder: Path, monkeypatch) -> None:
         stopped(monkeypatch, scene, folder / "broken", "modes", 4)
     else:  # all processes at once: one that has no slice would wait for the others
         with monkeypatch.context() as patch, pytest.raises(Stopped):
-            patch.setattr(Spectrum, "slices", sliced_and_stopped)
+            patch.setattr(SymmetricProblem, "slices", sliced_and_stopped)
             run(scene, folder / "broken", "modes")
         COMM.Barrier()
     assert parts(folder / "broken", "modes")

@@ -12,7 +12,7 @@ from mpi4py import MPI
 import tireroad
 from tireroad.contact.results.spectra import amplitudes
 from tireroad.greens.outputs import Surface
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.pipeline import run_scene
 
@@ -71,7 +71,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def run(folder: Path, text: str, *changes: str) -> tireroad.RunResults:
     (folder / "scene.toml").write_text(TIRE + text)
     scene = load(folder / "scene.toml", list(changes))
-    with observe.quiet():
+    with console.quiet():
         run_scene(scene, folder, MPI.COMM_SELF, until="motion", fresh=False, petsc_options=[])
     return tireroad.load(folder)
 

@@ -7,7 +7,7 @@ from mpi4py import MPI
 
 from tireroad.contact.results.chatter import ANY, LIMIT, Alternation, Chatter
 from tireroad.runs.files.cache import Cache
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.process.signals import Stopped
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages import contact
@@ -48,7 +48,7 @@ def run(tmp_path):
     def started(folder: str, *sets: str) -> None:
         scene = load(tmp_path / "again.toml", sets)
         (tmp_path / folder).mkdir(exist_ok=True)
-        with observe.quiet():
+        with console.quiet():
             run_scene(
                 scene,
                 tmp_path / folder,

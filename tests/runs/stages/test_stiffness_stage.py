@@ -8,7 +8,7 @@ import pytest
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.load import load
-from tireroad.runs.scene.tables.scene import Stiffness, deflections
+from tireroad.runs.scene.tables.scene import StiffnessTable, deflections
 from tireroad.runs.stages.stiffness import slides
 
 TIRE = """
@@ -90,9 +90,9 @@ def test_vertical_alone(run):
 
 
 def test_steps_and_lists():
-    assert deflections(Stiffness(steps=3), 0.02) == pytest.approx([0.01, 0.02, 0.03])
-    assert deflections(Stiffness(up_to=0.01, steps=2), None) == pytest.approx([0.005, 0.01])
-    assert deflections(Stiffness(deflections=(0.001, 0.002)), 0.5) == [0.001, 0.002]
+    assert deflections(StiffnessTable(steps=3), 0.02) == pytest.approx([0.01, 0.02, 0.03])
+    assert deflections(StiffnessTable(up_to=0.01, steps=2), None) == pytest.approx([0.005, 0.01])
+    assert deflections(StiffnessTable(deflections=(0.001, 0.002)), 0.5) == [0.001, 0.002]
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 from mpi4py import MPI
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.outputs.transmissibility import apart, compare
 from tireroad.runs.stages.pipeline import run_scene
@@ -95,7 +95,7 @@ def test_refused_where_the_road_carries_part_of_the_force(tmp_path) -> None:
 def test_both_ways_agree_and_slow_forces_pass(tmp_path) -> None:
     """Two modal bases of one mesh, 1 % at most below 150 Hz (8 segments: rolling also by the lumped mass)."""
     (tmp_path / "a.toml").write_text(SCENE)
-    with observe.quiet():
+    with console.quiet():
         run_scene(load(tmp_path / "a.toml"), tmp_path, MPI.COMM_SELF, until=None, fresh=False, petsc_options=[])  # fmt: skip
     with h5py.File(tmp_path / "response.h5") as file:
         group = file["transmissibility"]
@@ -119,7 +119,7 @@ def test_both_ways_agree_and_slow_forces_pass(tmp_path) -> None:
     scene = load(
         tmp_path / "a.toml", others
     )  # the forces over time are no matter of the Green's functions
-    with observe.quiet():
+    with console.quiet():
         run_scene(scene, tmp_path, MPI.COMM_SELF, until="response", fresh=False, petsc_options=[])
     stages = json.loads((tmp_path / "summary.json").read_text())["stages"]
     assert stages["greens"]["status"] == "reused", stages["greens"]
@@ -133,7 +133,7 @@ def test_both_ways_agree_with_the_inertia_of_the_thesis(tmp_path) -> None:
     """By s^2 of the momentum they were 18 to 21 % apart: its mean motion has the body rate, too."""
     (tmp_path / "a.toml").write_text(SCENE)
     scene = load(tmp_path / "a.toml", ["rotation.inertia=doppler"])
-    with observe.quiet():
+    with console.quiet():
         run_scene(scene, tmp_path, MPI.COMM_SELF, until="response", fresh=False, petsc_options=[])
     with h5py.File(tmp_path / "response.h5") as file:
         group = file["transmissibility"]
@@ -149,7 +149,7 @@ def test_in_time_the_axle_carries_what_it_carries_by_frequency(tmp_path, inertia
     (tmp_path / "a.toml").write_text(text)
     sets = [f"rotation.inertia={inertia}", "greens.residual=static", "modal.count=12"]
     sets += ["time={duration=0.3,step=1e-4}", "output.transmissibility={to=100.0,step=50.0}"]
-    with observe.quiet():
+    with console.quiet():
         run_scene(load(tmp_path / "a.toml", sets), tmp_path, MPI.COMM_SELF, until="response", fresh=False, petsc_options=[])  # fmt: skip
     with h5py.File(tmp_path / "response.h5") as file:
         time, force, axle = (file[k][:] for k in ("time", "force", "axle_force"))

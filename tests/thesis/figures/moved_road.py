@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tireroad.runs.stages.setup import probes
-from tireroad.runs.validation.full_elements import Trial, follow
+from tireroad.runs.validation.full_elements import Conditions, follow
 from tireroad.tests.thesis.claim import Claim
 from tireroad.tests.thesis.figure import Reproduced, figure
 from tireroad.tests.thesis.figures.simplified import Array, Simplified, full_tire
@@ -21,7 +21,7 @@ SOURCE = "section 6.3, figure 6.5"
 
 
 @dataclass(frozen=True)
-class Moved:
+class PrescribedMotion:
     """Motion of the lowest node, from t = `step` s on.
 
     `lowest` (n, 3) m: its displacement; `beside`: that 5° along the section from it; vertical
@@ -39,16 +39,16 @@ class Moved:
         return self.step * np.arange(1, len(self.force) + 1)
 
 
-def by_modes(scenes: Scenes, *settings: str) -> Moved:
+def by_modes(scenes: Scenes, *settings: str) -> PrescribedMotion:
     """The motion by modes. Collective."""
     run = scenes.run(SCENE, *settings, until="contact")
     history = run.done["contact"].product
     skip = int(history.time[0] == 0.0)
     driven = history.driven[skip:]
-    return Moved(history.step, driven[:, 0], history.total_force[skip:, 2], driven[:, 1])
+    return PrescribedMotion(history.step, driven[:, 0], history.total_force[skip:, 2], driven[:, 1])
 
 
-def by_all_unknowns(scenes: Scenes) -> Moved:
+def by_all_unknowns(scenes: Scenes) -> PrescribedMotion:
     """Full finite elements on the same points, without the brush, which by symmetry does not act.
 
     Computed once. Collective.
@@ -56,16 +56,18 @@ def by_all_unknowns(scenes: Scenes) -> Moved:
     return scenes.once("moved road, all unknowns", lambda: _by_all_unknowns(scenes))
 
 
-def _by_all_unknowns(scenes: Scenes) -> Moved:
+def _by_all_unknowns(scenes: Scenes) -> PrescribedMotion:
     run = scenes.run(SCENE, "contact.brush_stiffness=", until="greens")
     job, step = run.job, float(run.job.scene.time.step)
     alone = replace(job, scene=replace(job.scene, force=()))
     tire = full_tire(run, probes(alone, run.static, run.setup).on_face, step, RADIUS)
-    found = follow(Trial(job.scene.contact, run.setup, job.scene.time.duration), tire, step, 0.0)
+    found = follow(
+        Conditions(job.scene.contact, run.setup, job.scene.time.duration), tire, step, 0.0
+    )
     lowest = int(np.linalg.norm(run.setup.patch.points[:, :2], axis=1).argmin())
     moved = np.zeros((len(found.values["displacement"]), 3))
     moved[:, 2] = found.values["displacement"][:, lowest]
-    return Moved(step, moved, found.values["contact force"][:, 2])
+    return PrescribedMotion(step, moved, found.values["contact force"][:, 2])
 
 
 def distance(found: Array, exact: Array) -> float:

@@ -34,25 +34,24 @@ if TYPE_CHECKING:
     from tireroad.fem.sections.ring import Ring
     from tireroad.fem.tire.cords import Cords
     from tireroad.fem.tire.material import Material
-    from tireroad.runs.scene.tables.tire import Cords as Line
-    from tireroad.runs.scene.tables.tire import Tire
+    from tireroad.runs.scene.tables.tire import CordsTable, TireTable
 
 
-def _keys(tire: Tire) -> FileSection:
+def _keys(tire: TireTable) -> FileSection:
     return cast("FileSection", tire.shape)
 
 
-def own_section(tire: Tire) -> OwnSection:
+def own_section(tire: TireTable) -> OwnSection:
     """The section in the tire's file. Raises InputError, with file and line, for errors in it."""
     return _read(*_source(tire))
 
 
-def own_ring(tire: Tire) -> Ring:
+def own_ring(tire: TireTable) -> Ring:
     """The ring of that section in the scene's order and segments; cached per scene and file."""
     return _ring(*_source(tire), tire.order, tire.segments, tire.footprint_size)
 
 
-def _source(tire: Tire) -> tuple[Path, int, Wishes]:
+def _source(tire: TireTable) -> tuple[Path, int, Wishes]:
     """The file, its modification time, and what is requested from it."""
     from tireroad.fem.decks.own import Wishes
 
@@ -100,7 +99,7 @@ def _revolved(mesh: SectionMesh, segments: int, footprint_size: float) -> Ring:
     return revolved(mesh, segments, footprint_size, coarser)
 
 
-def fingerprint(tire: Tire) -> str:
+def fingerprint(tire: TireTable) -> str:
     """Hash of everything that the run takes from the tire's file."""
     own = own_section(tire)
     mesh = own.mesh
@@ -113,7 +112,7 @@ def fingerprint(tire: Tire) -> str:
     return found.hexdigest()
 
 
-def check_regions(tire: Tire, own: OwnSection) -> None:
+def check_regions(tire: TireTable, own: OwnSection) -> None:
     """Check that every [[tire.region]] names a region of the file."""
     known = {name.upper() for name in own.mesh.regions}
     for place, region in enumerate(tire.region):
@@ -124,7 +123,7 @@ def check_regions(tire: Tire, own: OwnSection) -> None:
             )
 
 
-def check_cords(tire: Tire, own: OwnSection) -> None:
+def check_cords(tire: TireTable, own: OwnSection) -> None:
     """Check that every [[tire.cords]] names a line of the file."""
     for place, cords in enumerate(spelt(tire.cords, own.mesh.plies)):
         if cords.name not in own.mesh.plies:
@@ -134,7 +133,7 @@ def check_cords(tire: Tire, own: OwnSection) -> None:
             )
 
 
-def own_materials(tire: Tire) -> dict[str, Material]:
+def own_materials(tire: TireTable) -> dict[str, Material]:
     """Compound of each region by name: of [[tire.region]], else the file, else [tire.material]."""
     own = own_section(tire)
     return {
@@ -143,7 +142,7 @@ def own_materials(tire: Tire) -> dict[str, Material]:
     }
 
 
-def _material(tire: Tire, name: str, rubber: Rubber | None) -> Material:
+def _material(tire: TireTable, name: str, rubber: Rubber | None) -> Material:
     """The material of one region.
 
     Its properties in small motions are those that the [[tire.region]] states, else likewise
@@ -164,12 +163,12 @@ def _material(tire: Tire, name: str, rubber: Rubber | None) -> Material:
     return compound(rubber.model, density, **rubber.coefficients, **change)
 
 
-def given_cords(tire: Tire) -> list[Line]:
+def given_cords(tire: TireTable) -> list[CordsTable]:
     """The scene's [[tire.cords]], with names spelt as in the file."""
     return spelt(tire.cords, own_section(tire).mesh.plies)
 
 
-def own_cords(tire: Tire) -> list[Cords]:
+def own_cords(tire: TireTable) -> list[Cords]:
     """The cords on the lines of the file: from [[tire.cords]] of that name, else from the file."""
     from tireroad.fem.tire.cords import Cords
 
@@ -182,7 +181,7 @@ def own_cords(tire: Tire) -> list[Cords]:
     return found + list(given.values())
 
 
-def described(tire: Tire) -> list[str]:
+def described(tire: TireTable) -> list[str]:
     """Which parts of the tire's file are used and which are not, for `check`."""
     own = own_section(tire)
     mesh = own.mesh
@@ -208,7 +207,7 @@ def _shown(value: float | tuple[float, ...]) -> str:
     return f"{value:.4g}" if isinstance(value, float) else " ".join(f"{one:.4g}" for one in value)
 
 
-def _in_words(tire: Tire, name: str, rubber: Rubber | None) -> str:
+def _in_words(tire: TireTable, name: str, rubber: Rubber | None) -> str:
     region = region_of(tire, name)
     if region is not None and region.material is not None:
         return "material of the scene's [[tire.region]]"
@@ -255,7 +254,7 @@ class FileSection(SectionKind):
         """The path of the file."""
         return Path(self.file or self.mesh or "")
 
-    def check(self, tire: Tire, source: Source) -> None:
+    def check(self, tire: TireTable, source: Source) -> None:
         if (self.file is None) == (self.mesh is None):
             source.add(("tire",), 'with section = "file" needs one of file = "…" and mesh = "…"')
             return
@@ -266,34 +265,34 @@ class FileSection(SectionKind):
         except InputError as error:
             source.add_as_is(("tire", "file"), str(error))
 
-    def proportions(self, tire: Tire) -> Proportions:
+    def proportions(self, tire: TireTable) -> Proportions:
         return proportions_of(self.ring(tire), own_section(tire).mesh)
 
-    def ring(self, tire: Tire) -> Ring:
+    def ring(self, tire: TireTable) -> Ring:
         return own_ring(tire)
 
-    def rubbers(self, tire: Tire) -> dict[str, Material]:
+    def rubbers(self, tire: TireTable) -> dict[str, Material]:
         return own_materials(tire)
 
-    def rubber(self, tire: Tire) -> tuple[float, float, float]:
+    def rubber(self, tire: TireTable) -> tuple[float, float, float]:
         """Values of the softest compound, in which the wall bends most."""
         soft = min(self.rubbers(tire).values(), key=lambda one: one.dynamic * one.law.youngs)
         return soft.dynamic * soft.law.youngs, soft.law.poisson, soft.density
 
-    def cords(self, tire: Tire) -> list[Cords]:
+    def cords(self, tire: TireTable) -> list[Cords]:
         return own_cords(tire)
 
-    def angles(self, tire: Tire) -> dict[str, float]:
+    def angles(self, tire: TireTable) -> dict[str, float]:
         own = own_section(tire).plies
         given = {line.name: line.angle for line in given_cords(tire)}
         return {ply.name: float(np.degrees(ply.angle)) for ply in own} | given
 
-    def coarser(self, tire: Tire) -> FileSection:
+    def coarser(self, tire: TireTable) -> FileSection:
         """The file's own elements: there are no others."""
         return self
 
-    def fingerprint(self, tire: Tire) -> str:
+    def fingerprint(self, tire: TireTable) -> str:
         return fingerprint(tire)
 
-    def described(self, tire: Tire) -> list[str]:
+    def described(self, tire: TireTable) -> list[str]:
         return described(tire)

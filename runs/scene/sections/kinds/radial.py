@@ -29,8 +29,7 @@ if TYPE_CHECKING:
     from tireroad.fem.sections.construction import Construction
     from tireroad.fem.tire.cords import Cords
     from tireroad.fem.tire.material import Material
-    from tireroad.runs.scene.tables.tire import Cords as Line
-    from tireroad.runs.scene.tables.tire import Region, Tire
+    from tireroad.runs.scene.tables.tire import CordsTable, RegionTable, TireTable
 
 _GROOVES, _MOST_GROOVES = 4, 8  # those of fem.sections.radial, whose import needs scipy
 # (elements around, along) available to a search.
@@ -57,11 +56,11 @@ class RadialSection(SectionKind):
         None, "number of elements from bead to bead; absent: 26", least=2, most=1000
     )
 
-    def elements(self, tire: Tire) -> tuple[RadialSection, int, int]:
+    def elements(self, tire: TireTable) -> tuple[RadialSection, int, int]:
         _, order, segments = super().elements(tire)
         return replace(self, elements_arc=self.elements_arc or 26), order, segments
 
-    def check(self, tire: Tire, source: Source) -> None:
+    def check(self, tire: TireTable, source: Source) -> None:
         if tire.material != type(tire)().material:
             text = "is for a torus: the compounds of a radial tire follow from its size; [[tire.region]] changes one"
             source.add(("tire", "material"), text)
@@ -77,26 +76,26 @@ class RadialSection(SectionKind):
         _check_parts("region", tire.region, list(construction.compounds), source)
         _check_parts("cords", tire.cords, lines, source)
 
-    def proportions(self, tire: Tire) -> Proportions:
+    def proportions(self, tire: TireTable) -> Proportions:
         ring = self.ring(tire)
         return proportions_of(ring, ring.section)
 
-    def ring(self, tire: Tire) -> Ring:
+    def ring(self, tire: TireTable) -> Ring:
         return _ring(self.size, tire.segments, self.elements_arc, tire.order, tire.footprint_size)
 
-    def rubbers(self, tire: Tire) -> dict[str, Material]:
+    def rubbers(self, tire: TireTable) -> dict[str, Material]:
         return {
             name: _compound((_everywhere(tire), region_of(tire, name)), dict(values))
             for name, values in built(self.size, self.grooves).compounds.items()
         }
 
-    def rubber(self, tire: Tire) -> tuple[float, float, float]:
+    def rubber(self, tire: TireTable) -> tuple[float, float, float]:
         """Values of the softest compound, in which the wall bends most."""
         compounds = built(self.size, self.grooves).compounds.values()
         soft = min(compounds, key=lambda one: one["youngs_modulus"])
         return soft["dynamic"] * soft["youngs_modulus"], soft["poisson_ratio"], soft["density"]
 
-    def cords(self, tire: Tire) -> list[Cords]:
+    def cords(self, tire: TireTable) -> list[Cords]:
         from tireroad.fem.tire.cords import Cords
 
         changed = {line.name: cords_of(line) for line in self._changed(tire)}
@@ -106,26 +105,26 @@ class RadialSection(SectionKind):
         )
         return [changed.get(line.name, line) for line in own]
 
-    def angles(self, tire: Tire) -> dict[str, float]:
+    def angles(self, tire: TireTable) -> dict[str, float]:
         own = {
             line.name: float(np.degrees(line.angle))
             for line in built(self.size, self.grooves).cords
         }
         return own | {line.name: line.angle for line in self._changed(tire)}
 
-    def _changed(self, tire: Tire) -> list[Line]:
+    def _changed(self, tire: TireTable) -> list[CordsTable]:
         return spelt(tire.cords, [line.name for line in built(self.size, self.grooves).cords])
 
-    def meshes(self, tire: Tire) -> tuple[tuple[int, int], ...]:
+    def meshes(self, tire: TireTable) -> tuple[tuple[int, int], ...]:
         return FINER
 
     def elements_along(self, along: int) -> RadialSection:
         return replace(self, elements_arc=along)
 
-    def coarser(self, tire: Tire) -> RadialSection:
+    def coarser(self, tire: TireTable) -> RadialSection:
         return replace(self, elements_arc=self.elements_arc // 2)
 
-    def described(self, tire: Tire) -> list[str]:
+    def described(self, tire: TireTable) -> list[str]:
         from tireroad.fem.sections.radial import RATED_PRESSURE, size
 
         rated = size(self.size).rated_load()
@@ -134,13 +133,13 @@ class RadialSection(SectionKind):
             "sizes, within 4 %)"
         ]
 
-    def has_losses(self, tire: Tire) -> bool:
+    def has_losses(self, tire: TireTable) -> bool:
         """All compounds of the built-in tire have a loss factor."""
         return True
 
 
 def _check_parts(
-    table: str, given: Sequence[Region | Line], names: list[str], source: Source
+    table: str, given: Sequence[RegionTable | CordsTable], names: list[str], source: Source
 ) -> None:
     """Note unknown or repeated names of parts, and keys for what follows from the tire's size."""
     default = type(given[0])() if given else None
@@ -166,12 +165,12 @@ def _fixed(value: object, names: list[str], named: bool) -> str:
     return f"{fixed}Name a compound instead: name = one of {', '.join(names)}"
 
 
-def _everywhere(tire: Tire) -> Region | None:
+def _everywhere(tire: TireTable) -> RegionTable | None:
     """The scene's [[tire.region]] without a name, which changes every compound, or None."""
     return next((region for region in tire.region if region.name is None), None)
 
 
-def _compound(regions: Iterable[Region | None], values: dict[str, Any]) -> Material:
+def _compound(regions: Iterable[RegionTable | None], values: dict[str, Any]) -> Material:
     """A built-in compound, modified by the regions that it lies in, the last before the others."""
     from tireroad.fem.tire.material import Material, compound, power_law
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tireroad.fem.parameters import choice, integer, number
-from tireroad.fem.sections.grid import Patch, PlyLine
+from tireroad.fem.sections.grid import PlyLine, RegionPatch
 from tireroad.fem.sections.ring import Ring
 from tireroad.fem.sections.torus import Torus
 from tireroad.runs.scene.source import Source
@@ -25,7 +25,7 @@ from tireroad.runs.scene.tables.tire import (
 if TYPE_CHECKING:
     from tireroad.fem.tire.cords import Cords
     from tireroad.fem.tire.material import Material
-    from tireroad.runs.scene.tables.tire import Region, Tire
+    from tireroad.runs.scene.tables.tire import RegionTable, TireTable
 
 # Default (segments, elements along the arc) by order. Largest error of the 28 lowest frequencies of
 # the unloaded torus, E = 480 MPa, against Fourier series around (bench.parts.harmonics): 28 x 16
@@ -72,14 +72,14 @@ class TorusSection(SectionKind):
     elements_thickness: int = integer(1, "number of elements through the wall", least=1, most=20)
     grading: str = choice("bead", ("bead", "uniform"), "grading of the elements along the section")
 
-    def elements(self, tire: Tire) -> tuple[TorusSection, int, int]:
+    def elements(self, tire: TireTable) -> tuple[TorusSection, int, int]:
         counted = tire.segments is not None or self.elements_arc is not None
         order = tire.order or (2 if counted else 3)
         segments, along = MESHES[order]
         kind = replace(self, elements_arc=self.elements_arc or along)
         return kind, order, tire.segments or segments
 
-    def proportions(self, tire: Tire) -> Proportions:
+    def proportions(self, tire: TireTable) -> Proportions:
         return Proportions(
             outer_radius=self.outer_radius,
             height=self.minor_radius,
@@ -89,7 +89,7 @@ class TorusSection(SectionKind):
             through=self.elements_thickness,
         )
 
-    def check(self, tire: Tire, source: Source) -> None:
+    def check(self, tire: TireTable, source: Source) -> None:
         self._check_circles(source)
         for which, region in enumerate(tire.region):
             place = ("tire", "region", str(which))
@@ -129,7 +129,7 @@ class TorusSection(SectionKind):
         )
         _note(("tire",), problems, source)
 
-    def _check_cords(self, tire: Tire, which: int, source: Source) -> None:
+    def _check_cords(self, tire: TireTable, which: int, source: Source) -> None:
         """Check that a line of cords lies within the wall and has a unique name."""
         cords, place = tire.cords[which], ("tire", "cords", str(which))
         low, high = cords.arc
@@ -167,35 +167,35 @@ class TorusSection(SectionKind):
         )
         _note(place, problems, source)
 
-    def ring(self, tire: Tire) -> Ring:
+    def ring(self, tire: TireTable) -> Ring:
         return self._torus(tire).ring(self._patches(tire), self._plies(tire))
 
-    def free_unknowns(self, tire: Tire) -> int:
+    def free_unknowns(self, tire: TireTable) -> int:
         lines = self._torus(tire).lines(self._patches(tire), self._plies(tire))
         wall, arc = (len(line) - 1 for line in lines)
         return 3 * tire.segments * tire.order * (tire.order * wall + 1) * (tire.order * arc - 1)
 
-    def meshes(self, tire: Tire) -> tuple[tuple[int, int], ...]:
+    def meshes(self, tire: TireTable) -> tuple[tuple[int, int], ...]:
         return FINER
 
-    def search_order(self, tire: Tire) -> int:
+    def search_order(self, tire: TireTable) -> int:
         return ORDER
 
     def elements_along(self, along: int) -> TorusSection:
         return replace(self, elements_arc=along)
 
-    def coarser(self, tire: Tire) -> TorusSection:
+    def coarser(self, tire: TireTable) -> TorusSection:
         return replace(self, elements_arc=self.elements_arc // 2)
 
-    def rubbers(self, tire: Tire) -> dict[str, Material]:
+    def rubbers(self, tire: TireTable) -> dict[str, Material]:
         return {"wall": rubber(tire)} | {
             patch(i, region).name: rubber(tire, region) for i, region in enumerate(tire.region)
         }
 
-    def cords(self, tire: Tire) -> list[Cords]:
+    def cords(self, tire: TireTable) -> list[Cords]:
         return [cords_of(line) for line in tire.cords]
 
-    def _torus(self, tire: Tire) -> Torus:
+    def _torus(self, tire: TireTable) -> Torus:
         return Torus(
             outer_radius=self.outer_radius,
             minor_radius=self.minor_radius,
@@ -209,10 +209,10 @@ class TorusSection(SectionKind):
             footprint_size=tire.footprint_size,
         )
 
-    def _patches(self, tire: Tire) -> list[Patch]:
+    def _patches(self, tire: TireTable) -> list[RegionPatch]:
         return [patch(i, region) for i, region in enumerate(tire.region)]
 
-    def _plies(self, tire: Tire) -> list[PlyLine]:
+    def _plies(self, tire: TireTable) -> list[PlyLine]:
         return [
             PlyLine(c.name, tuple(np.radians(c.arc)), 1 - c.depth / self.thickness)
             for c in tire.cords
@@ -229,23 +229,23 @@ def _note(
             return
 
 
-def patch(which: int, region: Region) -> Patch:
+def patch(which: int, region: RegionTable) -> RegionPatch:
     """The part of the section described by a [[tire.region]]."""
     from tireroad.runs.scene.tables.tire import AROUND_CROWN
 
     low, high = np.radians(region.arc or AROUND_CROWN)
     sides = {"left": ((-high, -low),), "right": ((low, high),)}
     arcs = sides.get(region.side, sides["left"] + sides["right"])
-    return Patch(f"tire.region {which}", arcs, region.depth)
+    return RegionPatch(f"tire.region {which}", arcs, region.depth)
 
 
-def rubber(tire: Tire, region: Region | None = None) -> Material:
+def rubber(tire: TireTable, region: RegionTable | None = None) -> Material:
     """The compound of the wall, or of one of its regions, which has from [tire] what it does not
     say."""
     from tireroad.fem.tire.material import Material
-    from tireroad.runs.scene.tables.tire import Material as Table
+    from tireroad.runs.scene.tables.tire import MaterialTable
 
     own = None if region is None else region.material
-    table = own or tire.material or Table()
+    table = own or tire.material or MaterialTable()
     losses = losses_of(tire) | losses_of(region)
     return Material(law=table.law, density=table.density, **losses)

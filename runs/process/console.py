@@ -24,7 +24,7 @@ class _State:
     root: bool = True
     log: TextIO | None = None
     only_log: bool = False
-    bar: "Progress | None" = None
+    bar: "ProgressBar | None" = None
 
 
 def set_root(root: bool) -> None:
@@ -116,7 +116,7 @@ def seconds(value: float) -> str:
     return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
 
 
-class Progress:
+class ProgressBar:
     """Progress of a long operation: `with Progress("contact", 4000, "steps") as bar`.
 
     Appears after two seconds, with rate and remaining time: on a terminal as a bar (rich), else as
@@ -136,7 +136,7 @@ class Progress:
         self._next = self._began + PATIENCE
         self._shown = False
 
-    def __enter__(self) -> "Progress":
+    def __enter__(self) -> "ProgressBar":
         if _State.root and _State.bar is None:
             _State.bar = self
         return self
@@ -201,7 +201,7 @@ class Progress:
     def _draw(self) -> None:
         from rich.console import Console
         from rich.progress import BarColumn, TextColumn
-        from rich.progress import Progress as Bar
+        from rich.progress import ProgressBar as Bar
 
         if self._rich is None:
             console = Console(file=sys.stderr, force_terminal=True)

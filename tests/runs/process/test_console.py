@@ -5,25 +5,25 @@ from pathlib import Path
 
 import pytest
 
-from tireroad.runs.process import observe
+from tireroad.runs.process import console
 
 
-def late(bar: observe.Progress) -> None:
+def late(bar: console.ProgressBar) -> None:
     """As if the bar had begun ten seconds ago."""
     bar._began -= 10.0
     bar._next -= 10.0
 
 
 def test_short_things_show_nothing(capsys) -> None:
-    with observe.Progress("modes", 100) as bar:
+    with console.ProgressBar("modes", 100) as bar:
         for _ in range(100):
             bar.advance()
     assert capsys.readouterr() == ("", "")
 
 
 def test_long_things_show_rate_and_time_left(capsys, monkeypatch) -> None:
-    monkeypatch.setattr(observe, "is_terminal", lambda: False)
-    with observe.Progress("contact", 1000, "steps") as bar:
+    monkeypatch.setattr(console, "is_terminal", lambda: False)
+    with console.ProgressBar("contact", 1000, "steps") as bar:
         late(bar)
         bar.note("residual 1e-9")
         bar.advance(250)
@@ -36,7 +36,7 @@ def test_long_things_show_rate_and_time_left(capsys, monkeypatch) -> None:
 
 
 def test_what_an_earlier_run_has_done_is_not_in_the_rate() -> None:
-    with observe.Progress("contact", 1000, "steps", begun=500) as bar:
+    with console.ProgressBar("contact", 1000, "steps", begun=500) as bar:
         late(bar)
         bar.advance(250)
         line = bar.line()
@@ -44,12 +44,12 @@ def test_what_an_earlier_run_has_done_is_not_in_the_rate() -> None:
 
 
 def test_bar_on_a_terminal(capsys, monkeypatch) -> None:
-    monkeypatch.setattr(observe, "is_terminal", lambda: True)
+    monkeypatch.setattr(console, "is_terminal", lambda: True)
     monkeypatch.setenv("COLUMNS", "120")
-    with observe.Progress("contact", 1000) as bar:
+    with console.ProgressBar("contact", 1000) as bar:
         late(bar)
         bar.advance(500)
-        observe.say("a line between")
+        console.say("a line between")
         late(bar)
         bar.advance(100)
     out, err = capsys.readouterr()
@@ -58,20 +58,20 @@ def test_bar_on_a_terminal(capsys, monkeypatch) -> None:
 
 
 def test_unknown_total(capsys, monkeypatch) -> None:
-    monkeypatch.setattr(observe, "is_terminal", lambda: False)
-    with observe.Progress("factorisation") as bar:
+    monkeypatch.setattr(console, "is_terminal", lambda: False)
+    with console.ProgressBar("factorisation") as bar:
         late(bar)
         bar.note("")
     assert "10 s so far" in capsys.readouterr().err
 
 
 def test_other_processes_are_silent(capsys, monkeypatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(observe._State, "root", False)
-    with observe.log_to(tmp_path / "log.txt"), observe.Progress("x", 10) as bar:
+    monkeypatch.setattr(console._State, "root", False)
+    with console.log_to(tmp_path / "log.txt"), console.ProgressBar("x", 10) as bar:
         late(bar)
-        observe.say("a")
-        observe.warn("b")
-        observe.log("c")
+        console.say("a")
+        console.warn("b")
+        console.log("c")
         bar.advance()
     assert capsys.readouterr() == ("", "")
     assert not (tmp_path / "log.txt").exists()
@@ -80,11 +80,11 @@ def test_other_processes_are_silent(capsys, monkeypatch, tmp_path: Path) -> None
 def test_log_keeps_what_was_said(capsys, tmp_path: Path) -> None:
     path = tmp_path / "log.txt"
     for text in ("first", "second"):
-        with observe.log_to(path):
-            observe.say(text)
-            observe.warn("careful")
-            observe.log("only here")
-    observe.say("after")
+        with console.log_to(path):
+            console.say(text)
+            console.warn("careful")
+            console.log("only here")
+    console.say("after")
     kept = path.read_text()
     assert kept.index("first") < kept.index("second")
     assert kept.count("warning: careful") == 2 and kept.count("only here") == 2
@@ -92,7 +92,7 @@ def test_log_keeps_what_was_said(capsys, tmp_path: Path) -> None:
 
 
 def test_advance_costs_little() -> None:
-    with observe.Progress("contact", 10**6) as bar:
+    with console.ProgressBar("contact", 10**6) as bar:
         began = time.thread_time()
         for _ in range(20_000):
             bar.advance()
@@ -104,4 +104,4 @@ def test_advance_costs_little() -> None:
     ("value", "words"), [(12.4, "12 s"), (185, "3 min 05 s"), (7800, "2 h 10 min")]
 )
 def test_durations(value: float, words: str) -> None:
-    assert observe.seconds(value) == words
+    assert console.seconds(value) == words
