@@ -1,7 +1,5 @@
 """Contact points on a grid between the nodes, and the state at rest moved to other points.
 
-Contact points on a regular grid, interpolated from the nodes around them.
-
 The finite elements find the static state with the road touching nodes only, and without the tread.
 On the grid, or on the nodes with their tread, the contact therefore settles again under the same
 load, linearised about that state: f >= 0, g >= 0, f . g = 0 with
@@ -9,8 +7,6 @@ load, linearised about that state: f >= 0, g >= 0, f . g = 0 with
     g = z_surface - z_road + delta + C~ f + W A_static (W^T f - f_nodes),  sum f = load,
 
 where A_static is the exact static flexibility between the nodes and delta the rise of the tire.
-
-The same contact patch with twice or half the spacing of its points, for an error estimate.
 """
 
 from __future__ import annotations

@@ -7,8 +7,6 @@ its width and length is fine enough (soft torus, 14 mm wide; docs/verification/c
 A wave needs twelve points: with ten the deviation of the radial tire, 130 mm wide, is 0.7 to
 2.2 % off (docs/verification/default-settings.md), with twelve 0.6 % at most. Points much closer than
 the nodes that carry them resolve no more of the tire.
-
-The points of the tread that may touch the road during a run, in the static state.
 """
 
 from __future__ import annotations

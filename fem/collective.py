@@ -1,4 +1,4 @@
-"""Collective operations on arrays: sums, gathering, and broadcast of objects that hold arrays.
+"""Collective operations: sums, gathering and broadcast of arrays, release of PETSc objects, sparse matrices from rows.
 
 Arrays are sent as buffers. Pickling would make two further copies and is limited to 2 GB, the
 largest byte count of an MPI message. Messages counted in numbers or rows may hold 16 GB and more;
@@ -12,8 +12,6 @@ call its cleanup. dolfinx gives each mesh a communicator of its own, which is fr
 small vector keeps it alive until the cleanup. Without this, a process that loads one tire after
 another, as in a search or a notebook, kept all matrices and factors: 50 MB for each tire of 7,000
 unknowns.
-
-Distributed sparse matrices from the rows of each process.
 """
 
 from __future__ import annotations

@@ -1,9 +1,7 @@
-"""Kinematics in UFL: deformation gradient, follower pressure, motion of a wheel rotating in place.
+"""Kinematics in UFL: deformation gradient, invariants, follower pressure, a wheel rotating in place.
 
 The mesh is fixed in the non-rotating frame; material flows through it with w = Omega e_y x X
 (Nackenhorst 2004; thesis (2.6)-(2.8), corrected). All quantities are per unit Omega.
-
-Invariants of the right Cauchy-Green tensor C in UFL, for the material laws.
 """
 
 from __future__ import annotations

@@ -1,15 +1,13 @@
-"""Description of one parameter: unit, meaning and range, and how a value is read.
+"""Parameters of models: type, unit, range and meaning, and registries of named variants.
+
+Description of one parameter: unit, meaning and range, and how a value is read.
 
 All packages may import this module; it needs only the standard library.
-
-Parameters of models: type, unit, range, meaning, and the check of values.
 
 Dataclass fields are made by `number`, `integer`, `flag`, `choice`, `text`, `filename` or `vector`.
 They are the only description of a parameter: the constructor, the scene file, `check`, the key
 reference and the error messages follow from them. Like `fem.errors`, all packages may import this
 module; it needs only the standard library.
-
-Named variants of a model: a new one is a decorated class in its own file or a user's script.
 """
 
 import importlib

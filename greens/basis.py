@@ -12,8 +12,6 @@ whose receptance has the exact value and slope of the truncated part at 0 Hz, an
 inertia. Standing, M_r and G_0 are positive and the states cannot grow; rolling, a state that grows
 is made static. (MacNeal, Comput. Struct. 1 (1971) 581; Rubin, AIAA J. 13 (1975) 995; decoupled
 here.)
-
-A basis of decoupled states, seen through probes on the outer face.
 """
 
 from __future__ import annotations

@@ -11,12 +11,6 @@ Many neighbouring points yield many shapes, most of which respond only staticall
 static share is negligible at every point (`foremost`) and pseudo-modes far above the highest mode
 (`dynamic`) are left out. The residual is then the exact flexibility less that of the states, so
 what is left out keeps its static response and loses its inertia.
-
-The states of a basis, completed by the static response of all that they lack.
-
-Responses between chosen probes of a rolling tire, with the requested residual flexibility.
-
-The full matrices of a tire's small motions about its static state, for a rolling wheel.
 """
 
 from __future__ import annotations

@@ -14,10 +14,6 @@ error is (1/8 + c) h^2 f'' and the work that springs lose on an oscillation of a
 2 c (1 - cos t)^2 >= 0, whatever the tire. With c = 1/16 a mass bouncing on a spring of stiffness k
 loses at least 2.5 % of its amplitude a step from k h^2 / m = 2 to 10^3.
 
-Distribution of the states of a shared loop over the processes.
-
-Which processes share a time loop.
-
 The response to forces that alternate in sign from step to step, as in a chattering contact.
 
 With f_n = (-1)^n F, linear in between, every state settles at z_n = (-1)^n Z,
@@ -26,10 +22,6 @@ With f_n = (-1)^n F, linear in between, every state settles at z_n = (-1)^n Z,
 
 (greens.recursion). The mass of a mode alone gives -h^2 / (12 m): the tire moves towards a force
 that pushes it, as if it were a negative spring. Forces constant over the step give zero.
-
-Products of a matrix with mostly zero forces, which read only the columns of nonzero ones.
-
-State-space recursion: the exact convolution of Green's functions and forces, without history.
 
 With a force linear over one step h (first-order hold), f(tau) = f_n + (f_{n+1} - f_n) tau / h, each
 state advances by

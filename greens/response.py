@@ -1,7 +1,5 @@
 """The response between forces and displacements by states, which of them are dynamic, hub moments.
 
-A real block of states split into those that stay dynamic and those that follow statically.
-
 Semi-analytical response of the tire between chosen forces and displacements.
 
     u(t) = Re[C z(t)] + C_b y(t) + G_res f(t),   z' = s z + P f,   y' = T y + P_b f

@@ -13,8 +13,6 @@ b(w) = |w^2 - i w d| / |w_c^2 - w^2 + i w d|.  Hence
 in Frobenius norms over all outputs and forces. The axle force, the sum of the loads less the second
 rate of the first moment, lacks  w^2 |m_r| (1 + b)  per unit load, m_r being the static moment
 outside the states.
-
-Responses between probes of a tire: residual, choice of dynamic states, error estimates.
 """
 
 from __future__ import annotations

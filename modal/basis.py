@@ -13,8 +13,6 @@ The pseudo-modes Psi are M-orthonormal to the modes and to each other, so all la
 as modes; G, S and B couple them to the modes. Eigenvectors are K-orthogonal to all that they are
 M-orthogonal to, but static shapes are not: shapes that joined earlier and those that join now form
 one space, on all of which K is made diagonal.
-
-The rotating-frame matrices on the undamped modes: small, replicated, independent of speed.
 """
 
 from __future__ import annotations

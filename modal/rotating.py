@@ -18,8 +18,6 @@ The second eigenproblem on the modal basis: the rotating tire in the non-rotatin
 (thesis (2.1)-(2.5), corrected; the doppler form takes B for G and S_B for S). Its response to modal
 forces is  eta = Re[R z] + R_b y,  z' = s z + L f,  y' = T y + L_b f:  a complex state per conjugate
 pair or real eigenvalue, and a real block for those that are nearly defective.
-
-Unrestrained motions, decoupled from all others: a wheel that drifts together with its car.
 """
 
 from __future__ import annotations

@@ -1,6 +1,4 @@
-"""Arguments of the wrong kind, refused by one message that says where the right ones come from.
-
-The computation as functions of typed inputs, without scenes or files, for scripts and notebooks.
+"""The computation as functions of typed inputs, without scenes or files, for scripts and notebooks.
 
   tire = torus(youngs_modulus=48e6, segments=24, elements_arc=10)
   turning = Turning(speed=50.0, damping=(500.0, 0.0))
@@ -11,8 +9,6 @@ The computation as functions of typed inputs, without scenes or files, for scrip
 
 SI units, angles in radians. Every function is collective: all processes of the tire's communicator
 call it with the same arguments and get the same arrays.
-
-Rolling over a road, for scripts and notebooks: runs the time loop and collects its histories.
 """
 
 from __future__ import annotations

@@ -1,11 +1,4 @@
-"""The energy that contact and drive give to the tire, and its balance.
-
-Energy between road and tire: supplied, stored, and hence dissipated.
-
-The energy balance of a run, which indicates how well its steps resolve it.
-
-Running results of the contact loop, updated by blocks of steps.
-"""
+"""The energy that road and drive give to the tire, its balance, and the running figures of a loop."""
 
 from __future__ import annotations
 

@@ -1,11 +1,4 @@
-"""Spectra, densities and levels of a record: third octaves, weighting, lines, confidence.
-
-Third-octave bands and weighting of levels, by IEC 61260-1 and IEC 61672-1.
-
-Spectra of time histories: amplitudes, densities, third-octave levels, distances.
-
-The frequency up to which a time-domain run is valid, and what limits it.
-"""
+"""Spectra and levels of a record: lines, densities, third octaves (IEC 61260-1, 61672-1), and their upper limit."""
 
 from __future__ import annotations
 

@@ -1,11 +1,4 @@
-"""Roads of heights on a regular grid, read row by row, and windows of it with holes filled.
-
-Heights of a road in rows across it, in memory or left in their file until needed.
-
-The part of a road's rows that the tire is passing over, without holes.
-
-A road measured on a regular grid, with bilinear heights in between.
-"""
+"""Roads of heights on a regular grid, read row by row, and windows of it with holes filled."""
 
 from __future__ import annotations
 

@@ -1,17 +1,4 @@
-"""Files of heights on a grid, .npz, .csv and .h5: read in pieces and checked for plausibility.
-
-Whether the sizes of a measured road can be metres; a file in millimetres looks the same.
-
-Arrays of numbers in NumPy archives (.npz), read as data; sizes are checked before allocation.
-
-Road heights in text files (.csv): a matrix, or a list of points.
-
-Road heights in NumPy archives (.npz), read as data; sizes are checked before allocation.
-
-Road heights in HDF5 files, whose datasets stay in their file until they are needed.
-
-Road heights on a grid from .npz, .csv and .h5 files, read as data and checked before use.
-"""
+"""Files of heights on a grid, .npz, .csv and .h5: read in pieces and checked for plausibility."""
 
 from __future__ import annotations
 

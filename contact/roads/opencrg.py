@@ -1,10 +1,4 @@
-"""Roads in OpenCRG files: header, heights, the surface along the reference line.
-
-The clear-text header of an OpenCRG file: named blocks of lines before the data.
-
-The sequential data of an OpenCRG file: rows of numbers in 80-byte records, text or binary.
-
-OpenCRG roads (curved regular grid, ASAM OpenCRG 1.2), text and binary, read as data.
+"""Roads in OpenCRG files (ASAM OpenCRG 1.2, curved regular grid), text and binary, read as data.
 
 The tire follows the reference line: the height under it at the distance u along and v to the left
 of the line is the grid's z(u, v). The curvature of the line is neglected within the patch: 0.12 m

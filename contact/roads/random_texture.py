@@ -11,12 +11,6 @@ so long waves of a profile are partly short ones cut obliquely. With C constant 
 the power of a profile in each band is a triangular matrix times C, which is solved for nonnegative
 C.
 
-Random fields with a given spectrum: tiles blended so that nothing repeats along the road.
-
-Superposed roads: long waves, and a texture of several bands with a skewed distribution.
-
-A line measured by a laser: cleaned of drop-outs, and widened to a surface.
-
 Cleaning of a measured profile: outliers are removed, gaps bridged, and both are counted.
 
 An outlier is farther from the median of 11 neighbours than `limit` times 1.4826 times the median

@@ -7,14 +7,6 @@ pieces of 100 mm, each less its straight line; the mean of the highest peaks in 
 piece, averaged over the pieces. Level of a third octave (ISO 13473-4): 20 lg(a / 1 um), a being the
 root mean square of the profile in the band, from a periodogram of Hann-windowed pieces with half
 overlap, each less its straight line. Bands by wavelength, 10^(k/10) m.
-
-A road that repeats, as on a drum, blended over a seam so that its heights are continuous.
-
-The part of a road that the axle is assumed to follow: its mean height, or its long waves.
-
-Vertical motion of the whole road, such as that of a shaker or a drum.
-
-A road placed under the tire: the strip of a run, with run-in and levelling.
 """
 
 from __future__ import annotations

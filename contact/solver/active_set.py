@@ -38,8 +38,6 @@ hundred points, so a factor of the touching set serves only one step. The set of
 more often than not remains the same. Relative to it the problem has as many
 nonzero unknowns as points differ: a third of those that touch, on a passenger tire, so a factor
 costs a thirtieth.
-
-The choice of the contact solver.
 """
 
 from __future__ import annotations

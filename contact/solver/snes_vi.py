@@ -1,9 +1,4 @@
-"""Unilateral contact by PETSc's SNESVI, a second method for the same problem.
-
-A compliance given as a product, in the form that PETSc's SNES VI needs.
-
-The same contact problem by PETSc's SNES VI: an independent check, slower.
-"""
+"""Unilateral contact by PETSc's SNESVI, a second method for the same problem."""
 
 from __future__ import annotations
 

@@ -1,7 +1,5 @@
 """Contact with friction: normal and tangential forces in turn, sticking and sliding points.
 
-GMRES (generalised minimal residual method) for a few hundred unknowns, without restarts.
-
 Stick and slip under given normal forces: minimise t.B t/2 + c.t with |t_i| <= b_i at each point.
 
 t_i lies in the plane of the road. Where |t_i| < b_i, (B t + c)_i = 0 and the point sticks; where

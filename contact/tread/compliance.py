@@ -1,6 +1,4 @@
-"""Compliance of the half space under rectangles.
-
-Compliance of the tread rubber between carcass and road, added to that of the tire.
+"""Compliance of the tread rubber between carcass and road: the half space under rectangles.
 
 Each function returns a dense (n, n) array in m/N: entry (i, j) is the approach of point i to the
 carcass under a unit force on point j. None of them is collective.

@@ -1,6 +1,4 @@
-"""A tread layer on a rigid base: normal and tangential influence.
-
-An elastic layer bonded to a rigid base, like a tread on its belt.
+"""A tread layer bonded to a rigid base, its belt: influence of pressure and of horizontal forces.
 
 An elastic layer bonded to a rigid base under horizontal forces, coupled with pressure.
 

@@ -1,7 +1,5 @@
 """Tangential influence of the tread, as matrix and as convolution on a grid.
 
-Displacements in the plane of the road and normal to it between points of a grid, by FFT.
-
 Horizontal displacements of an elastic half-space, coupled with pressure (Boussinesq, Cerruti).
 
 With z into the body, G the shear modulus, r the distance in the surface from a force t (in the

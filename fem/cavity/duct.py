@@ -1,6 +1,4 @@
-"""The air inside the tire as an ideal gas, and its acoustic losses at the walls.
-
-The air in the tire as an annular duct that rotates with the wheel: its modes with rigid walls.
+"""The air in the tire: an ideal gas in an annular duct that rotates with the wheel, and its losses.
 
 Air carried along by the wheel flows through the non-rotating duct with A U = const = Omega V / 2
 pi. Its displacement xi(s, t) relative to that flow along the ring, s running along the line of

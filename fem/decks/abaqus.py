@@ -1,7 +1,4 @@
-"""Sections, cord layers, embedded membranes, rigid rims and materials of an Abaqus deck.
-
-Reader of Abaqus decks, keyword by keyword, with a list of what is not used.
-"""
+"""Reader of Abaqus decks, keyword by keyword, with a list of what is not used."""
 
 from __future__ import annotations
 

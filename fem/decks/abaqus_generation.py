@@ -1,8 +1,4 @@
-"""Node sets, element sets and surfaces of an Abaqus deck.
-
-The nodes and elements that a deck has defined so far, by label.
-
-Positions of generated nodes: on lines and arcs, shifted, rotated, reflected.
+"""Nodes, elements, sets and surfaces of an Abaqus deck, given or generated.
 
 Nodes and elements that an Abaqus deck generates: *NGEN, *NFILL, *NCOPY, *ELGEN, *ELCOPY.
 

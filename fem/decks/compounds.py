@@ -1,9 +1,4 @@
-"""Units of a deck: Abaqus has none, so a length unit stands for a consistent system.
-
-Small motions from a Prony series.
-
-Materials of decks as laws of the program, in SI units.
-"""
+"""Materials of decks as laws of the program, in SI units."""
 
 from __future__ import annotations
 

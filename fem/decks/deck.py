@@ -2,12 +2,6 @@
 
 Files are read in pieces, so unused parts take no memory. Included files are read in place and must
 lie in the deck's folder or below it. Nothing in a deck is executed.
-
-Numbers of a deck's data lines: regular lines are read fast, others line by line.
-
-The Abaqus element types that can form a tire's section or body.
-
-Contents of a mesh file of any format, and what of it was not used.
 """
 
 from __future__ import annotations

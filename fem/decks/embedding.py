@@ -1,8 +1,4 @@
-"""Location of points in the cells of a section.
-
-Splitting of rows of cells along a line, so that element sides lie on it.
-
-Membranes in a section: on element sides, or inside elements, which are split along them.
+"""Membranes with cords in a section: where they lie, and the cells split along them.
 
 The cords of a deck on the sides of a section's cells: course, angle and data of each ply.
 
@@ -12,8 +8,6 @@ in the (r, z) plane: the cord lies along cos a t + sin a e_theta, e_theta right-
 the lowest point e_theta is -x, so relative to a chain that runs along s t (s = 1 or -1) the cord
 lies along -sin a e_x + s cos a e_chain: the angle from the circumference is atan2(s cos a, -sin a).
 A line has no sense of direction, so the angle is reduced to between -90 and 90 degrees.
-
-Embedding of all membranes with cords in the cells of a section.
 """
 
 from __future__ import annotations

@@ -1,8 +1,4 @@
-"""The element types of Gmsh and their Abaqus counterparts.
-
-The parts of a Gmsh file and their numbers, text or binary, never read past their end.
-
-Reader of Gmsh meshes, .msh 2.2 and 4.1, text and binary.
+"""Reader of Gmsh meshes, .msh 2.2 and 4.1, text and binary.
 
 Physical groups of the highest dimension become element sets, those one dimension lower surfaces. A
 section lies in the plane z = 0, with x the distance from the axle and y along it. Counts are

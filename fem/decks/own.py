@@ -1,11 +1,4 @@
-"""Edges of a section by the names of surfaces and sets.
-
-Assignment of compounds to the elements of a section.
-
-A section file (docs/section-file.md), converted like other mesh files.
-
-From a mesh file to a section: the only entry point of this package.
-"""
+"""From a mesh file or a section file to a section with compounds and cords."""
 
 from __future__ import annotations
 

@@ -1,16 +1,8 @@
-"""Nine-node quadrilaterals, and the conversion of sections with triangles to quadrilaterals.
+"""A section as nine-node quadrilaterals: conversion of triangles, its faces, its mirror image.
 
 Local node (i, j) of a cell is at 3 i + j, at xi = i/2, eta = j/2; sides 0 to 3 are xi = 0, xi = 1,
 eta = 0, eta = 1, as in tireroad.fem.sections. Every side carries the number of the deck's edge it
 is part of, so that sets of the deck remain valid after cells are split.
-
-A section as nine-node quadrilaterals, built from a deck's elements (see quad_split).
-
-Ordering of cell sides into chains from end to end.
-
-The faces of a section: rim, inner face under pressure, outer face and tread.
-
-A half section completed by its mirror image.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The axis about which the nodes of a three-dimensional deck form rings.
+"""Reduction of three-dimensional decks that are bodies of revolution to their section.
 
 Cord angles in three-dimensional membranes, converted to angles from the section's meridian.
 
@@ -8,8 +8,6 @@ one if x is the axle, where e_1 is the projection of global x (the meridian m to
 a cylindrical one about the axle with its first axis as normal, where e_1 is e_theta. With n x m = s
 e_theta, s = 1 or -1, the angle from m towards e_theta is s a in the first; in the second, as n x
 e_theta = -s m, it is atan2(cos a, -s sin a).
-
-Reduction of three-dimensional decks that are bodies of revolution to their section.
 
 The program's rolling states require a body whose undeformed shape is the same at every angle; any
 other body is refused, with the reason.

@@ -1,4 +1,6 @@
-"""Static flexibility of a free tire by inertia relief.
+"""Static flexibility of a free or rotating tire, and receptances of its full matrices.
+
+Static flexibility of a free tire by inertia relief.
 
 A rigid motion R has no stiffness, so K is singular. A load is balanced by the inertia forces of the
 rigid acceleration it causes, and the response is made orthogonal to the rigid motions:
@@ -12,8 +14,6 @@ By frame indifference K R of a rotation is the moment of the static forces that 
 tire. The doppler inertia leaves some where there should be none: Omega^2 S_B u of a shape that is
 round but for its elements. A balanced load then causes a small reaction, which is balanced and
 solved for again until none is left.
-
-Exact static flexibility of the rotating tire: one factorisation for all loads.
 
 Receptance of the full matrices, frequency by frequency: the reference for all modal ones.
 

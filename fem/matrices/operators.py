@@ -1,4 +1,6 @@
-"""Support of the tire in small motions: rim fixed or free, road absent or holding its nodes.
+"""Matrices of small motions about a static state, on the unknowns that its support leaves free.
+
+Support of the tire in small motions: rim fixed or free, road absent or holding its nodes.
 
 A free rim is an unsupported rigid body without mass of its own. On its nodes
 
@@ -13,8 +15,6 @@ centre. The second-order work of rotating forces adds to K, on the rotations,
 A free tire without a road then has its six rigid modes at any inflation (a uniform pressure on the
 two equal bead circles of a rigid rim has no resultant), and K is symmetric. Mass-proportional
 damping then acts against the ground, as there is no wheel on an axle.
-
-Matrices of small motions about a static state, on the unknowns that its support leaves free.
 
 For basis functions phi on the undeformed mesh and w = e_y x X (Omega factored out). K is the
 tangent stiffness with its geometric and follower-pressure parts, the rubber's material part with

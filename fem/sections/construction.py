@@ -1,6 +1,4 @@
-"""A smooth, symmetric outer face through a few points, parametrised by length from the crown.
-
-A tire built from layers under its outer face, as described by the radial tire or a section file.
+"""A tire built from layers under its outer face, as the radial tire or a section file describes it.
 
 Layers follow one another from the outer face inwards, each with a thickness that varies along the
 section. Cords lie on the inner side of a layer; parts of a layer may be of another compound.

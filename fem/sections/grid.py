@@ -1,10 +1,10 @@
-"""Element sizes near a clamped edge: geometric grading, as far as the other elements allow.
+"""Sections meshed as the product of two lines of elements: through the wall and along it.
+
+Element sizes near a clamped edge: geometric grading, as far as the other elements allow.
 
 At a clamped edge stresses are singular and a bending boundary layer ends. Sizes that grow in
 proportion to the distance (h = h0 + GROWTH d) give each element the same error. The smallest size
 depends on the number of elements: if there are few, the middle of the wall needs them more.
-
-Sections meshed as the product of two lines of elements: through the wall and along it.
 """
 
 from __future__ import annotations

@@ -1,9 +1,4 @@
-"""The reference quadrilateral [0, 1] x [0, 1]: tensor-product Lagrange functions and sides.
-
-The cross-section of a tire as curved quadrilaterals in the meridian half plane.
-
-Validity checks of a section mesh; each error names the fault and its position.
-"""
+"""The cross-section of a tire as curved quadrilaterals in the meridian half plane."""
 
 from __future__ import annotations
 

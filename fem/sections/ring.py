@@ -1,7 +1,4 @@
-"""Element sizes around the axle: smaller at the footprint.
-
-A section and the data for its revolution into a ring of elements.
-"""
+"""A section and the data for its revolution into a ring of elements."""
 
 from __future__ import annotations
 

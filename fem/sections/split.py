@@ -1,7 +1,4 @@
-"""Location of points in a section: cell, reference coordinates and shape functions.
-
-Local refinement: strips of a section's cells and segments of a ring are split in two.
-"""
+"""Points located in a section, and local refinement: strips of its cells split in two."""
 
 from __future__ import annotations
 

@@ -1,7 +1,5 @@
 """Stored results of a long computation, so that an interrupted one resumes bit for bit.
 
-Record of the solutions on a load path, so that an interrupted path is retraced without solving.
-
 The path is a function of the outcomes and states of its solutions. It is retraced from its start,
 and each recorded solution is put in place. The solution after the last recorded one may use its
 tangent, which is not stored; the last solution of each problem is therefore solved again, from

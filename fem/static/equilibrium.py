@@ -1,4 +1,8 @@
-"""Equilibrium on the road by Newton's method: forces, drag, resumed steps, and the solution.
+"""Static equilibrium under inflation, steady rolling and a smooth frictionless road, by Newton's method.
+
+F_int(u) + p F_pressure(u) + Omega^2 S (X + u) + gamma1 Omega B u + gamma2 Omega K M^-1 B u = f,
+with f >= 0 and z + u_z >= z_road at the tread dofs, one of the two an equality. On roads other than
+a level plane they move in road coordinates (fem.static.road). Friction: fem.static.friction_road.
 
 Record of the solutions on a load path, so that an interrupted path is retraced without solving.
 
@@ -6,18 +10,6 @@ The path is a function of the outcomes and states of its solutions. It is retrac
 and each recorded solution is put in place. The solution after the last recorded one may use its
 tangent, which is not stored; the last solution of each problem is therefore solved again, from
 where it began.
-
-Springs to the current position that slow the motion of a body through a snap.
-
-Outcome of one equilibrium solve.
-
-Assembled residual and tangent of one body at its present displacement, without a road.
-
-Static equilibrium under inflation, steady rolling and a smooth frictionless road.
-
-F_int(u) + p F_pressure(u) + Omega^2 S (X + u) + gamma1 Omega B u + gamma2 Omega K M^-1 B u = f,
-with f >= 0 and z + u_z >= z_road at the tread dofs, one of the two an equality. On roads other than
-a level plane they move in road coordinates (fem.static.road). Friction: fem.static.friction_road.
 """
 
 from __future__ import annotations

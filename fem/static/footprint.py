@@ -1,7 +1,4 @@
-"""Contact pressure and extent of the footprint from nodal forces and gaps on the outer face.
-
-Interpolation on the deformed outer face: weights and positions at any point.
-"""
+"""The footprint: contact pressure and extent on the deformed outer face."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pressing a tire on a road with friction: the system, the balance, steps of sliding.
+"""Pressing a tire on a road with friction, and sliding it there.
 
 The linearised equilibrium of a tire with stick and slip: the counterpart of `ConstrainedSystem`.
 

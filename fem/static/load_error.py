@@ -1,13 +1,7 @@
 """The discretisation error of the load, from a companion state on another mesh.
 
-Transfer of a static state to another mesh of the same tire, as a close start.
-
-A tire in equilibrium on the road, and near that state on another mesh, for mesh errors.
-
 Half of the ring is used where a half turn leaves the state unchanged
 (fem.static.symmetric).
-
-Error of the load from two companions: refined at the footprint, and of another order.
 
 Where contact ends, the surface opens as d^(3/2), d being the distance from the edge, which lies
 anywhere in an element. This error fluctuates from mesh to mesh, and no coarser mesh reveals it.

@@ -29,12 +29,6 @@ for without it.
 Adaptive load steps: halved when Newton's method fails, enlarged when it converges easily.
 
 If the steps become too small, an error names the last converged state.
-
-Path to a load or a deflection: known states and the choice of the next trial.
-
-Load steps to a requested state: inflation, then the road by height, deflection or load.
-
-Why a rolling tire has no static state: too high a speed, or too high a load.
 """
 
 from __future__ import annotations

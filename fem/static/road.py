@@ -16,8 +16,6 @@ All of these surfaces are developable. A point on the road has the coordinates x
 on a plane) along it and eta = y cos gamma - z sin gamma across it. A body on the road that moves up
 with it keeps both.
 
-The smooth road under the tread nodes of one body: nodes in contact and their forces.
-
 Tread nodes in the coordinates of a road that is not a level plane.
 
 X = X(xi, eta, w): the point of the surface at xi, eta along and across it

@@ -1,4 +1,6 @@
-"""Axisymmetric state of the inflated tire without a road, from one section.
+"""Symmetries of the static state: one section if inflated, half a ring if pressed on the road at rest.
+
+Axisymmetric state of the inflated tire without a road, from one section.
 
 With P from the motion of the section's nodes, in circumferential, axial and radial directions, to
 all nodes of a sector of one element around,
@@ -8,12 +10,6 @@ all nodes of a sector of one element around,
 The boundary terms of the two cut faces cancel in an axisymmetric motion. Angled belts may rotate
 the crown relative to the beads; that is axisymmetric too. Damping by mass or stiffness has no
 effect in an axisymmetric shape.
-
-Half of the ring where a half turn about the vertical leaves the tire unchanged.
-
-The two cut faces of a half ring, and the coupling of their nodes by the half turn.
-
-The linearised equilibrium of half a ring with coupled cut faces.
 
 Symmetry of the standing tire under a half turn about the vertical: half of the ring suffices.
 

@@ -1,7 +1,5 @@
 """The tangent with dofs held by the road, and its linear contact problem.
 
-The linearised equilibrium with some dofs held: one factorisation, any number of solves.
-
 Contact within a linearised step: a linear complementarity problem on the tread nodes.
 
 K du = right is solved with the nodes held that were held when K was factorised. Each node held

@@ -1,7 +1,4 @@
-"""Gathering of nodal values on every process.
-
-The tire as a discretised body: mesh, displacement field, clamped rim, integration measures.
-"""
+"""The tire as a discretised body: mesh, displacement field, clamped rim, integration measures."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""From a section to a ring of curved hexahedra: geometry, node lattice and boundary tags.
-
-Materials of the wall by region of the section: one value per cell for each coefficient.
-"""
+"""From a section to a ring of curved hexahedra: geometry, node numbering, materials of the wall."""
 
 from __future__ import annotations
 

@@ -1,12 +1,12 @@
-"""Integrals over one face of each cell as cell integrals whose quadrature points lie on the face.
+"""The plies of a body: the cell faces that they lie on, and their forms.
+
+Integrals over one face of each cell as cell integrals whose quadrature points lie on the face.
 
     int_face f dA = int_cell-rule f |J^-T n| |det J|,   n the reference normal (Nanson's formula)
 
 Facet integrals on a surface inside the body would couple the two adjacent cells in the sparsity
 pattern, order each facet's sides differently on each process, and need cells of other processes.
 Here each cell, and thus each process, owns its faces.
-
-The plies of a body: the cell faces they lie on, and their forms.
 
 As for the wall, the cords' coefficients are data of the compiled forms, one value per cell and 0
 where its face is on no ply. Another angle, modulus or number of plies needs no recompilation.

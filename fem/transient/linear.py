@@ -1,4 +1,6 @@
-"""Modal damping in the full finite-element model: a low-rank matrix in addition to the sparse ones.
+"""Full finite elements in time about a static state, in the non-rotating frame: the reference.
+
+Modal damping in the full finite-element model: a low-rank matrix in addition to the sparse ones.
 
     D_x = M Phi diag(e) Phi^T M,   and in the rolling pencil
     K_x = Omega D_x M^-1 B = Omega M Phi diag(e) Phi^T B,
@@ -29,8 +31,6 @@ only. With T = (1, -R; 0, L^-T), X' = T^T X T, a step solves
     [C^T Z] [x] = [s].
 
 The wheel's unknowns follow the tire's on the last process.
-
-Full finite elements in time about a static state, in the non-rotating frame: the reference.
 
     M u'' + (D + 2 Omega G) u' + K_Omega u = W^T f,   D = gamma1 M + gamma2 K,
 

@@ -1,6 +1,4 @@
-"""Operations on many fields over all unknowns, distributed by rows over the processes.
-
-Among them products with very sparse matrices that every process holds whole.
+"""Fields over all unknowns, distributed by rows: sums, products, and one order, sign and basis of the modes.
 
 One order, one sign and one basis of each repeated frequency for the modes, by rule.
 

@@ -1,11 +1,11 @@
-"""XDMF pages for ParaView, pyvista and meshio; they refer to the HDF5 results and copy no data.
+"""Exports for other programs: CSV for spreadsheets, and XDMF for ParaView, pyvista and meshio.
+
+XDMF pages for ParaView, pyvista and meshio; they refer to the HDF5 results and copy no data.
 
 A page is a time series of states; the first holds geometry and topology for all (XInclude, as
 DOLFINx writes it). The results lie one folder up. Readers expect every field to be a separate
 dataset: a row of a larger dataset becomes one through a virtual dataset (HDF5) in a small file
 beside the page.
-
-Exports for other programs: CSV for spreadsheets, and XDMF for ParaView.
 """
 
 from __future__ import annotations

@@ -1,9 +1,4 @@
-"""The result folder: its owner, and whether it is writable.
-
-Which result files of a folder belong to its scene: the one rule for all that read results.
-
-`summary.json`: what each stage of the folder's scene has given, and what other scenes left there.
-"""
+"""The result folder: its owner, its summary, and which of its files belong to the scene."""
 
 import fcntl
 import json

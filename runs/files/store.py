@@ -1,10 +1,8 @@
-"""What a result depends on besides its inputs: the program's sources and the libraries.
+"""Result files, written under a temporary name and renamed, so that an existing file is complete.
+
+What a result depends on besides its inputs: the program's sources and the libraries.
 
 Part of every stage's hash, so that no result is reused after the code or a library has changed.
-
-The file object under HDF5 while a result file is written.
-
-Result files, written to a temporary name and renamed, so that an existing file is complete.
 
 Only the root process writes; callers gather the arrays. Every HDF5 file carries the resolved scene,
 the hash of its inputs, program and library versions, the number of processes, and a checksum that

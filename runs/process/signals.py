@@ -1,7 +1,4 @@
-"""Exit statuses, and how they reach the shell through mpirun.
-
-Handling of stop signals in this process.
-"""
+"""Stop signals of this process, and exit statuses as they reach the shell through mpirun."""
 
 import os
 import signal

@@ -1,7 +1,4 @@
-"""Memory used by this process and available on this machine.
-
-Checks of a run's environment, made before MPI and HDF5 would fail without a message.
-"""
+"""Checks of a run's environment and memory, made before MPI and HDF5 would fail without a message."""
 
 import math
 import os

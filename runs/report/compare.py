@@ -1,9 +1,4 @@
-"""Differences between runs in scene, figures, levels, modes and cost, as rows of one table.
-
-Figures of several runs side by side, as data URIs.
-
-`compare`: two to twelve runs in one page and one table, from their result folders alone.
-"""
+"""`compare`: two to twelve runs in one page and one table, from their result folders alone."""
 
 from __future__ import annotations
 

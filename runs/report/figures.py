@@ -1,6 +1,4 @@
-"""Thins long series for drawing without losing peaks.
-
-Line charts and bars of the report, as data URIs.
+"""Line charts and bars of the report, as data URIs, thinned without losing peaks.
 
 Uses matplotlib's Figure objects only: no window, no global state.
 """

@@ -1,8 +1,6 @@
-"""Summary of a run: load, footprint, forces and levels with errors, first modes.
+"""report.html: one self-contained page about a result folder, with a summary on top.
 
 Rates error indicators: limits, and a word for the reader.
-
-report.html: one self-contained page about a result folder.
 """
 
 from __future__ import annotations

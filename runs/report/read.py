@@ -1,7 +1,4 @@
-"""Formats numbers with units for readers: 4 digits and the usual prefixes.
-
-Reading the result files of one folder, and the section of a report made from them.
-"""
+"""Reading the result files of one folder, and numbers with units for readers."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

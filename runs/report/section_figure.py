@@ -1,7 +1,4 @@
-"""A drawing of the section: regions, lines of cords with angles, inner face, tread and rim.
-
-Draws a scene's section into its result folder.
-"""
+"""A drawing of a scene's section: regions, lines of cords with angles, inner face, tread and rim."""
 
 from __future__ import annotations
 

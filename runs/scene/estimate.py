@@ -1,13 +1,4 @@
-"""What the static state takes: matrices, companions for the load's error, friction, tangents.
-
-Cost of a scene's stages: operations, and seconds on one core.
-
-Size of a run's files, estimated before anything is computed.
-
-Estimates of a scene's memory, disk and time before anything is computed.
-
-Compares a scene's demand with the machine's resources, to refuse or warn before the run.
-"""
+"""Estimates of a scene's memory, disk and time before anything is computed, and what the machine has."""
 
 import shutil
 from dataclasses import dataclass, replace

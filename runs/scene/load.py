@@ -1,13 +1,9 @@
-"""A scene before its checks: the text of its file, and single keys overridden by --set.
+"""Reads a scene from TOML, checks it completely and fills in every default.
 
 Drops keys of the file that are of no use to a variant chosen by --set.
 
 A scene with `kind = "sine"` has the sine's keys. With `--set road.kind=flat` these would be errors,
 and every one of them would have to be removed on the command line too.
-
-Defaults of a scene that follow from other tables than their own.
-
-Reads a scene from TOML, checks it completely and fills in every default.
 
 `load` returns a `Scene` whose values have their types, lie in their ranges and do not contradict
 each other, or raises one InputError that lists all problems: the key, its place and the remedy.

@@ -1,9 +1,4 @@
-"""Solutions on the full matrices need a damping that has a full matrix.
-
-Requirements and limits of a scene's outputs.
-
-Rules beyond single keys: contradictions between tables, and combinations not supported.
-"""
+"""Rules beyond single keys: contradictions between tables, and combinations not supported."""
 
 from collections.abc import Callable, Iterator
 from typing import Any

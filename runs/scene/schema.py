@@ -8,10 +8,6 @@ A variant is a class selected from a registry by a key of the same table, e.g. t
 `road.kind`: its parameters are keys of that table, and the scene holds an object of that class. A
 collection has one key per class of a registry, e.g. `output.impulse`: a switch, or a table if the
 class has parameters.
-
-Iterates over the tables of a scene and their keys, in all variants.
-
-The resolved scene as text: every default written out, with unit and meaning of each key.
 """
 
 from collections.abc import Iterator

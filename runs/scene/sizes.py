@@ -1,8 +1,4 @@
-"""The tire's wall as a shallow shell under tension: how dense its modes are.
-
-Sizes of the matrices and factors of a mesh whose columns of nodes go through the wall.
-
-Sizes of the parts of a scene, estimated before anything is computed.
+"""Sizes of the parts of a scene, estimated before anything is computed.
 
 Modes from their density in a shell under tension, contact points from the footprint, steps from the
 automatic step. Each is within a factor of about two of what a run finds.

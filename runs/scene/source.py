@@ -1,7 +1,4 @@
-"""Finds the line of a key in a scene's text, for messages: the TOML reader returns values only.
-
-The origin of a scene's values, and the collection of all its problems.
-"""
+"""The origin of a scene's values, the line of each, and the collection of all its problems."""
 
 import re
 from dataclasses import dataclass, field

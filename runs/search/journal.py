@@ -1,11 +1,9 @@
-"""The estimated error of a run relative to its target, by cause and figure.
+"""search.json: the trials of a search with their estimated errors, so that it can be resumed, and is not repeated.
 
 What a search keeps in its result folder until it has found settings.
 
 `search/scene.toml` is the scene as given, with which `resume` goes on; `scene.toml` is always that
 of the results beside it. `search/cache` holds the stages of the trials.
-
-search.json: the trials of a search, so that it can be resumed, and is not repeated.
 """
 
 from __future__ import annotations

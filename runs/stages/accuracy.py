@@ -1,17 +1,4 @@
-"""Local compliance, between the nodes of the mesh, of the rubber under a scene's contact.
-
-What companion runs have in common: the run that they repeat in part.
-
-The same scene on elements of twice the size, up to its Green's functions.
-
-What companion runs may cost: the steps that they repeat, and the points that may touch.
-
-Companion runs: error estimates for a run's time step, contact points, modes and mesh.
-
-Upper frequency up to which the results of a run are valid.
-
-Stage accuracy: error estimates of a run's forces from cheap companion runs of known orders.
-"""
+"""Stage accuracy: error estimates of a run's forces from cheap companion runs of known orders."""
 
 from __future__ import annotations
 

@@ -1,11 +1,4 @@
-"""Figures and warnings of a contact loop.
-
-Decides when a time loop stops and when it writes a checkpoint.
-
-The energy balance of stage contact: accumulated during the loop, then reported.
-
-Stage contact: the tire rolls over the road.
-"""
+"""Stage contact: the tire rolls over the road."""
 
 from __future__ import annotations
 

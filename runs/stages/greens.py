@@ -1,7 +1,4 @@
-"""Responses in result files.
-
-Stage greens: Green's functions between driven points, and between those of the patch.
-"""
+"""Stage greens: Green's functions between driven points, and between those of the patch."""
 
 from __future__ import annotations
 

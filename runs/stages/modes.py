@@ -1,11 +1,9 @@
-"""modes.h5: frequencies, traces on the outer face, small matrices; no fields on all unknowns.
+"""Stage modes: the lowest modes about the static state, and rotation matrices projected on them.
 
 The modes on all unknowns, in the shared cache beside modes.h5.
 
 A family with attachment modes thus solves them once. Not in the result folder: 38 MB for 157 modes
 of 30,240 unknowns. Those above LARGEST are solved again by each member.
-
-Stage modes: the lowest modes about the static state, and rotation matrices projected on them.
 """
 
 from __future__ import annotations

@@ -1,14 +1,12 @@
-"""Failures of stages: entered in the summary, and kept during a sweep.
+"""The product of a stage, from its own file, from the shared cache, or computed; and its failures.
+
+Failures of stages: entered in the summary, and kept during a sweep.
 
 Members of a sweep that share a stage do not repeat its failure.
 
 The environment variable TIREROAD_FAILURES names a folder with a file for each stage that has
 failed, by its name and the hash of its inputs. A sweep on this machine gives its workers an empty
 one. Without it nothing is remembered: a run by itself may be tried again.
-
-Settings of the solvers of each stage, for log.txt: method, tolerances, factorisation.
-
-The product of a stage, from its own file, from the shared cache, or computed.
 """
 
 from __future__ import annotations

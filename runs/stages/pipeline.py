@@ -1,9 +1,4 @@
-"""A road file, read by one process of each machine and shared with the others.
-
-The parts of the pipeline in their order.
-
-Runs the stages in order: each is reused, computed or skipped, and its cost is recorded.
-"""
+"""Runs the stages in order: each is reused, computed or skipped, and its cost is recorded."""
 
 from __future__ import annotations
 

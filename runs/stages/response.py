@@ -1,7 +1,4 @@
-"""What outputs can read of a run: responses and forces of the driven points, contact history.
-
-Stage response: prescribed point forces in time and frequency, and the scene's outputs.
-"""
+"""Stage response: prescribed point forces in time and frequency, and the scene's outputs."""
 
 from __future__ import annotations
 

@@ -1,13 +1,4 @@
-"""The prescribed forces of a scene as functions of time.
-
-The run-in, while the road grows from flat: it is left out of a run's figures.
-
-The time steps of a run: given by the scene, or derived from what must be resolved.
-
-A scene's time loop: the driven tire, the normal solver, the brush.
-
-The integration scheme: as the scene says, or as the contact's oscillation requires.
-"""
+"""A scene's time loop: step, scheme, run-in, the driven tire, the normal solver, the brush."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""The states in rotating.h5: those of the modes and, apart, those of the shapes that joined them.
+"""Stage rotating: eigenproblem of the rotating tire, on the modal basis or the finite elements.
+
+The states in rotating.h5: those of the modes and, apart, those of the shapes that joined them.
 
 A state dominated by rotation shapes (modal.rotation_shapes) is not an eigenfrequency of the tire: it
 represents the coupling of its modes to faster ones. There are as many as shapes; `turning/place`
 holds their indices among all states.
-
-Stage rotating: eigenproblem of the rotating tire, on the modal basis or the finite elements.
 """
 
 from __future__ import annotations

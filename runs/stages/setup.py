@@ -1,7 +1,4 @@
-"""The tread pattern of a scene.
-
-Where the tire meets the road and where prescribed forces act: cheap, so made in every run.
-"""
+"""Where the tire meets the road and where prescribed forces act: cheap, so made in every run."""
 
 from __future__ import annotations
 

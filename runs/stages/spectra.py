@@ -1,7 +1,4 @@
-"""Levels and densities of all histories of a run: forces, moments, motion of chosen points.
-
-Stage spectra: contact and axle force over frequency.
-"""
+"""Stage spectra: levels and densities of contact force, axle force and motions over frequency."""
 
 from __future__ import annotations
 

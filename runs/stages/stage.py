@@ -1,10 +1,4 @@
-"""The record of a stage: figures, warnings, and time by part.
-
-From the scene's tire to its section, lattice of nodes and finite-element body.
-
-A job: one run of one scene, shared unchanged by all its stages.
-
-A stage: a function of typed inputs whose frozen product is written to a file and read back.
+"""A stage: a function of typed inputs whose frozen product is written to a file and read back.
 
 Checkpoints of the stages static and modes, for runs that are stopped or killed.
 
@@ -12,8 +6,6 @@ Each process stores its own results, part by part, in
 `<stage>_checkpoint/<rank>of<size>-<number>.h5`, where `number` is that of the part's first result.
 Parts carry a checksum and the key of the stage's inputs; reading ends at the first part that is
 absent, damaged or of other inputs.
-
-Rotation of the scene's wheel, and damping of its tire.
 """
 
 from __future__ import annotations

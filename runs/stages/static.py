@@ -1,11 +1,4 @@
-"""Cord forces of a static state, in static.h5 and in its headline.
-
-Friction of a static state, in static.h5 and in its headline.
-
-The static state in static.h5.
-
-Stage static: inflates the tire and presses it on the road.
-"""
+"""Stage static: inflates the tire and presses it on the road."""
 
 from __future__ import annotations
 

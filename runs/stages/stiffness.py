@@ -1,7 +1,4 @@
-"""[stiffness] with friction: force over road displacement at rest, or over slip when rolling.
-
-Stage stiffness: load and footprint over deflection, stiffness of the non-rolling tire.
-"""
+"""Stage stiffness: load and footprint over deflection, stiffness, and forces of sliding or slip."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""All forces on the tire in a completed run, relative to the static state, on its coordinates.
-
-Common base of the stages that show the whole tire under the forces of a completed run.
-"""
+"""Base of the stages that show the whole tire under the forces of a completed run."""
 
 from __future__ import annotations
 

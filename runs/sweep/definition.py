@@ -1,6 +1,4 @@
-"""The members of a sweep, from the plan, the axes and the list in its file.
-
-Definition of a sweep file: a base scene, axes, and how their values form members.
+"""Definition of a sweep file: a base scene, axes, and how their values form members.
 
   name = "speeds"
   scene = "passenger.toml"          # relative to the sweep file

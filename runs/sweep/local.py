@@ -1,4 +1,4 @@
-"""Runs the members of a sweep on this machine, as many at a time as cores and memory allow.
+"""Runs the members of a sweep on this machine, or submits them to Slurm or another batch system.
 
 Submits a sweep to Slurm, or through a template to another batch system, as job scripts.
 

@@ -1,4 +1,4 @@
-"""Gathers settings and results of all members of a sweep from their folders into one table.
+"""sweep.html: the members of a sweep side by side, with their third octaves.
 
 Third octaves of a sweep's members in dB relative to the first with any, with their uncertainty.
 
@@ -7,8 +7,6 @@ power lies within t s / sqrt(n) of that of all roads in 95 of 100 cases (Student
 degrees of freedom, s the standard deviation over the n seeds). The error bars of the runs
 (contact.results.error_bars) are added as squares; both are independent of each other and of those
 of other members.
-
-sweep.html: the members of a sweep side by side.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""A synthetic tire without finite elements, for tests and benchmarks: a rolling strip on springs.
+"""Tires of validations and tests: a rolling strip without finite elements, and the thesis's torus.
+
+A synthetic tire without finite elements, for tests and benchmarks: a rolling strip on springs.
 
 A periodic strip of length L and width B, simply supported at its sides, with travelling waves
 
@@ -6,8 +8,6 @@ A periodic strip of length L and width B, simply supported at its sides, with tr
   omega^2 = omega_0^2 + c^2 (k_n^2 + (j pi/B)^2),
 
 convected at the rolling speed v: a mode n > 0 splits into omega +- k_n v, as modes of a tire do.
-
-The thesis's torus with selectable elements: tire of most benchmarks, validations and tests.
 """
 
 from __future__ import annotations

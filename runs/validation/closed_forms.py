@@ -1,9 +1,4 @@
-"""Finite elements, modes and recursion against closed forms: (case, unit, computed, exact).
-
-The golden car, without a tire, against its published poles: (case, unit, computed, exact).
-
-Parts of the program against closed forms.
-"""
+"""Finite elements, modes and recursion against closed forms: (case, unit, computed, exact)."""
 
 from __future__ import annotations
 

@@ -20,8 +20,6 @@ A rubber roller in plane strain: the finite-element tire as a cylinder with clos
 
 A torus with such a large section circle that the strip in use is flat; its inner face is held, and
 nothing moves along the axle. Elements are small at the road and grow from there around and inwards.
-
-Friction of the static state against closed forms: (case, unit, computed, exact).
 """
 
 from __future__ import annotations

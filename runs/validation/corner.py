@@ -1,7 +1,4 @@
-"""A wheel on its corner against its limits: a held axle, the blocked force, a free wheel.
-
-Modes against full finite elements in time: the wheel as a rigid body on a corner.
-"""
+"""A wheel on its corner against its limits, and modes against full finite elements in time."""
 
 from __future__ import annotations
 

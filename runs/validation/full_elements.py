@@ -1,9 +1,4 @@
-"""Time histories of any tire model with the same road, points, tread and solver.
-
-The two tire models of a validation: modes with any residual, and full finite elements.
-
-Modal runs against full finite elements at several time steps: errors, run times, targets.
-"""
+"""Modal runs against full finite elements at several time steps: errors, run times, targets."""
 
 from __future__ import annotations
 

@@ -1,18 +1,10 @@
 """Static states at and beyond the limits: each converges, or stops with reason and last state.
 
-Modes of a small tire at the limits: double roots, beyond critical speed, damping, buckling.
-
-Green's functions at the limits, against the matrix exponential of the companion problem.
-
-Part of `validate stability`: the contact loop at its limits, with a synthetic tire.
-
 Part of `validate stability`: combinations of a scene's options on one coarse tire, all stages.
 
 Every value of axle, road shape, tread, bristles, pattern and road occurs, and pairs that could
 amplify each other: a moving wheel on creeping rubber, patterns with friction, drums with jumps,
 slip with camber.
-
-Stress test of every package: each case must finish, or be refused with a reason.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Figures of measured tables: curves, the front of run time against error, ratios as bars.
-
-The self-contained page of benchmarks and validations, with numbered tables and figures.
-"""
+"""The self-contained page of benchmarks and validations, with numbered tables and figures."""
 
 from __future__ import annotations
 

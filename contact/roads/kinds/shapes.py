@@ -1,9 +1,4 @@
-"""A flat road: every height is 0.
-
-A sine road with crests across the rolling direction.
-
-A step or a cleat on a flat road, perpendicular to the rolling direction or at an angle.
-"""
+"""Roads of simple shapes: flat, a sine across the rolling direction, a step or a cleat."""
 
 import math
 from dataclasses import dataclass

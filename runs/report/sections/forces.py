@@ -1,13 +1,4 @@
-"""Report section part about the wheel: hub moments, and its motion if it moves.
-
-Report section part about the tread pattern.
-
-Report section part about the road.
-
-Report section part about the axle: force on the held axle per force on the tread.
-
-Report sections about forces: rolling contact and point forces.
-"""
+"""Report sections about forces: rolling contact, point forces, axle, road and tread pattern."""
 
 from __future__ import annotations
 

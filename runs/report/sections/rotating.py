@@ -1,7 +1,4 @@
-"""Figures of the rolling tire's eigenvalues: in the complex plane, and over speed.
-
-Report section about the modes of the rolling tire.
-"""
+"""Report section about the modes of the rolling tire: eigenvalues in the plane and over speed."""
 
 from __future__ import annotations
 

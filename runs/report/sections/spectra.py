@@ -1,7 +1,4 @@
-"""Report section part about the search for settings: error against cost of each trial.
-
-Report section about spectra: lines, densities, and third octaves with their errors.
-"""
+"""Report sections about spectra: lines, densities, third octaves with their errors, and a search's trials."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Report section parts about the air inside the tire.
-
-Report sections about the loaded tire and its modes.
-"""
+"""Report sections about the loaded tire, its modes and its air."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,7 +1,4 @@
-"""The table [pattern] of the tread, and incompatible settings.
-
-The tables [contact] and [time], with units, ranges and defaults.
-"""
+"""The tables [contact], [pattern] and [time], with units, ranges and defaults."""
 
 from __future__ import annotations
 

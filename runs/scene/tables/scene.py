@@ -1,17 +1,4 @@
-"""The table [static]: inflation, and the road by load, deflection or height.
-
-The table [modal]: which modes are extracted.
-
-The table [road]: placement, kind with the kind's keys, and motion.
-
-The table [axle]: support of the wheel, and incompatible settings.
-
-The table [accuracy]: error estimates, and the target of a search for settings.
-
-The table [stiffness]: load-deflection curve and stiffness, and what they need.
-
-The tables of a scene, key by key, with units, ranges and defaults (contract: Scene).
-"""
+"""The tables of a scene, key by key, with units, ranges and defaults (contract: Scene)."""
 
 from __future__ import annotations
 

@@ -1,13 +1,9 @@
-"""Base of the kinds of section: own keys, and the resulting ring of elements, compounds and cords.
+"""The table [tire], key by key, and the base of the kinds of section.
+
+Base of the kinds of section: own keys, and the resulting ring of elements, compounds and cords.
 
 A new kind is one file in runs.scene.sections.kinds, or a class in a user's script. The scene's
 keys, `check`, the key reference and the range tests derive from it.
-
-The table [tire.cavity]: keys, when air is included by default, and incompatible settings.
-
-The table of the tire, key by key, with units, ranges and defaults (contract: Scene).
-
-Shared by the kinds of section: cords and compounds of a scene's tables, sizes of a ring.
 """
 
 from __future__ import annotations

@@ -1,9 +1,4 @@
-"""Velocities of the driven points.
-
-Accelerations of the driven points.
-
-Impulse responses between the driven points.
-"""
+"""Outputs of the driven points' motion: velocities, accelerations, impulse responses."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""A tire's section from a file: read once; its regions and cords are matched with the scene's.
-
-`section = "file"`: an Abaqus deck, a Gmsh mesh or a section file (docs/how-to/own-tire.md).
-"""
+"""`section = "file"`: an Abaqus deck, a Gmsh mesh or a section file (docs/how-to/own-tire.md)."""
 
 from __future__ import annotations
 
