@@ -1,5 +1,6 @@
 """A scene's tread law and contact solver on a patch, from which the time loop obtains forces."""
 
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -29,8 +30,8 @@ MOST_DENSE = 6000  # 0.3 GB a matrix
 STEEPEST = 0.25
 
 
-class Spec(Protocol):
-    """The table [contact] of a scene."""
+class ContactSpec(Protocol):
+    """How tread and road meet: the table [contact] of a scene, or `NormalContact`."""
 
     @property
     def law(self) -> TreadLaw:
@@ -41,11 +42,25 @@ class Spec(Protocol):
         """Its name, or "auto"."""
 
     @property
+    def has_friction(self) -> bool:
+        """Whether the road exerts horizontal forces."""
+
+    @property
     def has_shear(self) -> bool:
         """Whether the tread deforms under horizontal forces."""
 
 
-def solver_name(spec: Spec, patch: Patch) -> str:
+@dataclass(frozen=True, kw_only=True)
+class NormalContact:
+    """A `ContactSpec` whose forces are all normal to the road."""
+
+    law: TreadLaw
+    solver: str = "auto"
+    has_friction: bool = False
+    has_shear: bool = False
+
+
+def solver_name(spec: ContactSpec, patch: Patch) -> str:
     """The solver's name; "auto" is resolved by the number of points that touch at rest."""
     if spec.solver != "auto":
         return spec.solver
@@ -53,7 +68,7 @@ def solver_name(spec: Spec, patch: Patch) -> str:
     return "projected-cg" if many and patch.places is not None else "active-set"
 
 
-def static_solver(spec: Spec, patch: Patch, tire: Array, speed: float) -> ContactSolver:
+def static_solver(spec: ContactSpec, patch: Patch, tire: Array, speed: float) -> ContactSolver:
     """The solver for the static state of a patch that rolls at `speed` m/s.
 
     As `step_solver`; a viscoelastic tread has all of its past, C~ (1 + sum c_k F_k)
@@ -79,7 +94,7 @@ def check_creeps(patch: Patch) -> None:
         )
 
 
-def tread_memory(spec: Spec, patch: Patch, speed: float, step: float) -> TreadMemory | None:
+def tread_memory(spec: ContactSpec, patch: Patch, speed: float, step: float) -> TreadMemory | None:
     """Memory of a viscoelastic tread rolling at `speed` m/s in steps of `step` s; else None."""
     if spec.law.creep is None:
         return None
@@ -91,7 +106,7 @@ def tread_memory(spec: Spec, patch: Patch, speed: float, step: float) -> TreadMe
     )
 
 
-def tread_shear(spec: Spec, patch: Patch, at_once: float = 1.0) -> Shear | None:
+def tread_shear(spec: ContactSpec, patch: Patch, at_once: float = 1.0) -> Shear | None:
     """The tread's shear compliance between the points, times `at_once`; None if it is rigid."""
     if not spec.has_shear:
         return None
@@ -110,7 +125,9 @@ def _spread(patch: Patch, tire: Array) -> Array:
     return tire if patch.weights is None else patch.weights @ (patch.weights @ tire.T).T
 
 
-def step_solver(spec: Spec, patch: Patch, tire: Array, at_once: float = 1.0) -> ContactSolver:
+def step_solver(
+    spec: ContactSpec, patch: Patch, tire: Array, at_once: float = 1.0
+) -> ContactSolver:
     """The solver for A = W tire W^T + C~, `tire` (p, p) m/N between nodes; C~ times `at_once`.
 
     InputError if a matrix of that many points is not affordable, or A is not positive definite.
@@ -129,7 +146,9 @@ def step_solver(spec: Spec, patch: Patch, tire: Array, at_once: float = 1.0) -> 
     return make_solver(name, matrix)
 
 
-def tread_matrix(spec: Spec, patch: Patch, index: slice | NDArray[np.intp] = slice(None)) -> Array:
+def tread_matrix(
+    spec: ContactSpec, patch: Patch, index: slice | NDArray[np.intp] = slice(None)
+) -> Array:
     """Compliance of the tread between the points, or those of the `index`, (c, c) m/N."""
     # Evaluates a few thousand offsets instead of c^2.
     if patch.places is not None and spec.law.compliant:
@@ -142,7 +161,9 @@ def tread_matrix(spec: Spec, patch: Patch, index: slice | NDArray[np.intp] = sli
         raise _out_of_reach(patch) or error from None
 
 
-def touching_compliance(spec: Spec, patch: Patch, tire: Array, index: NDArray[np.intp]) -> Array:
+def touching_compliance(
+    spec: ContactSpec, patch: Patch, tire: Array, index: NDArray[np.intp]
+) -> Array:
     """W tire W^T + C~ between the points `index`, (n, n) m/N; `tire` (p, p) between the nodes."""
     if patch.weights is None:
         return tire[np.ix_(index, index)] + tread_matrix(spec, patch, index)
@@ -169,7 +190,7 @@ def _out_of_reach(patch: Patch) -> InputError | None:
     )
 
 
-def _product(spec: Spec, patch: Patch, tire: Array, at_once: float) -> Compliance:
+def _product(spec: ContactSpec, patch: Patch, tire: Array, at_once: float) -> Compliance:
     """A as a product. Without a tread it would be singular: a grid has more points than nodes."""
     if not spec.law.compliant:
         raise InputError(

@@ -10,7 +10,7 @@ import numpy as np
 
 from tireroad.contact.grid_patch import DeformedTread, make_grid_patch, settle, spread_pull
 from tireroad.contact.loop import Drive
-from tireroad.contact.model import Spec, static_solver
+from tireroad.contact.model import ContactSpec, static_solver
 from tireroad.contact.patch import LEAST_REACH, Patch, make_patch
 from tireroad.contact.roads.cell_mean import CellMean
 from tireroad.contact.roads.kinds.shapes import Flat
@@ -163,7 +163,7 @@ class ContactSetup:
         road = _under(RoadUnderTire(Flat()), self.patch, still)
         return replace(self, road=road, rolled=still, pattern=None)
 
-    def settled(self, response: Response, nodal_force: np.ndarray, spec: Spec) -> tuple:
+    def settled(self, response: Response, nodal_force: np.ndarray, spec: ContactSpec) -> tuple:
         """(setup, rise in m): settle the points on the tread, which the elements lack.
 
         `nodal_force` (s,) N of the finite elements on the outer face. Nodes without a tread are

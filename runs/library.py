@@ -27,6 +27,7 @@ from scipy import sparse
 
 from tireroad.contact import loop as contact_loop
 from tireroad.contact.loop import Instant, Steps, check_times, equal_steps
+from tireroad.contact.model import ContactSpec, NormalContact
 from tireroad.contact.patch import Patch
 from tireroad.contact.results.chatter import choose, oscillation
 from tireroad.contact.results.spectra import Limit, amplitudes, limits, lowest, pitch, third_octaves
@@ -391,14 +392,6 @@ class History:
         return self.axle_force[np.searchsorted(self.time, start) :]
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Spec:
-    law: TreadLaw
-    solver: str = "auto"
-    has_friction: bool = False
-    has_shear: bool = False
-
-
 @typed
 def drive(
     tire: RollingTire,
@@ -436,7 +429,7 @@ def drive(
         probe.nodes(setup.patch.index, len(static.points), part) for part in range(3)
     )
     response = tire.respond(loads, loads, residual, sparse.vstack([along, across], "csr"))
-    spec = _Spec(law=law)
+    spec = NormalContact(law=law)
     setup, _ = setup.settled(response, static.force, spec)
     fastest = np.abs(response.eigenvalue).max(initial=1.0 / duration)
     largest = min(duration / _LEAST_STEPS, _TURN / fastest) if step is None else step
@@ -493,7 +486,7 @@ def _check_pitches(pitches: tuple[float, float], found: Footprint) -> None:
 
 
 def _instants(
-    spec: _Spec, setup: ContactSetup, response: Response, chosen: Steps, comm: MPI.Comm
+    spec: ContactSpec, setup: ContactSetup, response: Response, chosen: Steps, comm: MPI.Comm
 ) -> list[Instant]:
     """Run the time loop with the integration scheme that suits the contact. Collective."""
     kept = response.resolved(chosen.size)

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg
 
-from tireroad.contact.model import Spec, touching_compliance, tread_shear
+from tireroad.contact.model import ContactSpec, touching_compliance, tread_shear
 from tireroad.contact.patch import Patch
 from tireroad.fem.errors import ConvergenceError
 from tireroad.greens.recursion import alternating, at_once
@@ -98,7 +98,11 @@ def choose(steps: float) -> Chosen:
 
 
 def oscillation(
-    spec: Spec, patch: Patch, response: Response, step: float, bristles: Stiffness | None = None
+    spec: ContactSpec,
+    patch: Patch,
+    response: Response,
+    step: float,
+    bristles: Stiffness | None = None,
 ) -> float:
     """Steps (2 or more, inf) per fastest oscillation of points touching at rest, linear forces.
 
@@ -121,7 +125,7 @@ def oscillation(
     return _steps(mu)
 
 
-def _along(spec: Spec, patch: Patch, seen: list[np.ndarray], bristles: Stiffness) -> float:
+def _along(spec: ContactSpec, patch: Patch, seen: list[np.ndarray], bristles: Stiffness) -> float:
     """mu of the points' horizontal forces, `seen` by nodes (2 p, 2 p), x then y."""
     index, p = _nearest(patch, MOST // 2), len(patch.index)
     approach, compliance = (

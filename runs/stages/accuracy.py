@@ -12,6 +12,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from tireroad.contact.grid_patch import MOST, finer_touching, halved, ratio, thinned
+from tireroad.contact.model import NormalContact
 from tireroad.contact.results.chatter import choose, oscillation
 from tireroad.contact.results.error_bars import (
     CAUSES,
@@ -28,7 +29,6 @@ from tireroad.contact.results.spectra import Limit, limits, lowest, pitch
 from tireroad.contact.setup import ContactSetup, on_shape
 from tireroad.contact.tread.between_nodes import Backed, on_nodes, over_rectangles, unsettled
 from tireroad.contact.tread.compliance import Influence
-from tireroad.contact.tread.law import TreadLaw
 from tireroad.contact.tread.laws.elastic import ElasticLayer, HalfSpace
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.sections.ring import Ring
@@ -58,20 +58,10 @@ from tireroad.runs.stages.static import StaticStage
 _WHOLE = 0.9  # share of the wall from which a compound counts as all of it
 
 
-@dataclass(frozen=True, kw_only=True)
-class Normal:
-    """The attributes of [contact] that the loop needs if all forces are normal to the road."""
-
-    law: TreadLaw
-    solver: str
-    has_shear: bool = False
-    has_friction: bool = False
-
-
 class Backing(NamedTuple):
     """Replacements for the run's own contact, setup (not settled) and response."""
 
-    contact: Normal
+    contact: NormalContact
     setup: ContactSetup
     response: Response
 
@@ -99,7 +89,7 @@ def backed(job: Job, static: StaticState, setup: ContactSetup, response: Respons
     residual = response.residual.copy()
     residual[:count, :count] -= known
     patch = unsettled(patch, known, static.normal_force[patch.index])
-    spec = Normal(law=Backed(law=contact.law, wall=wall), solver=contact.solver)
+    spec = NormalContact(law=Backed(law=contact.law, wall=wall), solver=contact.solver)
     return Backing(spec, replace(setup, patch=patch), replace(response, residual=residual))
 
 
@@ -198,7 +188,7 @@ class Given:
         setup: ContactSetup,
         response: Response,
         coarser: int | None = None,
-        contact: Normal | None = None,
+        contact: NormalContact | None = None,
     ) -> ContactForces:
         """Repeat the loop with another setup (settled), response or `contact`.
 

@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from tireroad.contact.grid_patch import on_points
 from tireroad.contact.loop import roll
-from tireroad.contact.model import Spec, step_solver
+from tireroad.contact.model import ContactSpec, step_solver
 from tireroad.contact.results.spectra import BAND, Distance, distance
 from tireroad.contact.setup import ContactSetup
 from tireroad.fem.transient.linear import FullTire, ModalDamping
@@ -53,7 +53,7 @@ class FullHistory:
 class Conditions:
     """The conditions of any tire model's run: table [contact], patch and road, `duration` s."""
 
-    spec: Spec
+    spec: ContactSpec
     setup: ContactSetup
     duration: float
 
