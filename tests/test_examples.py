@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from started import environment
+from tires import soft_torus
 
 from tireroad.fem.tire.material import MATERIALS
 from tireroad.runs.scene.outputs import OUTPUTS
@@ -16,13 +17,9 @@ from tireroad.runs.scene.tables.tire import SECTIONS
 
 pytestmark = pytest.mark.slow
 
-SCENE = """
-[tire]
-segments = 12
-elements_arc = 4
-[tire.material]
-youngs_modulus = 48e6
-[static]
+SCENE = (
+    soft_torus(12, 4)
+    + """[static]
 load = 300.0
 [modal]
 count = 12
@@ -37,6 +34,7 @@ amplitude = 2e-4
 duration = 0.05
 step = 2e-4
 """
+)
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 
 

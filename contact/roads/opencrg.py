@@ -216,7 +216,7 @@ def _fields(
         number = payload.line + offset + bad // count * step
         text = fields[bad].decode("latin-1")
         raise InputError(
-            f"{payload.file}, line {number}, column {bad % count * width + 1}: {text!r} is no "
+            f"{payload.file}, line {number}, column {bad % count * width + 1}: {text!r} is not a "
             "number"
         ) from None
 

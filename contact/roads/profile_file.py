@@ -159,7 +159,9 @@ class _Form:
         for field in self.fields(line):
             value = self.number(field)
             if value is None:
-                raise InputError(f"{source}, line {n}: {field[:40]!r} is no number: {line[:60]!r}")
+                raise InputError(
+                    f"{source}, line {n}: {field[:40]!r} is not a number: {line[:60]!r}"
+                )
             found.append(value)
         return found
 

@@ -417,8 +417,8 @@ def cleaned(profile: Array, pitch: float, limit: float, longest: float, source: 
     if lost.mean() > MOST_LOST:
         raise InputError(
             f"{source}: {int(missing.sum())} heights are missing and {int(outlier.sum())} are outliers, "
-            f"{100 * lost.mean():.3g} % of {len(profile)}, more than {100 * MOST_LOST:g} %: the measurement "
-            f"is of no use, unless road.outlier = {limit:g} takes steep stones for outliers: then raise it"
+            f"{100 * lost.mean():.3g} % of {len(profile)}, more than {100 * MOST_LOST:g} %: too few valid "
+            f"heights. If road.outlier = {limit:g} takes steep stones for outliers, raise it"
         )
     whole = _bridged(profile, lost)
     return Cleaned(whole, int(missing.sum()), int(outlier.sum()), gap * pitch)

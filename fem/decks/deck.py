@@ -347,15 +347,13 @@ def _slow_records(data: list[Data], width: int) -> Iterator[np.ndarray]:
             where = where if begun else place
             begun += [label(field, place) for field in fields(line)]
             if len(begun) > width:
-                raise where.error(
-                    f"{len(begun)} numbers, {width} belong to an element of this type"
-                )
+                raise where.error(f"{len(begun)} numbers, but an element of this type has {width}")
             if len(begun) == width:
                 found.append(begun)
                 begun = []
     if begun:
         raise where.error(
-            f"{len(begun)} numbers, {width} belong to an element of this type: is the deck cut short?"
+            f"{len(begun)} numbers, but an element of this type has {width}: is the deck cut short?"
         )
     yield np.array(found, np.int64).reshape(-1, width)
 

@@ -91,7 +91,7 @@ def _read(path: Path) -> tuple[str, Any, list[str]]:
             )
             return kind, road, table
     raise InputError(
-        "\n  ".join([f"{path} is no road that can be used", *refused])
+        "\n  ".join([f"{path} cannot be used as a road", *refused])
         if len(refused) > 1
         else refused[0]
     )

@@ -3,14 +3,11 @@
 import h5py
 import numpy as np
 import pytest
+from tires import soft_torus
 
-SCENE = """
-[tire]
-segments = 16
-elements_arc = 6
-[tire.material]
-youngs_modulus = 48e6
-[static]
+SCENE = (
+    soft_torus(16, 6)
+    + """[static]
 steady_rolling = false
 [modal]
 count = 40
@@ -33,6 +30,7 @@ velocity = true
 acceleration = true
 receptance = { to = 80.0, step = 20.0, direct = 2 }
 """
+)
 
 
 @pytest.fixture(scope="module")

@@ -3,18 +3,16 @@
 import h5py
 import numpy as np
 import pytest
+from tires import soft_torus
 
 pytestmark = pytest.mark.slow
 
-SCENE = """
+SCENE = (
+    """
 name = "small"
-[tire]
-segments = 20
-elements_arc = 6
-footprint_size = 0.4
-[tire.material]
-youngs_modulus = 48e6
-[static]
+"""
+    + soft_torus(20, 6, footprint_size=0.4)
+    + """[static]
 load = 400.0
 [modal]
 count = 30
@@ -28,6 +26,7 @@ height_scatter = 0.0005
 [time]
 duration = 0.02
 """
+)
 
 
 @pytest.fixture(scope="module")

@@ -3,16 +3,14 @@
 import h5py
 import numpy as np
 import pytest
+from tires import soft_torus
 
-SCENE = """
+SCENE = (
+    """
 name = "reuse"
-[tire]
-segments = 20
-elements_arc = 6
-footprint_size = 0.4
-[tire.material]
-youngs_modulus = 48e6
-[static]
+"""
+    + soft_torus(20, 6, footprint_size=0.4)
+    + """[static]
 load = 400.0
 error_estimate = false
 [modal]
@@ -27,6 +25,7 @@ residual = "attachment"
 duration = 0.002
 step = 1e-4
 """
+)
 FREQUENCY = np.linspace(20.0, 190.0, 18)
 
 

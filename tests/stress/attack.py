@@ -14,17 +14,16 @@ from pathlib import Path
 import h5py
 import numpy as np
 from started import ROOT, environment
+from tires import soft_torus
 
 LONG = 1200  # s that a run may take on a busy machine
 
-SCENE = """
+SCENE = (
+    """
 name = "attacked"
-[tire]
-segments = 12
-elements_arc = 4
-[tire.material]
-youngs_modulus = 48e6
-[static]
+"""
+    + soft_torus(12, 4)
+    + """[static]
 load = 300.0
 error_estimate = false
 [modal]
@@ -45,6 +44,7 @@ duration = 0.012
 step = 3e-5
 checkpoint = 0.1
 """
+)
 
 
 def write_scene(folder: Path) -> Path:

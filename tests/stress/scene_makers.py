@@ -18,16 +18,16 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "fem" / "decks"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "contact" / "roads"))
 
 from test_opencrg import crg
+from tires import soft_torus
 from torus_decks import CORDS, HALF_ANGLE, Torus, membranes, plain
 
-TIRE = """
+TIRE = (
+    """
 name = "fuzz"
-[tire]
-segments = 12
-elements_arc = 4
-[tire.material]
-youngs_modulus = 48e6
 """
+    + soft_torus(12, 4)
+    + """"""
+)
 PRESSED = """
 [static]
 load = 300.0

@@ -5,16 +5,13 @@ import json
 import h5py
 import numpy as np
 import pytest
+from tires import soft_torus
 
 pytestmark = pytest.mark.slow
 
-TIRE = """
-[tire]
-segments = 16
-elements_arc = 4
-[tire.material]
-youngs_modulus = 48e6
-[static]
+TIRE = (
+    soft_torus(16, 4)
+    + """[static]
 load = 300.0
 [modal]
 count = 300
@@ -35,6 +32,7 @@ step = 1e-4
 [output]
 receptance = {{ to = 60.0, step = 10.0 }}
 """
+)
 
 
 @pytest.fixture(scope="module")

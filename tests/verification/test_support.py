@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
+from tires import soft_torus
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.matrices.operators import Operators, Support
@@ -91,13 +92,9 @@ def test_held_nodes_do_not_rise():
     assert (modes.squares > 1.001 * before.squares[:20]).any()
 
 
-SCENE = """
-[tire]
-segments = 16
-elements_arc = 4
-[tire.material]
-youngs_modulus = 48e6
-[static]
+SCENE = (
+    soft_torus(16, 4)
+    + """[static]
 {road}
 [modal]
 count = 60
@@ -118,6 +115,7 @@ step = 1e-4
 [output]
 receptance = {{ to = 150.0, step = 50.0, direct = 3 }}
 """
+)
 
 
 def run(launch, folder, command="run", speed=0.0, road="", modal="", residual="static", mass=None):

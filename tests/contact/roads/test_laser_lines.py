@@ -96,7 +96,7 @@ def much_lost(mm, rng) -> None:
     [
         (all_lost, "none of the 25000 heights is a number"),
         (one_long_gap, "longest_gap"),
-        (much_lost, "of no use"),
+        (much_lost, "too few valid heights"),
     ],
 )
 def test_profiles_of_no_use_are_refused(tmp_path, spoil, message) -> None:

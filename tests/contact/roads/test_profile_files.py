@@ -92,7 +92,7 @@ def test_codes_for_missing_heights_are_named_and_taken(tmp_path: Path, code: str
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("0,1\n0.5,2\n1.0,3\n1.5,abc\n2,4\n", "line 4: 'abc' is no number"),
+        ("0,1\n0.5,2\n1.0,3\n1.5,abc\n2,4\n", "line 4: 'abc' is not a number"),
         ("0,1\n0.5,2\n1.0,3\n1.5,4,5\n2,4\n", "line 4: 3 values where"),
         ("a,b,c\n1,2,3\n2,5,6\n7,8,9\n", "headings that name one column"),
         ("nan\nnan\nnan\nnan\n", "none of the 4 heights"),

@@ -5,16 +5,13 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from tires import soft_torus
 
 from tireroad.runs.stages import reuse
 
-SCENE = """
-[tire]
-segments = 16
-elements_arc = 8
-[tire.material]
-youngs_modulus = 48e6
-[static]
+SCENE = (
+    soft_torus(16, 8)
+    + """[static]
 load = 500.0
 steady_rolling = false
 error_estimate = false
@@ -34,6 +31,7 @@ wavelength = 0.2
 duration = 0.02
 step = 2e-4
 """
+)
 FAMILY = """
 import os, sys
 import tireroad

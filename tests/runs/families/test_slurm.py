@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from one_node import ended, slurm
 from started import environment
+from tires import soft_torus
 
 import tireroad
 from tireroad.fem.errors import ConvergenceError, InputError
@@ -17,15 +18,12 @@ from tireroad.runs.sweep.local import Queue, _directives, _environment
 
 pytestmark = pytest.mark.slow
 
-SCENE = """
+SCENE = (
+    """
 name = "base"
-[tire]
-segments = 12
-elements_arc = 4
-order = 2
-[tire.material]
-youngs_modulus = 48e6
-[static]
+"""
+    + soft_torus(12, 4, order=2)
+    + """[static]
 load = 300.0
 error_estimate = false
 [modal]
@@ -41,6 +39,7 @@ duration = {duration}
 step = 1e-4
 checkpoint = 3600.0
 """
+)
 FAMILY = """
 scene = "base.toml"
 [[axis]]

@@ -10,6 +10,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from tires import soft_torus
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.folder import held
@@ -20,19 +21,18 @@ from tireroad.runs.sweep.definition import _absolute, read
 
 pytestmark = pytest.mark.slow
 
-SCENE = """
+SCENE = (
+    """
 name = "base"
-[tire]
-segments = 12
-elements_arc = 4
-[tire.material]
-youngs_modulus = 48e6
-[static]
+"""
+    + soft_torus(12, 4)
+    + """[static]
 load = 300.0
 error_estimate = false
 [modal]
 count = 8
 """
+)
 
 
 LOADS = '[[axis]]\nkey = "static.load"\nvalues = [1.0]\n'

@@ -6,6 +6,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from tires import soft_torus
 
 from tireroad.runs.cli import main
 from tireroad.runs.files import cache as shared
@@ -13,14 +14,9 @@ from tireroad.runs.files.cache import Cache
 from tireroad.runs.files.disk import Refused
 from tireroad.runs.stages import accuracy
 
-SCENE = """
-[tire]
-segments = 8
-elements_arc = 4
-order = 2
-[tire.material]
-youngs_modulus = 48e6
-[static]
+SCENE = (
+    soft_torus(8, 4, order=2)
+    + """[static]
 load = 300.0
 [modal]
 count = 8
@@ -34,6 +30,7 @@ step = 2e-4
 [accuracy]
 estimate = false
 """
+)
 
 
 @pytest.fixture

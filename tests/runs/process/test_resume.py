@@ -10,15 +10,14 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from tires import soft_torus
 
-SCENE = """
+SCENE = (
+    """
 name = "stopped"
-[tire]
-segments = 16
-elements_arc = 6
-[tire.material]
-youngs_modulus = 48e6
-[static]
+"""
+    + soft_torus(16, 6)
+    + """[static]
 load = 300.0
 [modal]
 count = 20
@@ -35,6 +34,7 @@ step = 1e-5
 [output]
 spectra = false
 """
+)
 
 
 @pytest.mark.long

@@ -9,20 +9,19 @@ from pathlib import Path
 
 import pytest
 from started import ROOT, environment
+from tires import soft_torus
 
 pytestmark = pytest.mark.slow
 
 PROGRAM = [sys.executable, "-P", "-m", "runs"]
 LONG = 600  # s that the slowest machine may take
 
-SCENE = """
+SCENE = (
+    """
 name = "stopped"
-[tire]
-segments = 12
-elements_arc = 4
-[tire.material]
-youngs_modulus = 48e6
-[static]
+"""
+    + soft_torus(12, 4)
+    + """[static]
 load = 300.0
 [modal]
 count = 8
@@ -40,6 +39,7 @@ checkpoint = 3600.0
 [output]
 spectra = false
 """
+)
 
 DEAF = """
 import os, sys

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from started import ROOT, environment
+from tires import soft_torus
 
 from tireroad.runs import start
 from tireroad.runs.cli import main
@@ -20,19 +21,18 @@ pytestmark = pytest.mark.slow
 PROGRAM = [sys.executable, "-P", "-m", "runs"]
 LONG = 600
 
-SCENE = """
+SCENE = (
+    """
 name = "odd"
-[tire]
-segments = 12
-elements_arc = 4
-[tire.material]
-youngs_modulus = 48e6
-[static]
+"""
+    + soft_torus(12, 4)
+    + """[static]
 deflection = 0.002
 error_estimate = false
 [modal]
 count = 4
 """
+)
 ROLLING = """
 [rotation]
 speed = 30.0

@@ -3,6 +3,7 @@
 import h5py
 import numpy as np
 import pytest
+from tires import soft_torus
 
 from tireroad.contact.loop import equal_steps, steps_of
 from tireroad.fem.errors import InputError
@@ -10,15 +11,12 @@ from tireroad.runs.scene.tables.scene import Motion, RoadTable
 from tireroad.runs.stages.contact import beyond_unique
 from tireroad.runs.stages.rolling import passing_period
 
-SCENE = """
+SCENE = (
+    """
 name = "time"
-[tire]
-segments = 16
-elements_arc = 6
-footprint_size = 0.4
-[tire.material]
-youngs_modulus = 48e6
-[static]
+"""
+    + soft_torus(16, 6, footprint_size=0.4)
+    + """[static]
 load = 300.0
 error_estimate = false
 [modal]
@@ -35,6 +33,7 @@ height_scatter = 0.0005
 duration = 0.01
 step = 3e-5
 """
+)
 
 
 @pytest.fixture(scope="module")

@@ -4,20 +4,16 @@ import math
 from pathlib import Path
 
 import pytest
+from tires import soft_torus
 
 from tireroad.runs.scene.estimate import estimate
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.sizes import highest_frequency
 from tireroad.runs.scene.tables.scene import Scene
 
-SCENE = """
-[tire]
-segments = 24
-elements_arc = 8
-order = 2
-[tire.material]
-youngs_modulus = 48e6
-[static]
+SCENE = (
+    soft_torus(24, 8, order=2)
+    + """[static]
 load = 500.0
 error_estimate = false
 [modal]
@@ -36,6 +32,7 @@ duration = 0.1
 [accuracy]
 estimate = false
 """
+)
 
 
 def torus(folder: Path, *overrides: str) -> Scene:

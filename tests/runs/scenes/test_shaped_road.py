@@ -3,17 +3,14 @@
 import h5py
 import numpy as np
 import pytest
+from tires import soft_torus
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.load import load
 
-SCENE = """
-[tire]
-segments = 20
-elements_arc = 6
-[tire.material]
-youngs_modulus = 48e6
-[static]
+SCENE = (
+    soft_torus(20, 6)
+    + """[static]
 load = 800.0
 camber = 4.0
 error_estimate = false
@@ -36,6 +33,7 @@ duration = 0.01
 [accuracy]
 estimate = false
 """
+)
 CAR = """
 [axle]
 kind = "corner"

@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 import pytest
 from mpi4py import MPI
+from tires import soft_torus
 
 from tireroad.contact.results.error_bars import CAUSES, bars, measured
 from tireroad.contact.tread.kernel import KernelTread
@@ -22,15 +23,12 @@ from tireroad.runs.stages.stage import Job
 
 pytestmark = pytest.mark.slow
 
-SCENE = """
+SCENE = (
+    """
 name = "sure"
-[tire]
-segments = 20
-elements_arc = 8
-footprint_size = 0.4
-[tire.material]
-youngs_modulus = 48e6
-[static]
+"""
+    + soft_torus(20, 8, footprint_size=0.4)
+    + """[static]
 load = 400.0
 error_estimate = false
 [modal]
@@ -49,6 +47,7 @@ run_in = 0.05
 duration = 0.03
 step = 1e-4
 """
+)
 
 
 @pytest.fixture(scope="module")

@@ -7,6 +7,7 @@ import h5py
 import numpy as np
 import pytest
 from mpi4py import MPI
+from tires import soft_torus
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.process import console
@@ -15,13 +16,9 @@ from tireroad.runs.scene.tables.scene import axle_of
 from tireroad.runs.stages import corner
 from tireroad.runs.stages.pipeline import run_scene
 
-SCENE = """
-[tire]
-segments = 20
-elements_arc = 6
-[tire.material]
-youngs_modulus = 48e6
-[static]
+SCENE = (
+    soft_torus(20, 6)
+    + """[static]
 load = 500.0
 error_estimate = false
 [modal]
@@ -40,13 +37,10 @@ wavelength = 0.2
 duration = 0.04
 step = 2e-4
 """
-POINT_FORCE = """
-[tire]
-segments = 12
-elements_arc = 5
-[tire.material]
-youngs_modulus = 48e6
-[modal]
+)
+POINT_FORCE = (
+    soft_torus(12, 5)
+    + """[modal]
 count = 20
 [[force]]
 angle = 40.0
@@ -58,6 +52,7 @@ direction = [0.3, 1.0, 1.0]
 duration = 0.03
 step = 5e-4
 """
+)
 CAR = """
 [axle]
 kind = "corner"

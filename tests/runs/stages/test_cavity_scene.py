@@ -3,19 +3,16 @@
 import h5py
 import numpy as np
 import pytest
+from tires import soft_torus
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.tables.scene import has_air
 from tireroad.runs.scene.tables.tire import CavityTable
 
-SCENE = """
-[tire]
-segments = 20
-elements_arc = 6
-[tire.material]
-youngs_modulus = 48e6
-[tire.cavity]
+SCENE = (
+    soft_torus(20, 6)
+    + """[tire.cavity]
 [modal]
 count = 120
 [greens]
@@ -25,6 +22,7 @@ direction = [0.3, 0.0, 1.0]
 [output]
 receptance = { to = 300.0, step = 100.0, direct = 2 }
 """
+)
 
 
 @pytest.fixture(scope="module")

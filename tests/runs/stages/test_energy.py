@@ -1,19 +1,17 @@
 """The energy balance of a run: every term counted, standing and rolling."""
 
 import pytest
+from tires import soft_torus
 
 from tireroad.runs.stages.contact import _rolling, negligible
 from tireroad.runs.stages.stage import Record
 
-SCENE = """
+SCENE = (
+    """
 name = "energy"
-[tire]
-segments = 16
-elements_arc = 6
-order = 2
-[tire.material]
-youngs_modulus = 48e6
-[static]
+"""
+    + soft_torus(16, 6, order=2)
+    + """[static]
 load = 300.0
 error_estimate = false
 [modal]
@@ -32,6 +30,7 @@ step = 5e-5
 [output]
 spectra = false
 """
+)
 
 
 @pytest.fixture(scope="module")

@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 import pytest
 from mpi4py import MPI
+from tires import soft_torus
 
 import tireroad
 from tireroad.contact.results.spectra import amplitudes
@@ -18,15 +19,9 @@ from tireroad.runs.stages.pipeline import run_scene
 
 pytestmark = pytest.mark.slow
 
-TIRE = """
-[tire]
-segments = 16
-elements_arc = 8
-order = 2
-footprint_size = 0.35
-[tire.material]
-youngs_modulus = 48e6
-[static]
+TIRE = (
+    soft_torus(16, 8, order=2, footprint_size=0.35)
+    + """[static]
 load = 500.0
 error_estimate = false
 [modal]
@@ -45,6 +40,7 @@ estimate = false
 [output]
 fields = true
 """
+)
 FLAT = '[road]\nkind = "flat"\n'
 # The force of 0 N only reads the loop's displacement; it lies on a node of this mesh.
 SINE = """

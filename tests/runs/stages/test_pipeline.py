@@ -3,19 +3,16 @@
 import h5py
 import numpy as np
 import pytest
+from tires import soft_torus
 
 pytestmark = pytest.mark.slow
 
-TIRE = """
-[tire]
-segments = 20
-elements_arc = 6
-footprint_size = 0.4
-[tire.material]
-youngs_modulus = 48e6
-[modal]
+TIRE = (
+    soft_torus(20, 6, footprint_size=0.4)
+    + """[modal]
 count = 30
 """
+)
 
 
 @pytest.fixture(scope="module")

@@ -4,6 +4,7 @@ import h5py
 import numpy as np
 import pytest
 from mpi4py import MPI
+from tires import soft_torus
 
 from tireroad.contact.results.chatter import ANY, LIMIT, Alternation, Chatter
 from tireroad.runs.files.cache import Cache
@@ -15,14 +16,12 @@ from tireroad.runs.stages.pipeline import run_scene
 
 pytestmark = pytest.mark.slow
 
-SCENE = """
+SCENE = (
+    """
 name = "again"
-[tire]
-segments = 12
-elements_arc = 4
-[tire.material]
-youngs_modulus = 48e6
-[static]
+"""
+    + soft_torus(12, 4)
+    + """[static]
 load = 400.0
 error_estimate = false
 [modal]
@@ -39,6 +38,7 @@ wavelength = 0.2
 duration = 0.02
 step = 2e-4
 """
+)
 
 
 @pytest.fixture

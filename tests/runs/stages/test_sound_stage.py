@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from scipy.interpolate import CubicSpline
+from tires import soft_torus
 
 import tireroad
 from tireroad.greens.outputs import Surface
@@ -23,14 +24,9 @@ from tireroad.runs.stages.sound import SoundStage
 
 pytestmark = pytest.mark.slow
 
-SCENE = """
-[tire]
-segments = 16
-elements_arc = 6
-order = 2
-[tire.material]
-youngs_modulus = 48e6
-[static]
+SCENE = (
+    soft_torus(16, 6, order=2)
+    + """[static]
 load = 300.0
 error_estimate = false
 [modal]
@@ -53,6 +49,7 @@ estimate = false
 microphones = ["cpx", [3.0, 1.0, 1.0]]
 up_to = 150.0
 """
+)
 
 
 def run(folder: Path, *overrides: str) -> tireroad.RunResults:

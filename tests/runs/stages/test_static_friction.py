@@ -4,6 +4,7 @@ import h5py
 import numpy as np
 import pytest
 from mpi4py import MPI
+from tires import soft_torus
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.report.read import Results, quantity
@@ -11,13 +12,9 @@ from tireroad.runs.report.sections.tire import friction
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.pipeline import run_scene
 
-SCENE = """
-[tire]
-segments = 16
-elements_arc = 6
-[tire.material]
-youngs_modulus = 48e6
-[static]
+SCENE = (
+    soft_torus(16, 6)
+    + """[static]
 load = 800.0
 friction = 0.7
 error_estimate = false
@@ -37,6 +34,7 @@ estimate = false
 [output]
 spectra = false
 """
+)
 
 
 @pytest.mark.slow

@@ -5,22 +5,19 @@ from types import SimpleNamespace
 import h5py
 import numpy as np
 import pytest
+from tires import soft_torus
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.tables.scene import StiffnessTable, deflections
 from tireroad.runs.stages.stiffness import slides
 
-TIRE = """
-[tire]
-segments = 16
-elements_arc = 10
-footprint_size = 0.3
-[tire.material]
-youngs_modulus = 48e6
-[modal]
+TIRE = (
+    soft_torus(16, 10, footprint_size=0.3)
+    + """[modal]
 count = 10
 """
+)
 
 
 @pytest.fixture(scope="module")

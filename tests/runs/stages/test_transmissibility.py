@@ -6,6 +6,7 @@ import h5py
 import numpy as np
 import pytest
 from mpi4py import MPI
+from tires import soft_torus
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.process import console
@@ -14,14 +15,9 @@ from tireroad.runs.stages.outputs.transmissibility import apart, compare
 from tireroad.runs.stages.pipeline import run_scene
 from tireroad.runs.stages.stage import Record
 
-SCENE = """
-[tire]
-segments = 8
-elements_arc = 4
-order = 2
-[tire.material]
-youngs_modulus = 48e6
-[static]
+SCENE = (
+    soft_torus(8, 4, order=2)
+    + """[static]
 steady_rolling = false
 [modal]
 count = 20
@@ -38,6 +34,7 @@ arc = 10.0
 [output]
 transmissibility = { to = 150.0, step = 25.0, free_rim = 30 }
 """
+)
 
 
 @pytest.mark.parametrize("changed", ["modal.rim=free", "axle.kind=free"])

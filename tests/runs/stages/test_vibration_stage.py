@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mpi4py import MPI
+from tires import soft_torus
 
 import tireroad
 from tireroad.fem.errors import InputError
@@ -17,14 +18,9 @@ from tireroad.runs.stages.pipeline import run_scene
 
 pytestmark = pytest.mark.slow
 
-TIRE = """
-[tire]
-segments = 12
-elements_arc = 4
-order = 2
-[tire.material]
-youngs_modulus = 48e6
-[static]
+TIRE = (
+    soft_torus(12, 4, order=2)
+    + """[static]
 load = 300.0
 error_estimate = false
 [modal]
@@ -33,6 +29,7 @@ count = 12
 vibration = true
 fields = true
 """
+)
 FORCE = """
 [[force]]
 angle = 90.0
