@@ -18,7 +18,7 @@ import shutil
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -256,6 +256,39 @@ def put(file: h5py.Group, name: str, array: Any, unit: str, **attributes: Any) -
     for key, value in attributes.items():
         dataset.attrs[key] = value
     return dataset
+
+
+def dataset(unit: str, name: str = "", **given: Any) -> Any:
+    """A field of a product, stored as a dataset with its `unit`: `name` in the file, or the field's own."""
+    return field(metadata={"dataset": name, "unit": unit}, **given)
+
+
+def attribute(name: str = "", **given: Any) -> Any:
+    """A field of a product, a number or a text, stored as an attribute of its file."""
+    return field(metadata={"attribute": name}, **given)
+
+
+def write_fields(file: h5py.Group, product: Any) -> None:
+    """Write the fields of a product that are a `dataset` or an `attribute`; none for those that are None."""
+    for one in fields(product):
+        value, meant = getattr(product, one.name), one.metadata
+        if "dataset" in meant and value is not None:
+            put(file, meant["dataset"] or one.name, value, meant["unit"])
+        elif "attribute" in meant:
+            file.attrs[meant["attribute"] or one.name] = value
+
+
+def read_fields(file: h5py.Group, kind: type) -> dict[str, Any]:
+    """The same fields of a product of class `kind`, by name; without datasets that the file lacks."""
+    found: dict[str, Any] = {}
+    for one in fields(kind):
+        meant = one.metadata
+        if "dataset" in meant and (meant["dataset"] or one.name) in file:
+            found[one.name] = file[meant["dataset"] or one.name][()]
+        elif "attribute" in meant:
+            value = file.attrs[meant["attribute"] or one.name]
+            found[one.name] = value.item() if isinstance(value, np.generic) else value
+    return found
 
 
 def stage_hash(inputs: Mapping[str, Any]) -> str:

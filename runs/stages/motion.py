@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-import h5py
 import numpy as np
 
 from tireroad.greens.basis import Basis
-from tireroad.runs.files.store import put
+from tireroad.runs.files.store import dataset
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.stages.stage import Record
 from tireroad.runs.stages.whole_tire import PatchForces, WholeTire, replayed
@@ -26,16 +25,9 @@ class Motion:
     motion of the wheel. From the modes only: the residual flexibility is not included.
     """
 
-    time: np.ndarray
-    displacement: np.ndarray
-    points: np.ndarray
-
-
-_UNITS = {
-    "time": ("time", "s"),
-    "displacement": ("displacement", "m"),
-    "points": ("surface/points", "m"),
-}
+    time: np.ndarray = dataset("s")
+    displacement: np.ndarray = dataset("m")
+    points: np.ndarray = dataset("m", "surface/points")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +35,7 @@ class MotionStage(WholeTire[Motion]):
     """Integrates the states once more under the forces of the run, which are known by now."""
 
     name: ClassVar[str] = "motion"
+    kind: ClassVar[type] = Motion
 
     def compute(self, record: Record) -> Motion | None:
         """The outer face at the stored instants; None but on the root process. Collective."""
@@ -63,12 +56,3 @@ class MotionStage(WholeTire[Motion]):
         time, q = forces.time[kept], replayed(basis, forces, kept)
         field = (q @ basis.face(len(points)).T).reshape(len(time), -1, 3)
         return Motion(time=time, displacement=field.astype("f4"), points=points)
-
-    def write(self, file: h5py.File, product: Motion) -> None:
-        """All fields of the product."""
-        for name, (stored, unit) in _UNITS.items():
-            put(file, stored, getattr(product, name), unit)
-
-    def read(self, file: h5py.File) -> Motion:
-        """The same, read back."""
-        return Motion(**{name: file[stored][:] for name, (stored, _) in _UNITS.items()})

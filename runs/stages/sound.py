@@ -31,7 +31,7 @@ from tireroad.greens.tire_sound import (
     transfer,
 )
 from tireroad.modal.corner import BODY, SEEN
-from tireroad.runs.files.store import put
+from tireroad.runs.files.store import dataset, put, read_fields, write_fields
 from tireroad.runs.scene.plan import skipped
 from tireroad.runs.scene.tables.sound import SoundTable
 from tireroad.runs.stages.spectra import Spectra
@@ -216,51 +216,29 @@ class SoundPressure:
     """
 
     names: list[str]
-    places: np.ndarray
-    frequency: np.ndarray
-    pressure: np.ndarray
-    centre: np.ndarray
-    level: np.ndarray
-    weighted: np.ndarray
-    error: np.ndarray
-    power: np.ndarray
-    efficiency: np.ndarray
-    total: np.ndarray
-    total_weighted: np.ndarray
-    total_error: np.ndarray
-    total_power: np.ndarray
-    directivity: np.ndarray
-    signal: np.ndarray
+    places: np.ndarray = dataset("m", "microphones")
+    frequency: np.ndarray = dataset("Hz")
+    pressure: np.ndarray = dataset("Pa")
+    centre: np.ndarray = dataset("Hz", "third_octave/centre")
+    level: np.ndarray = dataset("dB re 20 uPa", "third_octave/level")
+    weighted: np.ndarray = dataset("dB(A) re 20 uPa", "third_octave/level_a")
+    error: np.ndarray = dataset("dB", "third_octave/level_error")
+    power: np.ndarray = dataset("dB re 1 pW")
+    efficiency: np.ndarray = dataset("-")
+    total: np.ndarray = dataset("dB re 20 uPa", "total/level")
+    total_weighted: np.ndarray = dataset("dB(A) re 20 uPa", "total/level_a")
+    total_error: np.ndarray = dataset("dB", "total/level_error")
+    total_power: np.ndarray = dataset("dB re 1 pW", "total/power")
+    directivity: np.ndarray = dataset("dB re 20 uPa at 7.5 m", "directivity/level")
+    signal: np.ndarray = dataset("Pa", "signal/pressure")
     rate: float
-    solved: np.ndarray
-    weight: np.ndarray
-    share: np.ndarray
-    shares: np.ndarray
-    outline: np.ndarray
+    solved: np.ndarray = dataset("Hz", "transfer/frequency")
+    weight: np.ndarray = dataset("Pa s/m3", "transfer/weight")
+    share: np.ndarray = dataset("-", "contribution/region")
+    shares: np.ndarray = dataset("-", "contribution/element")
+    outline: np.ndarray = dataset("deg, -", "contribution/outline")
 
 
-_UNITS = {
-    "places": ("microphones", "m"),
-    "frequency": ("frequency", "Hz"),
-    "pressure": ("pressure", "Pa"),
-    "centre": ("third_octave/centre", "Hz"),
-    "level": ("third_octave/level", "dB re 20 uPa"),
-    "weighted": ("third_octave/level_a", "dB(A) re 20 uPa"),
-    "error": ("third_octave/level_error", "dB"),
-    "power": ("power", "dB re 1 pW"),
-    "efficiency": ("efficiency", "-"),
-    "total": ("total/level", "dB re 20 uPa"),
-    "total_weighted": ("total/level_a", "dB(A) re 20 uPa"),
-    "total_error": ("total/level_error", "dB"),
-    "total_power": ("total/power", "dB re 1 pW"),
-    "directivity": ("directivity/level", "dB re 20 uPa at 7.5 m"),
-    "signal": ("signal/pressure", "Pa"),
-    "solved": ("transfer/frequency", "Hz"),
-    "weight": ("transfer/weight", "Pa s/m3"),
-    "share": ("contribution/region", "-"),
-    "shares": ("contribution/element", "-"),
-    "outline": ("contribution/outline", "deg, -"),
-}
 PASS_BY = 7.5  # m: distance of the directivity
 
 
@@ -334,8 +312,7 @@ class SoundStage(WholeTire[SoundPressure]):
 
     def write(self, file: h5py.File, product: SoundPressure) -> None:
         """All fields of the product."""
-        for name, (stored, unit) in _UNITS.items():
-            put(file, stored, getattr(product, name), unit)
+        write_fields(file, product)
         file["microphones"].attrs["names"] = file.attrs["microphone_names"] = product.names
         file["contribution/region"].attrs["names"] = REGIONS
         file["signal/pressure"].attrs["rate"] = product.rate
@@ -345,7 +322,7 @@ class SoundStage(WholeTire[SoundPressure]):
 
     def read(self, file: h5py.File) -> SoundPressure:
         """The same, read back."""
-        kept: dict[str, Any] = {name: file[stored][:] for name, (stored, _) in _UNITS.items()}
+        kept = read_fields(file, SoundPressure)
         names = [str(name) for name in file["microphones"].attrs["names"]]
         return SoundPressure(names=names, rate=float(file["signal/pressure"].attrs["rate"]), **kept)
 

@@ -29,7 +29,7 @@ from tireroad.contact.results.spectra import (
 )
 from tireroad.contact.setup import ContactSetup
 from tireroad.modal.rolling import RollingModes
-from tireroad.runs.files.store import put
+from tireroad.runs.files.store import attribute, dataset, put, read_fields, write_fields
 from tireroad.runs.process import console
 from tireroad.runs.stages import corner
 from tireroad.runs.stages.accuracy import Accuracy, all_limits
@@ -202,25 +202,18 @@ class Spectra:
     runs.stages.corner.
     """
 
-    frequency: np.ndarray
-    contact_force: np.ndarray
-    left_out: float
+    frequency: np.ndarray = dataset("Hz")
+    contact_force: np.ndarray = dataset("N")
+    left_out: float = attribute()
     limit: Limit
     levels: dict[str, np.ndarray]
-    too_short: str = ""
+    too_short: str = attribute(default="")
     wheel: dict[str, np.ndarray] = field(default_factory=dict)
-    axle_force: np.ndarray | None = None
-    level_error: np.ndarray | None = None
-    contact_level_error: np.ndarray | None = None
-
-
-_UNITS = {
-    "frequency": ("frequency", "Hz"),
-    "contact_force": ("contact_force", "N"),
-    "axle_force": ("axle_force", "N"),
-    "level_error": ("third_octave/level_error", "dB"),
-    "contact_level_error": ("third_octave/contact_level_error", "dB"),
-}
+    axle_force: np.ndarray | None = dataset("N", default=None)
+    level_error: np.ndarray | None = dataset("dB", "third_octave/level_error", default=None)
+    contact_level_error: np.ndarray | None = dataset(
+        "dB", "third_octave/contact_level_error", default=None
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -316,9 +309,7 @@ class SpectraStage(Computed[Spectra]):
 
     def write(self, file, product: Spectra) -> None:
         """All fields of the product."""
-        for name, (stored, unit) in _UNITS.items():
-            if getattr(product, name) is not None:
-                put(file, stored, getattr(product, name), unit)
+        write_fields(file, product)
         for name, values in product.wheel.items():
             put(file, name, values, corner.UNITS[name])
         write(file, product.levels)
@@ -327,24 +318,15 @@ class SpectraStage(Computed[Spectra]):
             if self.job.axle
             else "blocked force, wheel held"
         )
-        file.attrs["left_out"] = product.left_out
         file.attrs["limit"] = product.limit.frequency
         file.attrs["limit_cause"] = product.limit.cause
-        file.attrs["too_short"] = product.too_short
 
     def read(self, file) -> Spectra:
         """The same, read back."""
-        kept = {name: file[stored][:] for name, (stored, _) in _UNITS.items() if stored in file}
         limit = Limit(float(file.attrs["limit"]), str(file.attrs["limit_cause"]))
         wheel = {name: file[name][:] for name in corner.UNITS if name in file}
-        return Spectra(
-            left_out=float(file.attrs["left_out"]),
-            limit=limit,
-            levels=read(file),
-            too_short=str(file.attrs["too_short"]),
-            wheel=wheel,
-            **kept,
-        )
+        kept = read_fields(file, Spectra)
+        return Spectra(limit=limit, levels=read(file), wheel=wheel, **kept)
 
 
 def too_short(centre: np.ndarray, up_to: float, grows: float) -> str:

@@ -274,15 +274,25 @@ class Stage(PipelinePart[P]):
 
 
 class Computed(Stage[P]):
-    """A stage whose product is first computed, then written."""
+    """A stage whose product is first computed, then written.
+
+    `kind`: class of the product, whose fields say how they are stored (runs.files.store.dataset), unless
+    the stage writes and reads it by itself.
+    """
+
+    kind: ClassVar[type]
 
     @abstractmethod
     def compute(self, record: Record) -> P:
         """Compute the product; figures go into the record. Collective."""
 
-    @abstractmethod
     def write(self, file: Any, product: P) -> None:
         """Write the product into an empty file. Root process only."""
+        store.write_fields(file, product)
+
+    def read(self, file: Any) -> Any:
+        """The product's fields, read back."""
+        return self.kind(**store.read_fields(file, self.kind))
 
     def produce(self, key: str, record: Record) -> P:
         """Compute the product and write its file. Collective."""

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
-import h5py
 import numpy as np
 
 from tireroad.contact.results.spectra import a_weighting, band_sums
 from tireroad.fem.static.state import StaticState
 from tireroad.greens.basis import Basis
 from tireroad.greens.outputs import Surface, mean_square_velocity, radiated_power
-from tireroad.runs.files.store import put
+from tireroad.runs.files.store import attribute, dataset
 from tireroad.runs.stages.spectra import Spectra
 from tireroad.runs.stages.stage import Done, Record
 from tireroad.runs.stages.whole_tire import Lines, WholeTire
@@ -34,38 +33,21 @@ class Vibration:
     or the strongest that fit in 200 MB.
     """
 
-    frequency: np.ndarray
-    velocity: np.ndarray
-    centre: np.ndarray
-    velocity_level: np.ndarray
-    power_level: np.ndarray
-    weighted: np.ndarray
-    velocity_weighted: np.ndarray
-    shapes_at: np.ndarray
-    displacement: np.ndarray
-    points: np.ndarray
-    total_velocity: float
-    total_power: float
-    total_weighted: float
-
-
-_UNITS = {
-    "frequency": ("frequency", "Hz"),
-    "velocity": ("mean_square_velocity", "m2/s2"),
-    "centre": ("third_octave/centre", "Hz"),
-    "velocity_level": ("third_octave/velocity_level", "dB re 1 nm/s"),
-    "power_level": ("third_octave/radiated_power_level", "dB re 1 pW"),
-    "weighted": ("third_octave/radiated_power_level_a_weighted", "dB(A) re 1 pW"),
-    "velocity_weighted": ("third_octave/velocity_level_a_weighted", "dB(A) re 1 nm/s"),
-    "shapes_at": ("surface/frequency", "Hz"),
-    "displacement": ("surface/displacement", "m"),
-    "points": ("surface/points", "m"),
-}
-_TOTALS = {
-    "total_velocity": "velocity_level",
-    "total_power": "radiated_power_level",
-    "total_weighted": "radiated_power_level_a_weighted",
-}  # attributes, in dB as the bands
+    frequency: np.ndarray = dataset("Hz")
+    velocity: np.ndarray = dataset("m2/s2", "mean_square_velocity")
+    centre: np.ndarray = dataset("Hz", "third_octave/centre")
+    velocity_level: np.ndarray = dataset("dB re 1 nm/s", "third_octave/velocity_level")
+    power_level: np.ndarray = dataset("dB re 1 pW", "third_octave/radiated_power_level")
+    weighted: np.ndarray = dataset("dB(A) re 1 pW", "third_octave/radiated_power_level_a_weighted")
+    velocity_weighted: np.ndarray = dataset(
+        "dB(A) re 1 nm/s", "third_octave/velocity_level_a_weighted"
+    )
+    shapes_at: np.ndarray = dataset("Hz", "surface/frequency")
+    displacement: np.ndarray = dataset("m", "surface/displacement")
+    points: np.ndarray = dataset("m", "surface/points")
+    total_velocity: float = attribute("velocity_level")  # dB, as the bands
+    total_power: float = attribute("radiated_power_level")  # dB, as the bands
+    total_weighted: float = attribute("radiated_power_level_a_weighted")  # dB, as the bands
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,6 +55,7 @@ class VibrationStage(WholeTire[Vibration]):
     """From the states of the modes, after the run-in."""
 
     name: ClassVar[str] = "vibration"
+    kind: ClassVar[type] = Vibration
     lines: Done[Lines | None]
     spectra: Done[Spectra] | None = None
 
@@ -90,19 +73,6 @@ class VibrationStage(WholeTire[Vibration]):
         found = _seen(shape, surface, state, lines.frequency, lines.amplitude)
         record.headline |= _headline(found, surface)
         return found
-
-    def write(self, file: h5py.File, product: Vibration) -> None:
-        """All fields of the product."""
-        for name, (stored, unit) in _UNITS.items():
-            put(file, stored, getattr(product, name), unit)
-        for name, stored in _TOTALS.items():
-            file.attrs[stored] = getattr(product, name)
-
-    def read(self, file: h5py.File) -> Vibration:
-        """The same, read back."""
-        kept: dict[str, Any] = {name: file[stored][:] for name, (stored, _) in _UNITS.items()}
-        kept |= {name: float(file.attrs[stored]) for name, stored in _TOTALS.items()}
-        return Vibration(**kept)
 
 
 def _seen(

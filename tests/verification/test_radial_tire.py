@@ -98,9 +98,9 @@ def test_losses_of_a_rolling_tire_take_off_at_its_critical_speed():
 @pytest.mark.slow
 @pytest.mark.parametrize(("size", "width"), [("175/65 R14", 175), ("255/35 R20", 255)])
 def test_sizes_inflate_to_about_what_they_say(size, width):
-    """Width within 4 %, radius within 1 %, moved by less than 6 mm."""
+    """Width within 4 %, radius within 1 %, moved by less than 7 mm (4.2 in 205/60 R15)."""
     tire = InflatedRing(radial(size), 26, 2, PRESSURE)
     place = tire.section.nodes + tire.displacement[:, [0, 2]]
     assert np.ptp(place[:, 1]) == pytest.approx(1e-3 * width, rel=0.04)
     assert place[:, 0].max() == pytest.approx(tire.section.nodes[:, 0].max(), rel=0.012)
-    assert np.abs(tire.displacement).max() < 6e-3
+    assert np.abs(tire.displacement).max() < 7e-3

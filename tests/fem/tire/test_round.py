@@ -8,8 +8,8 @@ from tireroad.fem.errors import LoadingStopped
 from tireroad.fem.sections.grid import PlyLine
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.load_steps import LoadStepper
-from tireroad.fem.static.symmetric import AxisymmetricEquilibrium, inflated
-from tireroad.fem.static.virtual_work import AT_REST, Rolling
+from tireroad.fem.static.symmetric import AxisymmetricEquilibrium
+from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.cords import Cords
 from tireroad.fem.tire.material import compound
 
@@ -72,39 +72,26 @@ def test_any_number_of_processes_inflates_alike(belted):
     np.testing.assert_allclose(shared.body.displacement(), wanted, atol=1e-10 * abs(wanted).max())
 
 
-def _inflate(section: AxisymmetricEquilibrium) -> None:
-    LoadStepper(section, lambda progress: None)._inflate_in_steps(PRESSURE)
+@pytest.mark.slow
+def test_a_rolling_tire_is_inflated_first_and_turned_then(belted):
+    """From 0 at 150 rad/s steps of pressure stop at 0 Pa. The state is that to which states at one speed after the
+    other lead."""
+    body, told = belted(), []
+    section = AxisymmetricEquilibrium(body, Rolling(speed=150.0))
+    LoadStepper(section, lambda progress: told.append(progress.what))._inflate_in_steps(PRESSURE)
+    assert sorted(told) == told and set(told) == {"inflation", "speed"}
+    assert section.out_of_balance() < 1e-9 * section.force_scale
+    wanted = np.zeros_like(section.body.u.x.array)
+    for speed in (0.0, 60.0, 100.0, 125.0, 150.0):
+        another = AxisymmetricEquilibrium(body, Rolling(speed=speed))
+        another.body.u.x.array[:] = wanted
+        assert LoadStepper(another, lambda progress: None)._begin(PRESSURE)
+        wanted = another.body.u.x.array.copy()
+    np.testing.assert_allclose(section.body.u.x.array, wanted, atol=1e-9 * abs(wanted).max())
 
 
 @pytest.mark.slow
-def test_a_tire_that_does_not_inflate_while_it_turns_turns_when_it_is_inflated(belted):
-    """Steps of pressure stop at 0 Pa at 150 rad/s; the state is that to which steps of the speed lead from rest."""
-    body, tried = belted(), []
-
-    def inflate(section: AxisymmetricEquilibrium) -> None:
-        tried.append(section.rolling.speed)
-        _inflate(section)
-
-    found = inflated(body, Rolling(speed=150.0), inflate)
-    assert tried == [150.0, 0.0, 150.0]
-    assert found.out_of_balance() < 1e-9 * found.force_scale
-    wanted = np.zeros_like(found.body.u.x.array)
-    for speed in (0.0, 60.0, 100.0, 125.0, 150.0):
-        section = AxisymmetricEquilibrium(body, Rolling(speed=speed))
-        section.body.u.x.array[:] = wanted
-        _inflate(section)
-        wanted = section.body.u.x.array.copy()
-    np.testing.assert_allclose(found.body.u.x.array, wanted, atol=1e-9 * abs(wanted).max())
-
-
-@pytest.mark.parametrize(("rolling", "tried"), [(AT_REST, [0.0]), (ROLLING, [60.0, 0.0])])
-def test_what_does_not_inflate_at_rest_is_an_error(belted, rolling, tried):
-    speeds = []
-
-    def stops(section: AxisymmetricEquilibrium) -> None:
-        speeds.append(section.rolling.speed)
-        raise LoadingStopped("static: stops")
-
-    with pytest.raises(LoadingStopped):
-        inflated(belted(), rolling, stops)
-    assert speeds == tried
+def test_a_speed_that_is_not_reached_is_told(belted):
+    section = AxisymmetricEquilibrium(belted(), Rolling(speed=1500.0))
+    with pytest.raises(LoadingStopped, match=r"speed stops at \d+.* rad/s of 1500 rad/s"):
+        LoadStepper(section, lambda progress: None)._inflate_in_steps(PRESSURE)
