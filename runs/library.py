@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import inspect
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property, wraps
@@ -73,10 +74,34 @@ _MADE_BY = {
 }
 
 
-def typed(function: Callable[P, T]) -> Callable[P, T]:
-    """The function, with InputError for an argument that is not of the class it is annotated with.
+# Arguments of the library by the keys of a scene that errors name.
+_ARGUMENTS = {
+    "contact.points = { dx, dy }": "spacing = (dx, dy)",
+    "contact.points": "spacing",
+    "contact.tread": "tread",
+    "[time] step": "step",
+    "time.step": "step",
+    "time.duration": "duration",
+    "greens.residual": "residual",
+    "static.steady_rolling = false": "no turning",
+    **{f"static.{name}": name for name in ("inflation", "load", "deflection", "road_height")},
+    "rotation.speed": "turning.speed",
+    **{f"modal.{name}": name for name in ("count", "up_to")},
+    **{f"tire.{name}": name for name in ("segments", "elements_arc", "footprint_size", "order")},
+}
+_KEYS = re.compile("|".join(rf"(?<![\w.]){re.escape(key)}(?!\w)" for key in _ARGUMENTS))
 
-    Only for the classes that functions of the library make.
+
+def in_arguments(text: str) -> str:
+    """The text of an error with arguments of the library in place of a scene's keys."""
+    return _KEYS.sub(lambda key: _ARGUMENTS[key[0]], text)
+
+
+def typed(function: Callable[P, T]) -> Callable[P, T]:
+    """The function with errors that name its arguments, also those of the wrong class.
+
+    InputError for an argument that is not of the class it is annotated with, if functions of the library
+    make that class.
     """
     signature = inspect.signature(function)
 
@@ -94,7 +119,11 @@ def typed(function: Callable[P, T]) -> Callable[P, T]:
                 raise InputError(
                     f"{function.__name__}: {name} is of the type {found}: take what {_maker(kind)} returns"
                 )
-        return function(*args, **keys)
+        try:
+            return function(*args, **keys)
+        except (InputError, ConvergenceError) as error:
+            error.args = (in_arguments(str(error)),)
+            raise
 
     return checked
 

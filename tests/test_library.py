@@ -9,7 +9,7 @@ import pytest
 
 import tireroad as tr
 from tireroad.fem.model import SmallMotions
-from tireroad.runs.library import RollingTire
+from tireroad.runs.library import RollingTire, in_arguments
 
 pytestmark = pytest.mark.slow
 
@@ -87,6 +87,37 @@ def test_modes_take_the_state_of_an_equal_tire(rolling, static) -> None:
 def test_drive_says_what_it_does_not_take(rolling, given: dict, message: str) -> None:
     with pytest.raises(tr.InputError, match=message):
         tr.drive(rolling, tr.make_road(kind="flat"), **{"duration": 0.01} | given)
+
+
+@pytest.mark.parametrize(
+    ("key", "argument"),
+    [
+        ("contact.points = { dx, dy } (m)", "spacing = (dx, dy) (m)"),
+        ("take a smaller [time] step, or time.step", "take a smaller step, or step"),
+        ("Lower static.load, raise static.inflation", "Lower load, raise inflation"),
+        ("docs/static.load_curve and tire.segmentsx", "docs/static.load_curve and tire.segmentsx"),
+    ],
+)
+def test_errors_name_arguments_and_not_keys_of_a_scene(key: str, argument: str) -> None:
+    assert in_arguments(key) == argument
+
+
+def test_a_load_out_of_reach_names_the_argument(tire) -> None:
+    with pytest.raises(
+        tr.ConvergenceError, match=r"Lower load, raise inflation, or give deflection"
+    ):
+        tr.press(tire, inflation=2e5, load=1e7)
+    with pytest.raises(tr.InputError, match="load = -1 N"):
+        tr.press(tire, inflation=2e5, load=-1.0)
+
+
+def test_a_tire_is_pressed_as_if_for_the_first_time(static) -> None:
+    """Its body is shared, and held the state of the press before: another inflation stopped at 0 Pa."""
+    again = tr.torus(**TIRE)
+    tr.press(again, inflation=1e5, deflection=0.004)
+    assert np.array_equal(
+        tr.press(again, inflation=2e5, load=300.0).displacement, static.displacement
+    )
 
 
 @pytest.mark.parametrize(

@@ -442,8 +442,8 @@ class LoadStepper:
         From a `u` that is `near`, else from 0: with cords from the axisymmetric shape of one
         section; in steps if that is not close enough.
         """
+        self.body.u.x.array[:] = 0.0 if near is None else near
         if near is not None:
-            self.body.u.x.array[:] = near
             begun = self._begin(pressure)
         else:
             begun = bool(self.body.plies.cords) and self._start_round(pressure)
