@@ -201,7 +201,7 @@ class ProgressBar:
     def _draw(self) -> None:
         from rich.console import Console
         from rich.progress import BarColumn, TextColumn
-        from rich.progress import ProgressBar as Bar
+        from rich.progress import Progress as Bar
 
         if self._rich is None:
             console = Console(file=sys.stderr, force_terminal=True)

@@ -218,7 +218,7 @@ REPORT = 1.6e6
 HEADER = 3e4
 """Bytes of a file's scene, settings and empty datasets."""
 INSTANTS = 400
-"""Instants of the outer face in motion.h5 at most (runs.stages.motion)."""
+"""Instants of the outer face in motion.h5 at most (runs.stages.vibration)."""
 MOST_OF_VIBRATION = 2e8
 """Bytes of the outer face's spectra in vibration.h5 at most (runs.stages.vibration)."""
 

@@ -43,7 +43,6 @@ from tireroad.runs.stages import obtained as stages_obtained
 from tireroad.runs.stages.accuracy import STATIC_TO_GREENS, AccuracyStage
 from tireroad.runs.stages.contact import ContactStage
 from tireroad.runs.stages.greens import Responses
-from tireroad.runs.stages.motion import MotionStage
 from tireroad.runs.stages.obtained import obtained
 from tireroad.runs.stages.response import ResponseStage
 from tireroad.runs.stages.setup import Setup
@@ -52,7 +51,7 @@ from tireroad.runs.stages.spectra import SpectraStage
 from tireroad.runs.stages.stage import Done, Job, PipelinePart, Shared, Stage
 from tireroad.runs.stages.static import StaticStage
 from tireroad.runs.stages.stiffness import StiffnessStage
-from tireroad.runs.stages.vibration import VibrationStage
+from tireroad.runs.stages.vibration import MotionStage, VibrationStage
 from tireroad.runs.stages.whole_tire import LinesOfRun
 
 

@@ -1,4 +1,4 @@
-"""Stage vibration: the whole tire over frequency, under the forces of the run."""
+"""Stages vibration and motion: the whole tire over frequency and over time, under the forces of the run."""
 
 from __future__ import annotations
 
@@ -12,13 +12,16 @@ from tireroad.fem.static.state import StaticState
 from tireroad.greens.basis import Basis
 from tireroad.greens.outputs import Surface, mean_square_velocity, radiated_power
 from tireroad.runs.files.store import attribute, dataset
+from tireroad.runs.process.mpi import on_root
 from tireroad.runs.stages.spectra import Spectra
 from tireroad.runs.stages.stage import Done, Record
-from tireroad.runs.stages.whole_tire import Lines, WholeTire
+from tireroad.runs.stages.whole_tire import Lines, PatchForces, WholeTire, replayed
 
 VELOCITY, POWER = 1e-9, 1e-12  # m/s, W: reference values of the levels, ISO 1683
 _LARGEST = 2e8  # bytes: largest size of the stored displacement fields
 HANN = 1.5  # noise bandwidth of the window in lines: mean of w^2 over the square of its mean
+_INSTANTS = 400  # at most; the last ones of the run
+_PER_PERIOD = 8  # of the band's upper frequency
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,3 +127,44 @@ def _headline(found: Vibration, surface: Surface) -> dict[str, tuple[float, str]
         "A-weighted": (found.total_weighted, "dB(A) re 1 pW"),
         "strongest line": (float(found.frequency[found.velocity.argmax()]), "Hz"),
     }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motion:
+    """Motion of the outer face at the instants `time` (g,) s.
+
+    `displacement` (g, s, 3) m from the static state, of the nodes at `points` (s, 3) m, with the
+    motion of the wheel. From the modes only: the residual flexibility is not included.
+    """
+
+    time: np.ndarray = dataset("s")
+    displacement: np.ndarray = dataset("m")
+    points: np.ndarray = dataset("m", "surface/points")
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionStage(WholeTire[Motion]):
+    """Integrates the states once more under the forces of the run, which are known by now."""
+
+    name: ClassVar[str] = "motion"
+    kind: ClassVar[type] = Motion
+
+    def compute(self, record: Record) -> Motion | None:
+        """The outer face at the stored instants; None but on the root process. Collective."""
+        made: list[Motion] = []
+        basis, forces = self.taken_in()
+        on_root(self.job.comm, lambda: made.append(self._seen(basis, forces())))
+        if not made:
+            return None
+        size = float(np.linalg.norm(made[0].displacement, axis=2).max(initial=0.0))
+        record.headline["instants"] = (len(made[0].time), "-")
+        record.headline["largest displacement of the face"] = (size, "m")
+        return made[0]
+
+    def _seen(self, basis: Basis, forces: PatchForces) -> Motion:
+        points = self.static.product.points
+        stride = max(int(1 / (_PER_PERIOD * self.band * forces.step)), 1)
+        kept = range(len(forces.time) - 1, -1, -stride)[:_INSTANTS][::-1]
+        time, q = forces.time[kept], replayed(basis, forces, kept)
+        field = (q @ basis.face(len(points)).T).reshape(len(time), -1, 3)
+        return Motion(time=time, displacement=field.astype("f4"), points=points)

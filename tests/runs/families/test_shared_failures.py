@@ -56,6 +56,6 @@ def test_a_failure_is_told_to_the_members_with_the_same_inputs(tmp_path, monkeyp
 
 
 def test_a_run_by_itself_tries_again(tmp_path, monkeypatch) -> None:
-    monkeypatch.delenv(stages_obtained.VARIABLE, road_rise=False)
+    monkeypatch.delenv(stages_obtained.VARIABLE, raising=False)
     said, tried = messages(tmp_path, monkeypatch)
     assert tried == ["one", "two", "three"] and set(said) == {"static: it folds"}

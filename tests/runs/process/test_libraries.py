@@ -46,7 +46,7 @@ def test_only_where_openblas_knows_nothing_better(monkeypatch: pytest.MonkeyPatc
         (libraries.UNKNOWN, "Core2", "Core2"),
     ):
         monkeypatch.setattr(libraries, "_kernels", lambda chosen=chosen: chosen)
-        monkeypatch.delenv("OPENBLAS_CORETYPE", road_rise=False)
+        monkeypatch.delenv("OPENBLAS_CORETYPE", raising=False)
         if before:
             monkeypatch.setenv("OPENBLAS_CORETYPE", before)
         libraries.choose_kernels()

@@ -98,7 +98,7 @@ count = 4
 )
 # What a search reads, before and between runs (tests/runs/families/test_search.py).
 UNREAD = {
-    f"Accuracy.{name}" for name in ("target", "target_db", "of", "search", "trials", "budget")
+    f"AccuracyTable.{name}" for name in ("target", "target_db", "of", "search", "trials", "budget")
 }
 DRAWING = """
 tread = 0.05
@@ -135,7 +135,7 @@ class Recorder:
                         seen.update(f"{label}.{n}" for n in switches)
             return plain(holder, name)
 
-        self._patch.setattr(of, "__getattribute__", reading, road_rise=False)
+        self._patch.setattr(of, "__getattribute__", reading, raising=False)
 
 
 def _run(folder: Path, text: str, *overrides: str) -> None:

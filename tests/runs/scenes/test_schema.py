@@ -37,7 +37,7 @@ def test_numbers_have_ends() -> None:
     """A number without an upper and a lower end is one that nobody has thought about; and above 0 lets in
     5e-324, which no length, modulus or density is: a range ends at the least that makes sense.
     """
-    free = {"PointForce.direction"}
+    free = {"PointForceTable.direction"}
     for name, key in KEYS.items():
         limits = key.limits
         if limits and name not in free:
