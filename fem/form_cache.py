@@ -35,8 +35,7 @@ _ABANDONED = 3600.0  # s after which another machine's folder without a lock is 
 _PATIENCE = 2.0  # s of compilation after which it is announced
 _LIBRARY = tuple(EXTENSION_SUFFIXES)
 
-announce: Callable[[str], None] = logging.getLogger(__name__).warning
-"""Tells the user that forms are being compiled; the command line sets its own function."""
+_LOG = logging.getLogger(__name__)  # tells the user that forms are being compiled
 
 
 def kept_in() -> Path:
@@ -106,7 +105,7 @@ def _workshop() -> Path:
         for names in _forms(kept).values():
             _borrow(kept, folder, names)
     except OSError as error:
-        announce(
+        _LOG.warning(
             f"compiled forms cannot be kept in {kept} ({error.strerror}) and are compiled anew in"
             " every run: name another folder by XDG_CACHE_HOME"
         )
@@ -238,7 +237,7 @@ def _announce(folder: Path) -> None:
 
 @cache
 def _say_once(kept: Path) -> None:
-    announce(f"compiling finite-element forms, once for this kind of tire (kept in {kept}) ...")
+    _LOG.warning(f"compiling finite-element forms, once for this kind of tire (kept in {kept}) ...")
 
 
 def end_compilers(folder: str | Path) -> None:

@@ -15,7 +15,6 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
-from tireroad.fem import form_cache
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.runs.process import console, mpi, signals
 from tireroad.runs.process.signals import DONE, INPUT, handed_over, processes_here, rank_before_mpi
@@ -339,6 +338,7 @@ def _together(function: Callable[[Any], None]) -> int:
 
     comm = MPI.COMM_WORLD
     console.set_root(comm.rank == 0)
+    console.show_log("tireroad.fem")
     _only_warnings()
     signals.stop_on_signals()
     return mpi.guarded(comm, partial(function, comm))
@@ -369,7 +369,6 @@ def _run_inside(args: argparse.Namespace, petsc_options: list[str], comm) -> Non
     scene = load(args.scene, args.set, remarks.append, args.until)
     directory = args.out if args.out is not None else Path("results") / scene.name
     mpi.start_petsc(petsc_options)
-    form_cache.announce = console.say
     with ExitStack() as stack:
 
         def claim() -> None:

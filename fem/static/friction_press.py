@@ -295,7 +295,7 @@ class Slide:
             Show("slip of the wheel", 1.0, "") if self.rolls else Show("way of the road", 1.0, "m")
         )
         try:
-            march(attempt, start, end, end - start, show)
+            march(attempt, end, end - start, show, start)
         except LoadingStopped as error:
             raise ConvergenceError(
                 f"{error}. Take more stiffness.slide_steps, or smaller elements at the footprint (tire.footprint_size)"

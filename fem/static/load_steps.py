@@ -36,6 +36,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from dolfinx import fem
@@ -170,10 +171,10 @@ class Show:
 
 def march(
     attempt: Attempt,
-    start: float,
     end: float,
     first: float,
     show: Show,
+    start: float = 0.0,
     fall: Attempt | None = None,
     enough: Callable[[], bool] = lambda: False,
     seen: Callable[[SolveOutcome, float, Show], None] = lambda step, target, show: None,
@@ -463,7 +464,9 @@ class LoadStepper:
         self.body.set_displacement(on_root(self.body.comm, shape))
         half = self._half()
         if half is not None:  # elements of unequal length are axisymmetric only approximately
-            half.loader.newton_steps += half.loader._solve_at(pressure).iterations
+            half.loader.newton_steps += half.loader._solve_at(
+                half.equilibrium.pressure, pressure
+            ).iterations
             self._count(half)
             self.body.set_displacement(half.equilibrium.on(self.body.lattice)[0])
         begun = self._begin(pressure)
@@ -473,7 +476,7 @@ class LoadStepper:
 
     def _begin(self, pressure: float) -> bool:
         """Whether the present shape leads to that at the pressure in one solution. Collective."""
-        step = self._solve_at(pressure)
+        step = self._solve_at(self.equilibrium.pressure, pressure)
         self.newton_steps += step.iterations
         if step.converged:
             self.tell("inflation", pressure, "Pa", step)
@@ -490,15 +493,13 @@ class LoadStepper:
         if problem.rolling.speed:
             problem.rolls.value = 0.0
         show = Show("inflation", pressure, "Pa")
-        self.march(lambda part: self._solve_at(part * pressure), 1.0, 1.0, show)
+        self.march(lambda part: self._solve_at(problem.pressure, part * pressure), 1.0, 1.0, show)
         if problem.rolling.speed:
             show = Show("speed", problem.rolling.speed, "rad/s")
-            self.march(lambda part: self._solve_with(problem.rolls, part**2), 1.0, 1.0, show)
+            self.march(lambda part: self._solve_at(problem.rolls, part**2), 1.0, 1.0, show)
 
-    def _solve_at(self, pressure: float) -> SolveOutcome:
-        return self._solve_with(self.equilibrium.pressure, pressure)
-
-    def _solve_with(self, constant: fem.Constant, value: float) -> SolveOutcome:
+    def _solve_at(self, constant: fem.Constant, value: float) -> SolveOutcome:
+        """Solve with a constant of the problem at another value, which stays if that converges."""
         before = float(constant.value)
         constant.value = value
         step = self.equilibrium.solve()
@@ -622,19 +623,11 @@ class LoadStepper:
         """Total vertical force of the road, N. Collective."""
         return self.equilibrium.load()
 
-    def march(
-        self,
-        attempt: Attempt,
-        end: float,
-        first: float,
-        show: Show,
-        start: float = 0.0,
-        fall: Attempt | None = None,
-        enough: Callable[[], bool] = lambda: False,
-    ) -> None:
-        """`march` that counts all steps and reports the converged ones. Collective."""
+    @property
+    def march(self) -> Callable[..., None]:
+        """`march` that counts all steps and reports the converged ones."""
         smallest = _SMALLEST_ROLLING if self.equilibrium.rolling.speed else _SMALLEST
-        march(attempt, start, end, first, show, fall, enough, self._seen, smallest)
+        return partial(march, seen=self._seen, smallest=smallest)
 
     def _seen(self, step: SolveOutcome, target: float, show: Show) -> None:
         self.newton_steps += step.iterations

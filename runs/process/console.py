@@ -4,11 +4,13 @@ Only the root process prints; on other processes the same functions have no effe
 no rank tests. Nothing here is collective.
 """
 
+import logging
 import os
 import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -99,6 +101,19 @@ def warn(text: str) -> None:
     """Print a warning to stderr, and log it."""
     if _State.root:
         _show(f"warning: {text}", sys.stderr)
+
+
+class _Said(logging.Handler):
+    def emit(self, record: logging.LogRecord) -> None:
+        say(record.getMessage())
+
+
+@cache
+def show_log(name: str) -> None:
+    """Print what is logged under a name by `say`, and nowhere else."""
+    logger = logging.getLogger(name)
+    logger.addHandler(_Said())
+    logger.propagate = False
 
 
 def is_terminal() -> bool:

@@ -1,5 +1,6 @@
 """A stop in the middle of a compilation leaves nothing that a later run would wait for."""
 
+import logging
 import os
 import signal
 import subprocess
@@ -134,8 +135,10 @@ def test_a_compiler_that_fails_is_named_with_its_folder() -> None:
 
 def test_a_long_compilation_is_announced(monkeypatch: pytest.MonkeyPatch) -> None:
     said: list[str] = []
+    told = logging.Handler()
+    monkeypatch.setattr(told, "emit", lambda record: said.append(record.getMessage()))
+    monkeypatch.setattr(form_cache._LOG, "handlers", [told])
     monkeypatch.setattr(form_cache, "_PATIENCE", 0.05)
-    monkeypatch.setattr(form_cache, "announce", said.append)
     form_cache._say_once.cache_clear()
 
     def make(folder: Path) -> str:

@@ -65,7 +65,7 @@ def test_a_march_falls_where_small_steps_fail_and_goes_on_by_steps():
         fallen.append(target)
         return SolveOutcome(True, 20, 0.0, "snapped through")
 
-    march(attempt, 0.0, 1.0, 0.3, Show("deflection", 1.0, "m"), fall)
+    march(attempt, 1.0, 0.3, Show("deflection", 1.0, "m"), fall=fall)
     assert len(fallen) == 1 and 0.4 <= fallen[0] < 0.5
     assert asked[-1] == 1.0 and max(asked[: asked.index(fallen[0])]) >= 0.4
 
@@ -78,7 +78,7 @@ def test_a_march_goes_either_way():
         asked.append(target)
         return SolveOutcome(True, 30, 0.0, "converged")
 
-    march(attempt, 0.0, -1.0, 0.3, Show("deflection", 1.0, "m"))
+    march(attempt, -1.0, 0.3, Show("deflection", 1.0, "m"))
     assert asked == pytest.approx([-0.3, -0.6, -0.9, -1.0])
 
 
