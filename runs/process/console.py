@@ -9,7 +9,7 @@ import os
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from typing import Any, TextIO
@@ -104,8 +104,12 @@ def warn(text: str) -> None:
 
 
 class _Said(logging.Handler):
+    """Past `sys.stdout`, which the form compiler replaces while it works."""
+
     def emit(self, record: logging.LogRecord) -> None:
-        say(record.getMessage())
+        with suppress(OSError, ValueError):  # a closed stream
+            if _State.root:
+                _show(record.getMessage(), sys.__stdout__ or sys.stdout)
 
 
 @cache

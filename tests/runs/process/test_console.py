@@ -1,6 +1,9 @@
 """Progress: silent when short, rate and time left when long, on the root process only."""
 
+import logging
 import time
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 
 import pytest
@@ -41,6 +44,14 @@ def test_what_an_earlier_run_has_done_is_not_in_the_rate() -> None:
         bar.advance(250)
         line = bar.line()
     assert line.startswith("contact: 750 of 1000 steps, 25 steps/s, 10 s left")
+
+
+def test_what_is_logged_is_shown_while_stdout_is_replaced(capfd) -> None:
+    """cffi replaces it while it compiles: that forms are being compiled stood in the log alone."""
+    console.show_log("tireroad.of_this_test")
+    with redirect_stdout(StringIO()):
+        logging.getLogger("tireroad.of_this_test.part").warning("compiling")
+    assert capfd.readouterr().out.splitlines() == ["compiling"]
 
 
 def test_bar_on_a_terminal(capsys, monkeypatch) -> None:
