@@ -44,6 +44,9 @@ LISTED = 16  # rows of a table of modes; the files hold all modes
 PICTURED = 6
 
 
+_LABELS = {"footprint shoulder": "pressure of shoulders over middle"}
+
+
 def static(results: Results) -> Section:
     """The section on the static state (static.h5)."""
     section = Section("Loaded tire and footprint", "The static state everything later starts from.")
@@ -66,6 +69,7 @@ def static(results: Results) -> Section:
             ("drum_radius", "m"),
         ),
     )
+    section.facts = [(_LABELS.get(label, label), value) for label, value in section.facts]
     speed = results.scene.get("rotation", {}).get("speed")
     radius = results.attribute(name, "rolling_radius")
     if speed and radius:
@@ -143,6 +147,9 @@ def footprint(results: Results, section: Section) -> None:
     if isinstance(whole, float) and whole > 0:
         section.facts.append(("contact area", f"{1e4 * whole:.4g} cm²"))
         section.facts.append(("mean contact pressure", quantity(mean_pressure(results), "Pa")))
+        if (largest := results.optional("static.h5", "contact/pressure")) is not None:
+            found = quantity(float(largest.max(initial=0.0)), "Pa")
+            section.facts.append(("largest contact pressure", found))
     if area is not None:
         caption = f"Contact pressure of {quantity(float(force[:, 2].sum()), 'N')}"
     picture = surface_figures.footprints(points, [values], ["footprint at rest"], unit)
