@@ -129,8 +129,8 @@ class RadialSection(SectionKind):
 
         rated = size(self.size).rated_load()
         return [
-            f"{self.size}: rated for about {rated:.0f} N at {1e-3 * RATED_PRESSURE:.0f} kPa (by the load indices of such "
-            "sizes, within 4 %)"
+            f"{self.size}: rated for about {rated:.0f} N at {1e-3 * RATED_PRESSURE:.0f} kPa as a standard tire (by "
+            "load indices of sizes from 145 to 275 mm wide, within 4 %)"
         ]
 
     def has_losses(self, tire: TireTable) -> bool:
