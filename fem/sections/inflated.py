@@ -295,7 +295,7 @@ class InflatedRing:
 
     def _of_kind(self, wave: int, share: np.ndarray) -> sparse.csr_matrix:
         """The wall's own stiffness at a wave number, times a `share` of each cell."""
-        return self._wall(wave, [share[:, None, None, None] * own for _, own in self._moduli])
+        return self._wall(wave, [share[:, None, None, None] * own for _, own in self._inflated])
 
     def _dynamic_stiffness(self, wave: int) -> Callable[[float], sparse.csc_matrix]:
         """The complex stiffness of small motions of a wave, free unknowns, by frequency (Hz)."""
@@ -372,7 +372,7 @@ class InflatedRing:
         for wave in range(waves + 1):
             stiffness = self._dynamic_stiffness(wave)(wave * self.speed / (2 * np.pi))
             inertia = self.speed**2 * self._inside(self._carried(wave))
-            answer = load @ splu((stiffness - inertia).tocsc()).solve(load)
+            answer = load @ splu(stiffness - inertia).solve(load)
             deflection += _share(wave, half_angle) * answer.real
             moment -= wave * _share(wave, half_angle) * answer.imag
         return float(deflection), float(moment)
@@ -439,18 +439,16 @@ class InflatedRing:
         return out
 
     def _strained(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Moduli (c, q, 9, 9) Pa of both parts in the present state, whole and without those of the tension."""
-        u, found = self.displacement.ravel()[dofs(self.section.cells)], []
-        for rule, stress in self._parts:
-            F = _deformation(rule.gradient(0), u)
-            A = _moduli(stress, F)
-            found.append((A, _own(stress, F, A)))
-        return found
+        """Deformation gradient (c, q, 3, 3) and moduli (c, q, 9, 9) Pa of both parts in the present state."""
+        u = self.displacement.ravel()[dofs(self.section.cells)]
+        every = [(_deformation(rule.gradient(0), u), stress) for rule, stress in self._parts]
+        return [(F, _moduli(stress, F)) for F, stress in every]
 
     @cached_property
-    def _moduli(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Those of the inflated state."""
-        return self._strained()
+    def _inflated(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Moduli of both parts in the inflated state, whole and without those of the tension."""
+        every = zip(self._parts, self._strained(), strict=True)
+        return [(A, _own(stress, F, A)) for (_, stress), (F, A) in every]
 
     def _wall(self, wave: int, moduli: Sequence[np.ndarray]) -> sparse.csr_matrix:
         out: sparse.spmatrix = sparse.csr_matrix((self._size, self._size))
@@ -465,9 +463,9 @@ class InflatedRing:
         face, u = InnerFace(self.section, self.displacement), self.displacement
         if dynamic:
             excess = (self._dynamic - 1)[:, None, None, None]
-            moduli = [A + excess * own for A, own in self._moduli]
+            moduli = [A + excess * own for A, own in self._inflated]
         else:
-            moduli = [A for A, _ in self._strained()]
+            moduli = [A for _, A in self._strained()]
         out = self._wall(wave, moduli) + pressure * self._assembled(face.nodes, face.tangent(wave))
         for cords, edges in self._cords:
             line = CordElements(self.section, edges, cords, self.section.order)
