@@ -204,7 +204,7 @@ def radial(
         section="radial", shape=shape, segments=segments, order=2, footprint_size=footprint_size
     )
     try:
-        built(size)
+        built(size, grooves)
     except InputError as problem:
         raise InputError(f"radial: {str(problem).removeprefix('tire.')}") from None
     return make_tire(comm, tire)

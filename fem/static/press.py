@@ -39,7 +39,7 @@ def press(
     """
     if not (math.isfinite(inflation) and inflation >= 0.0):
         raise InputError(f"inflation = {inflation:g} Pa must be 0 or more, and finite")
-    tire.body.u.x.array[:] = 0.0  # of an earlier state
+    tire.body.u.x.array[:] = 0.0  # not that of an earlier press: the force scale is of this shape
     loader = LoadStepper(Equilibrium(tire.body, rolling, road), report)
     loader.inflate(inflation)
     loader = place(loader, load, deflection, road_height, friction)
