@@ -1,7 +1,7 @@
 """The time loop: the tire's motion without the next force, the contact solution, the step.
 
-Steps of equal size, what a moving road imposes (`driven`), and the contact problem solved on the root or on
-every process while parts of the next step are computed ahead of the force.
+Steps of equal size, what a moving road imposes (`driven`), and the contact problem solved on the
+root or on every process while parts of the next step are computed ahead of the force.
 """
 
 from __future__ import annotations
@@ -141,7 +141,7 @@ _POINTS_AHEAD, _STEPS_AHEAD = 200_000, 64
 class LinearTire(Protocol):
     """A linear tire between the forces and displacements of the patch.
 
-    greens.recursion or greens.convolution; the processes of `comm` advance it together.
+    greens.recursion or greens.recursion; the processes of `comm` advance it together.
     """
 
     comm: MPI.Comm

@@ -3,10 +3,10 @@
 Spacing of the contact points where the scene leaves it to the program.
 
 The forces of a footprint a few points wide depend on where its edge falls between them; a fifth of
-its width and length is fine enough (soft torus, 14 mm wide; docs/verification/contact-points.md).
-A wave needs twelve points: with ten the deviation of the radial tire, 130 mm wide, is 0.7 to
-2.2 % off (docs/verification/default-settings.md), with twelve 0.6 % at most. Points much closer than
-the nodes that carry them resolve no more of the tire.
+its width and length is fine enough (soft torus, 14 mm wide; docs/verification/contact-points.md). A
+wave needs twelve points: with ten the deviation of the radial tire, 130 mm wide, is 0.7 to 2.2 %
+off (docs/verification/default-settings.md), with twelve 0.6 % at most. Points much closer than the
+nodes that carry them resolve no more of the tire.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import sparse
 
-from tireroad.contact.tread.kernel import GridPlaces
+from tireroad.contact.tread.compliance import GridPlaces
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.parameters import second_digit
 

@@ -15,7 +15,7 @@ from mpi4py import MPI
 from tireroad.fem.parameters import number
 from tireroad.fem.static.press import press
 from tireroad.runs.scene.load import load
-from tireroad.runs.scene.sections.kinds.torus import TorusSection
+from tireroad.runs.scene.sections.torus import TorusSection
 from tireroad.runs.scene.tables.tire import SECTIONS, section_kind
 from tireroad.runs.stages.stage import make_tire
 

@@ -4,7 +4,7 @@ from tireroad.fem.exports import exported
 
 _HOMES = {
     "Basis": "basis",
-    "Convolution": "convolution",
+    "Convolution": "recursion",
     "Recursion": "recursion",
     "Response": "response",
     "Wheel": "coupling",

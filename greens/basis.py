@@ -22,8 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
-from tireroad.fem.axle import Axle
-from tireroad.fem.turning import Turning
+from tireroad.fem.wheel import Axle, Turning
 from tireroad.greens.response import Response, couple, reading
 from tireroad.modal.basis import Projection
 from tireroad.modal.corner import MOMENTS, SEEN

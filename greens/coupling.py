@@ -24,8 +24,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import sparse
 
-from tireroad.fem.axle import Axle
-from tireroad.fem.cavity.column import Column
+from tireroad.fem.cavity import Column
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.compliance import (
     LoadedShapes,
@@ -41,7 +40,7 @@ from tireroad.fem.matrices.compliance import (
 from tireroad.fem.matrices.operators import Compound, Operators, Rotation
 from tireroad.fem.matrices.rim_motion import RimMotion
 from tireroad.fem.model import SmallMotions
-from tireroad.fem.turning import Turning
+from tireroad.fem.wheel import Axle, Turning
 from tireroad.greens.basis import (
     Array,
     Basis,

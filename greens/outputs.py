@@ -7,9 +7,9 @@ The tire transmits the forces on it less the rate of change of its momentum,
     f_axle = sum f_c - d/dt int rho Du/Dt = sum f_c + omega^2 int rho u,
 
 since the convective part of the momentum cancels around the ring. The doppler inertia has the body
-rate in place of D/Dt, and with it (d/dt - Omega e_y x)^2 in place of d^2/dt^2. The other way is the thesis's
-(7.1)-(7.4), corrected. With the six motions r of the rigid rim and the loads c, the rim stays at
-rest under the forces
+rate in place of D/Dt, and with it (d/dt - Omega e_y x)^2 in place of d^2/dt^2. The other way is the
+thesis's (7.1)-(7.4), corrected. With the six motions r of the rigid rim and the loads c, the rim
+stays at rest under the forces
 
     f_r = -H_rr^-1 H_rc f_c     on the tire,
 
@@ -49,10 +49,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import sparse
 
-from tireroad.fem.axle import Axle
 from tireroad.fem.collective import summed
 from tireroad.fem.matrices.rim_motion import RimMotion
-from tireroad.fem.turning import Turning
+from tireroad.fem.wheel import Axle, Turning
 from tireroad.greens.basis import Basis, Probes
 from tireroad.greens.response import Response, couple
 from tireroad.modal.corner import BODY, SEEN, Corner

@@ -1,6 +1,13 @@
 """The time loop's recursion of states: exact convolution of Green's functions without history.
 
-One time step of the states: decay, and the force during it (greens.recursion).
+With a force linear over one step h (first-order hold), f(tau) = f_n + (f_{n+1} - f_n) tau / h, each
+state advances by
+
+    z_{n+1} = e^{sh} z_n + b0 P f_n + b1 P f_{n+1},   b1 = h phi2(sh),  b0 = h (phi1 - phi2)(sh),
+
+phi1(x) = (e^x - 1)/x, phi2(x) = (e^x - 1 - x)/x^2. With the force constant at its new value b0 = 0
+and b1 = h phi1. Cost: one pass over output and input,
+4 q (r + k) flops and 16 q (r + k) bytes.
 
 The schemes differ in the force within a step, from the forces f_n at its end, f_{n-1} and f_{n-2}:
 
@@ -13,24 +20,6 @@ Of the means a f_n + b f_{n-1} + c f_{n-2} that are of second order, a = 1/2 + c
 error is (1/8 + c) h^2 f'' and the work that springs lose on an oscillation of angle t a step is as
 2 c (1 - cos t)^2 >= 0, whatever the tire. With c = 1/16 a mass bouncing on a spring of stiffness k
 loses at least 2.5 % of its amplitude a step from k h^2 / m = 2 to 10^3.
-
-The response to forces that alternate in sign from step to step, as in a chattering contact.
-
-With f_n = (-1)^n F, linear in between, every state settles at z_n = (-1)^n Z,
-
-    -Z = e^{sh} Z + b0 P F - b1 P F   =>   Z = (b1 - b0) P F / (1 + e^{sh})
-
-(greens.recursion). The mass of a mode alone gives -h^2 / (12 m): the tire moves towards a force
-that pushes it, as if it were a negative spring. Forces constant over the step give zero.
-
-With a force linear over one step h (first-order hold), f(tau) = f_n + (f_{n+1} - f_n) tau / h, each
-state advances by
-
-    z_{n+1} = e^{sh} z_n + b0 P f_n + b1 P f_{n+1},   b1 = h phi2(sh),  b0 = h (phi1 - phi2)(sh),
-
-phi1(x) = (e^x - 1)/x, phi2(x) = (e^x - 1 - x)/x^2. With the force constant at its new value b0 = 0
-and b1 = h phi1. Cost: one pass over output and input,
-4 q (r + k) flops and 16 q (r + k) bytes.
 """
 
 from __future__ import annotations
@@ -47,6 +36,7 @@ from scipy.sparse.linalg import LinearOperator
 from threadpoolctl import threadpool_info
 
 from tireroad.fem.collective import allgather_rows, same_on_all
+from tireroad.fem.errors import InputError
 from tireroad.greens.response import Response
 
 DAMPED = 1 / 16
@@ -247,6 +237,13 @@ def alternating(response: Response, step: float) -> np.ndarray:
     """Displacement (r, k) m/N under unit forces of alternating sign, without the residual.
 
     `response` as the loop uses it (Response.resolved), `step` s; forces linear over the step.
+
+    With f_n = (-1)^n F, linear in between, every state settles at z_n = (-1)^n Z,
+
+        -Z = e^{sh} Z + b0 P F - b1 P F   =>   Z = (b1 - b0) P F / (1 + e^{sh})
+
+    The mass of a mode alone gives -h^2 / (12 m): the tire moves towards a force
+    that pushes it, as if it were a negative spring. Forces constant over the step give zero.
     """
     x = response.eigenvalue * step
     old, new = weights(x, step, "linear")
@@ -640,3 +637,74 @@ def marched(
             out += (late[:-3] @ (np.vstack([force, forces[:-1]]) - forces).T).T
         yield out
         force, last = forces[-1], pushes[-2:]
+
+
+LARGEST = 4e9  # bytes of sampled Green's functions
+
+
+class Convolution:
+    """The interface of `Recursion` by direct sums over the whole history, in steps of `step` s.
+
+    InputError if the sampled Green's functions take more than `LARGEST` bytes. Not collective.
+
+    Thesis (5.3), kept as a reference:
+
+        u_n = sum_{k<n} g((n - k) h) f_k h + G_res f_n,   g(0) = 0
+
+    A rectangle rule: first order in h, and only for modes that h resolves well. Time and memory grow
+    with the number of steps: n r k multiplications in step n.
+    """
+
+    def __init__(self, *, response: Response, step: float, steps: int) -> None:
+        outputs, forces = response.residual.shape
+        needed = 8.0 * steps * outputs * forces
+        if needed > LARGEST:
+            raise InputError(
+                f'time.scheme = "convolution" needs {needed / 1e9:.1f} GB for {steps} steps of '
+                f"{outputs} x {forces} Green's functions (at most {LARGEST / 1e9:.0f} GB): shorten "
+                'time.duration, or take scheme = "linear", which needs no history'
+            )
+        times = step * np.arange(1, steps + 1)
+        self._kernel = step * response.impulse(times)
+        self._momentum = step * response.momentum_rate(times)
+        self._direct = response.direct_momentum_rate()
+        # Answers to the rate of the force: of the outputs, and of the momentum's rate.
+        slope = 0.0 if response.slope is None else response.slope / step
+        self._slope = np.zeros((outputs + 3, forces)) + slope
+        self._history = np.zeros((steps + 1, forces))
+        self._n = 0
+        self.same_step, self.comm = response.residual + self._slope[:-3], MPI.COMM_SELF
+
+    def start(self, force: np.ndarray) -> None:
+        """Begin with a force (k,) N that is already there at t = 0."""
+        self._history[0] = force
+
+    def predict(self) -> np.ndarray:
+        """Displacement (r,) m at the end of the step due to all earlier forces."""
+        self._n += 1
+        past = _convolve(self._kernel[: self._n], self._history[: self._n])
+        return past - self._slope[:-3] @ self._history[self._n - 1]
+
+    def advance(self, force: np.ndarray) -> None:
+        """Set the force (k,) N at the end of the step."""
+        self._history[self._n] = force
+
+    def snapshot(self) -> dict[str, np.ndarray]:
+        """The forces so far."""
+        return {"history": self._history[: self._n + 1]}
+
+    def restore(self, kept: dict[str, np.ndarray]) -> None:
+        """Continue from a snapshot."""
+        self._n = len(kept["history"]) - 1
+        self._history[: self._n + 1] = kept["history"]
+
+    def inertia_force(self) -> np.ndarray:
+        """Rate of change of the tire's momentum (3,), N."""
+        past = _convolve(self._momentum[: self._n], self._history[: self._n])
+        change = self._history[self._n] - self._history[max(self._n - 1, 0)]
+        return past + self._direct @ self._history[self._n] + self._slope[-3:] @ change
+
+
+def _convolve(kernel: np.ndarray, history: np.ndarray) -> np.ndarray:
+    """sum_k kernel[n - 1 - k] history[k]."""
+    return np.einsum("trk,tk->r", kernel[::-1], history, optimize=True)

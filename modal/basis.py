@@ -3,7 +3,7 @@
 The air in the tire on a modal basis: the terms that it adds to the projected problem.
 
 With coordinates eta of the tire and g of the air's own modes, both of unit mass, the pencil is that
-of `fem.cavity.duct.Duct.joined`. The shapes on the outer face have no component along g.
+of `fem.cavity.Duct.joined`. The shapes on the outer face have no component along g.
 
 Additions to the modes of a basis: static shapes with their inertia, the air, the wheel.
 
@@ -25,14 +25,13 @@ import numpy as np
 from mpi4py import MPI
 from scipy import sparse
 
-from tireroad.fem.axle import Axle
-from tireroad.fem.cavity.column import Column
-from tireroad.fem.cavity.duct import Duct
+from tireroad.fem.cavity import Column, Duct
 from tireroad.fem.collective import summed
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.operators import Compound, Operators, Rotation
 from tireroad.fem.matrices.rim_motion import RimMotion
 from tireroad.fem.tire.material import CONSTANT, own_moduli
+from tireroad.fem.wheel import Axle
 from tireroad.modal.corner import Corner, meeting
 from tireroad.modal.solver.fields import between, gram, projected, strain_energies
 from tireroad.modal.solver.slicing import Modes

@@ -23,10 +23,10 @@ import numpy as np
 from mpi4py import MPI
 from scipy import linalg, sparse
 
-from tireroad.fem.axle import DIRECTIONS, Axle
 from tireroad.fem.collective import summed
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.rim_motion import FELT, RimMotion, carried_pencil
+from tireroad.fem.wheel import DIRECTIONS, Axle
 
 BODY = 6  # index of the body's height, after the six motions of the rim
 # Motions that probes can read or load after the outer face: the rim's six and the body's height.

@@ -26,7 +26,7 @@ from __future__ import annotations
 import numpy as np
 
 from tireroad.fem.errors import InputError
-from tireroad.fem.turning import Damping, Proportional, StrainEnergy
+from tireroad.fem.wheel import Damping, Proportional, StrainEnergy
 from tireroad.modal.basis import Projection
 
 

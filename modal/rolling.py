@@ -1,7 +1,7 @@
 """The states of a rolling tire and the wheel's motion that they were computed for: by projection, or in full.
 
-The full method solves the quadratic problem on the finite elements by SLEPc for a few states, and measures
-how far the projected ones are from them.
+The full method solves the quadratic problem on the finite elements by SLEPc for a few states, and
+measures how far the projected ones are from them.
 """
 
 from __future__ import annotations
@@ -14,13 +14,12 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import optimize
 
-from tireroad.fem.axle import Axle
 from tireroad.fem.collective import summed
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.matrices.rim_motion import RimMotion
 from tireroad.fem.parallel import on_root
-from tireroad.fem.turning import Turning
+from tireroad.fem.wheel import Axle, Turning
 from tireroad.modal.basis import ModalBasis, Projection
 from tireroad.modal.campbell import Campbell
 from tireroad.modal.corner import meeting

@@ -8,13 +8,13 @@ respond with modes of some kHz, which a basis of the lowest modes lacks, hence s
 
 where omega_m is the circular frequency of the highest mode. x . K x is the relative shift that a
 shape causes in the squared frequencies near w. The leading directions of X in that measure, those
-of Turning.shape_tolerance and more, join the basis (modal.basis) and take part in the rotating problem. They
-are found in the block Krylov space of X X^T K, begun with random combinations of the columns of X
-(Musco and Musco, Advances in Neural Information Processing Systems 28 (2015) 1396): a few solutions
-per direction that counts instead of two per mode. Blocks are added until what counts has settled.
-Their measure falls slowly where it is cut, so that directions from random combinations alone differ
-from one choice of these to the next: between a tire and its mirror image, forces on the axle
-differed by 0.4 to 3 % in the band.
+of Turning.shape_tolerance and more, join the basis (modal.basis) and take part in the rotating
+problem. They are found in the block Krylov space of X X^T K, begun with random combinations of the
+columns of X (Musco and Musco, Advances in Neural Information Processing Systems 28 (2015) 1396): a
+few solutions per direction that counts instead of two per mode. Blocks are added until what counts
+has settled. Their measure falls slowly where it is cut, so that directions from random combinations
+alone differ from one choice of these to the next: between a tire and its mirror image, forces on
+the axle differed by 0.4 to 3 % in the band.
 
 For a belted tire at 80 rad/s (20,520 unknowns, 100 modes to 322 Hz, 37 points of its footprint,
 against its full matrices) the largest error of the receptance up to 161 Hz is 45 % without them,
@@ -31,7 +31,7 @@ from scipy.sparse.csgraph import connected_components
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.compliance import LoadedShapes
 from tireroad.fem.matrices.operators import Operators, Rotation
-from tireroad.fem.turning import Turning
+from tireroad.fem.wheel import Turning
 from tireroad.modal.basis import Projection, combined, extended, take_off
 from tireroad.modal.solver.fields import gram, multiply
 from tireroad.modal.solver.slicing import Modes

@@ -6,15 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from tireroad.fem.axle import Axle
-from tireroad.fem.cavity.column import Column
+from tireroad.fem.cavity import Column
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.parameters import Limits, finite, whole
 from tireroad.fem.static.checkpoint import Journal
 from tireroad.fem.tire.material import CONSTANT, own_moduli
-from tireroad.fem.turning import Turning
+from tireroad.fem.wheel import Axle, Turning
 from tireroad.modal.basis import ModalBasis, project, with_air, with_corner
 from tireroad.modal.rotation_shapes import with_rotation_shapes
 from tireroad.modal.solver import undamped

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable
 from contextlib import ExitStack, redirect_stderr, redirect_stdout, suppress
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -323,17 +323,24 @@ def _parser(
     )
 
 
-def _together(function: Callable[[Any], None]) -> int:
-    """Run `function(comm)` on all processes; returns the exit status. Collective."""
-    status, message = mpi.judged(check_surroundings)
-    if status != DONE:
-        if rank_before_mpi() == 0:
-            print(message, file=sys.stderr)
-        return status
+def _refused_here() -> int:
+    """Check that MPI can run here, before it starts; tells why not. Returns the exit status."""
+    with mpi.ending() as end:
+        check_surroundings()
     if rank_before_mpi() == 0:
-        # Before MPI starts, which with far too many processes takes minutes by itself.
-        for text in crowded(processes_here()):
-            print(f"warning: {text}", file=sys.stderr, flush=True)
+        # With far too many processes, MPI's start takes minutes by itself.
+        texts = (
+            [end.message]
+            if end.status
+            else [f"warning: {text}" for text in crowded(processes_here())]
+        )
+        for text in texts:
+            print(text, file=sys.stderr, flush=True)
+    return end.status
+
+
+def _world() -> Any:
+    """All processes, with output, log and signals set up for them. Collective."""
     from mpi4py import MPI
 
     comm = MPI.COMM_WORLD
@@ -341,7 +348,7 @@ def _together(function: Callable[[Any], None]) -> int:
     console.show_log("tireroad.fem")
     _only_warnings()
     signals.stop_on_signals()
-    return mpi.guarded(comm, partial(function, comm))
+    return comm
 
 
 @cache
@@ -353,46 +360,45 @@ def _only_warnings() -> None:
 
 
 def _run(args: argparse.Namespace, petsc_options: list[str]) -> int:
-    """The command `run`. Collective over all processes."""
-    return _together(partial(_run_inside, args, petsc_options))
+    """The command `run`; returns the exit status. Collective."""
+    comm = _world()
+    with mpi.common_ending(comm) as end, ExitStack() as stack:
+        scene, remarks = _loaded(args, comm)
+        directory = args.out if args.out is not None else Path("results") / scene.name
+        mpi.start_petsc(petsc_options)
+        from tireroad.runs.files.cache import Cache
+        from tireroad.runs.files.folder import claimed
+        from tireroad.runs.search import journal
+        from tireroad.runs.search.search import search, searches, tell_error
+        from tireroad.runs.stages.pipeline import run_scene
+
+        mpi.on_root(comm, lambda: stack.enter_context(claimed(directory, scene.name)))
+        stack.enter_context(console.log_to(directory / "log.txt"))
+        for remark in remarks:
+            console.say(f"note: {remark}")
+        given = {"fresh": args.fresh, "petsc_options": petsc_options, "cache": Cache.of_user()}
+        try:
+            if searches(scene, args.until):
+                search(scene, directory, comm, **given)
+            else:
+                mpi.on_root(comm, lambda: journal.leave(directory))
+                tell_error(scene, run_scene(scene, directory, comm, until=args.until, **given))
+        except (InputError, ConvergenceError) as error:
+            console.log(f"error: {error}")
+            raise
+    return end.status
 
 
-def _run_inside(args: argparse.Namespace, petsc_options: list[str], comm) -> None:
-    from tireroad.runs.files.cache import Cache
-    from tireroad.runs.files.folder import check_kept_scene, claimed
+def _loaded(args: argparse.Namespace, comm: Any) -> tuple[Any, list[str]]:
+    """The scene of the command `run`, and remarks on it for the log."""
+    from tireroad.runs.files.folder import check_kept_scene
     from tireroad.runs.scene.load import load
 
     _check_processes(args, comm.size)
     if getattr(args, "resumed", False):
         check_kept_scene(args.scene)
     remarks: list[str] = []
-    scene = load(args.scene, args.set, remarks.append, args.until)
-    directory = args.out if args.out is not None else Path("results") / scene.name
-    mpi.start_petsc(petsc_options)
-    with ExitStack() as stack:
-
-        def claim() -> None:
-            stack.enter_context(claimed(directory, scene.name))
-
-        mpi.on_root(comm, claim)
-        stack.enter_context(console.log_to(directory / "log.txt"))
-        for remark in remarks:
-            console.say(f"note: {remark}")
-        from tireroad.runs.search.search import run
-
-        try:
-            run(
-                scene,
-                directory,
-                comm,
-                until=args.until,
-                fresh=args.fresh,
-                petsc_options=petsc_options,
-                cache=Cache.of_user(),
-            )
-        except (InputError, ConvergenceError) as error:
-            console.log(f"error: {error}")
-            raise
+    return load(args.scene, args.set, remarks.append, args.until), remarks
 
 
 def _check_processes(args: argparse.Namespace, size: int) -> None:
@@ -404,14 +410,17 @@ def _check_processes(args: argparse.Namespace, size: int) -> None:
         )
 
 
-def _reproduce(args: argparse.Namespace, comm) -> None:
-    """Recompute figures and tables of the thesis. Collective."""
-    _check_processes(args, comm.size)
-    _check_checkout("thesis", args.command)
-    mpi.start_petsc([])
-    from tireroad.tests.thesis.command import reproduce
+def _reproduce(args: argparse.Namespace) -> int:
+    """Recompute figures and tables of the thesis; returns the exit status. Collective."""
+    comm = _world()
+    with mpi.common_ending(comm) as end:
+        _check_processes(args, comm.size)
+        _check_checkout("thesis", args.command)
+        mpi.start_petsc([])
+        from tireroad.tests.thesis.command import reproduce
 
-    reproduce(args.names, args.out, comm)
+        reproduce(args.names, args.out, comm)
+    return end.status
 
 
 def _resumed(args: argparse.Namespace) -> argparse.Namespace:
@@ -439,8 +448,13 @@ def _check(args: argparse.Namespace) -> None:
 
 def _check_file(path: Path) -> None:
     """Say what a file that is no scene holds."""
-    from tireroad.runs.report.road_figure import KINDS, describe_road, is_road_file
-    from tireroad.runs.report.tire_file import describe_tire, is_tire_file
+    from tireroad.runs.report.input_file import (
+        KINDS,
+        describe_road,
+        describe_tire,
+        is_road_file,
+        is_tire_file,
+    )
 
     out = Path("results") / path.stem
     if is_tire_file(path):
@@ -461,7 +475,7 @@ def _report(args: argparse.Namespace) -> None:
 
 
 def _fit(args: argparse.Namespace) -> None:
-    from tireroad.runs.fit.fit import command
+    from tireroad.runs.fit import command
 
     print(command(args.figures, args.out or Path("results") / args.figures.stem, args.set))
 
@@ -563,10 +577,11 @@ def _alone(args: argparse.Namespace) -> int:
         return DONE
     signals.stop_on_signals()
     kept = "the same command begins again" if args.command in READERS else mpi.KEPT
-    status, message = mpi.judged(lambda: ALONE[args.command](args), kept)
-    if message:
-        print(message, file=sys.stderr)
-    return status
+    with mpi.ending(kept) as end:
+        ALONE[args.command](args)
+    if end.message:
+        print(end.message, file=sys.stderr)
+    return end.status
 
 
 def main(argv: list[str]) -> int:
@@ -592,8 +607,9 @@ def main(argv: list[str]) -> int:
     except SystemExit as ending:
         return handed_over(int(ending.code or 0))
     args = _resumed(args) if args.command == "resume" else args
-    if args.command == "run":
-        return handed_over(_run(args, options))
-    if args.command == "reproduce":
-        return handed_over(_together(partial(_reproduce, args)))
-    return _alone(args)
+    if args.command not in ("run", "reproduce"):
+        return _alone(args)
+    status = _refused_here()
+    if status == DONE:
+        status = _run(args, options) if args.command == "run" else _reproduce(args)
+    return handed_over(status)

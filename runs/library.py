@@ -45,7 +45,7 @@ from tireroad.fem.static.state import StaticState
 from tireroad.fem.static.virtual_work import AT_REST
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import Material, compound
-from tireroad.fem.turning import Turning
+from tireroad.fem.wheel import Turning
 from tireroad.greens.coupling import Wheel, wheel_of
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
@@ -54,8 +54,8 @@ from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes, rolling_modes
 from tireroad.modal.standing import standing_modes
 from tireroad.runs.scene.rules import barred_from_contact
-from tireroad.runs.scene.sections.kinds.radial import RadialSection, built
-from tireroad.runs.scene.sections.kinds.torus import TorusSection
+from tireroad.runs.scene.sections.radial import RadialSection, built
+from tireroad.runs.scene.sections.torus import TorusSection
 from tireroad.runs.scene.tables.tire import NEAR_ROAD, TireTable
 from tireroad.runs.stages.rolling import grown, make_loop
 from tireroad.runs.stages.stage import make_tire, rolling_shape

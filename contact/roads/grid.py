@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.contact.roads.placement import shown
+from tireroad.contact.roads.under_tire import shown
 from tireroad.fem.errors import InputError
 
 Array = NDArray[np.float64]

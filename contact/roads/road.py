@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.contact.roads.placement import Placement
-from tireroad.contact.roads.under_tire import Road, RoadUnderTire
+from tireroad.contact.roads.under_tire import Placement, Road, RoadUnderTire
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import ParameterError, Parameters, Registry, choice, number
 

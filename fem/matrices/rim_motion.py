@@ -17,7 +17,6 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from tireroad.fem import compat
-from tireroad.fem.axle import Axle
 from tireroad.fem.collective import summed
 from tireroad.fem.matrices.operators import FIXED, TURN, Unknowns, rigid_motions, turning_moments
 from tireroad.fem.static.virtual_work import (
@@ -30,6 +29,7 @@ from tireroad.fem.static.virtual_work import (
     static_residual,
 )
 from tireroad.fem.tire.body import Body
+from tireroad.fem.wheel import Axle
 
 TRANSLATIONS = slice(0, 3)
 # The factors of 2 Omega and of Omega^2, by the inertia of rotation.

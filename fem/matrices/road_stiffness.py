@@ -21,7 +21,7 @@ from scipy import sparse
 from tireroad.fem import compat
 from tireroad.fem.collective import summed
 from tireroad.fem.errors import InputError
-from tireroad.fem.matrices.direct import multiply, solve_all
+from tireroad.fem.matrices.compliance import multiply, solve_all
 from tireroad.fem.matrices.operators import FIXED, Unknowns, rigid_motions
 from tireroad.fem.static.virtual_work import AT_REST, Rolling, static_residual, tangent
 from tireroad.fem.tire.body import Body

@@ -16,10 +16,16 @@ import numpy.typing as npt
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from tireroad.fem.errors import InputError
-from tireroad.fem.sections import grid
-from tireroad.fem.sections.grid import PlyLine, RegionPatch, corners, product
-from tireroad.fem.sections.mesh2d import SectionMesh
-from tireroad.fem.sections.ring import Ring, revolved
+from tireroad.fem.sections import mesh2d
+from tireroad.fem.sections.mesh2d import (
+    PlyLine,
+    RegionPatch,
+    Ring,
+    SectionMesh,
+    corners,
+    product,
+    revolved,
+)
 
 RADII = 0.1, 2.5  # m, range of the outer radius of a tire
 INFLATION = 2.2e5  # Pa, of a passenger tire whose pressure a file does not give
@@ -257,7 +263,7 @@ class Construction:
         length = self._held
         thickness = self._surfaces()(np.array([length]))[0, -1]
         distance = np.maximum(length - np.abs(s), 0.0)
-        size = grid.size(distance, 2 * length, count, grid.LEAST * thickness / count)
+        size = mesh2d.size(distance, 2 * length, count, mesh2d.LEAST * thickness / count)
         size = np.where(np.abs(s) < length, size, self.outline.length)  # held part: one element
         ends = np.array([line.to for line in self.cords if line.to < length])
         if not len(ends):

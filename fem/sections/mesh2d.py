@@ -1,13 +1,22 @@
-"""The cross-section of a tire as curved quadrilaterals in the meridian half plane."""
+"""The cross-section of a tire as curved quadrilaterals in the meridian half plane, and its revolution.
+
+A section without layers of its own is meshed as the product of two lines of elements: through the
+wall and along it. At a clamped edge stresses are singular and a bending boundary layer ends. Sizes
+that grow in proportion to the distance (h = h0 + GROWTH d) give each element the same error. The
+smallest size depends on the number of elements: if there are few, the middle of the wall needs them
+more.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from tireroad.fem.errors import InputError
+from tireroad.fem.parameters import Limits
 
 SIDES = ("xi = 0", "xi = 1", "eta = 0", "eta = 1")
 
@@ -191,10 +200,10 @@ _GAUSS = 4  # points per direction at which the Jacobian is checked, besides the
 def check(mesh: SectionMesh) -> None:
     """Raise InputError for the first rule of `SectionMesh` that is violated."""
     _arrays(mesh)
-    _nodes(mesh)
+    _check_nodes(mesh)
     _jacobians(mesh)
     _one_body(mesh)
-    edges = _edges(mesh)
+    edges = _boundary_edges(mesh)
     for name in ("outer", "tread", "inner", "rim"):
         _on_boundary(mesh, name, edges)
     _outer(mesh)
@@ -225,7 +234,7 @@ def _place(point: np.ndarray) -> str:
     return f"r = {point[0]:.5g} m, y = {point[1]:.5g} m"
 
 
-def _nodes(mesh: SectionMesh) -> None:
+def _check_nodes(mesh: SectionMesh) -> None:
     if mesh.nodes[:, 0].min() <= 0:
         worst = mesh.nodes[mesh.nodes[:, 0].argmin()]
         raise InputError(
@@ -283,7 +292,7 @@ def _one_body(mesh: SectionMesh) -> None:
         )
 
 
-def _edges(mesh: SectionMesh) -> np.ndarray:
+def _boundary_edges(mesh: SectionMesh) -> np.ndarray:
     """Number of cells that share each side of each cell, (c, 4)."""
     sides = np.sort(mesh.cells[:, side_nodes(mesh.order)], axis=2)
     _, inverse, count = np.unique(
@@ -354,3 +363,329 @@ def _plies(mesh: SectionMesh, count: np.ndarray) -> None:
             raise InputError(f"section: ply {name!r} is not one chain of element edges in order")
         if len(np.unique(chain)) != len(chain):
             raise InputError(f"section: ply {name!r} meets itself")
+
+
+# Largest error in % of nine frequencies (n = 0, 1, 3; three each) of the clamped torus of order 3,
+# exact ring, with 8, 10, 12, 14 and 16 elements along the arc. This grading: 0.82, 0.38, 0.22,
+# 0.16, 0.14; cosine down to 0.3 of the uniform size at the bead: 1.0, 0.56, 0.37, 0.28, 0.22; sizes
+# from a twelfth of the wall: 12, 5.7, 3.4.
+GROWTH = 1.0
+SPARE = 1.3  # largest size over the uniform one
+LEAST = 1.33  # smallest size: wall thicknesses over the number of elements
+
+
+def size(distance: np.ndarray, length: float, count: int, floor: float) -> np.ndarray:
+    """Sizes at distances from the nearer of two clamped edges, for `count` elements over a length.
+
+    Distances, length, floor (the least size at the edge) and result have the same unit.
+    """
+    largest = SPARE * length / count
+
+    def elements(logarithm: float) -> float:
+        first = largest * np.exp(-logarithm)
+        graded = 2 * (largest - first) / GROWTH
+        return 2 * logarithm / GROWTH + max(length - graded, 0.0) / largest
+
+    low, deep = 0.0, np.log(largest / floor) if largest > floor else 0.0
+    if elements(deep) > count:  # a smaller first element costs more elements: bisect
+        for _ in range(60):
+            middle = (low + deep) / 2
+            low, deep = (middle, deep) if elements(middle) < count else (low, middle)
+    return np.minimum(largest * np.exp(-deep) + GROWTH * distance, largest)
+
+
+@dataclass(frozen=True)
+class RegionPatch:
+    """A part of a wall of another compound: signed section angles (rad) and depths, from and to.
+
+    Depth as a fraction of the wall: 0 inner, 1 outer face.
+    """
+
+    name: str
+    arcs: tuple[tuple[float, float], ...]
+    depth: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class PlyLine:
+    """A line of cords: from, to in rad, at a depth as a fraction of the wall (0 inner, 1 outer)."""
+
+    name: str
+    arc: tuple[float, float]
+    depth: float
+
+
+def product(
+    *,
+    order: int,
+    wall: np.ndarray,
+    arc: np.ndarray,
+    place: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    patches: Sequence[RegionPatch] = (),
+    plies: Sequence[PlyLine] = (),
+    main: str = "wall",
+) -> SectionMesh:
+    """The section with ascending corners at depths `wall` (0 to 1) and angles `arc` (rad).
+
+    `place(depth, angle)` gives (r, y) m. The inner face is at depth 0, the outer one, all of it
+    tread, at 1; the rim is at both ends. Edges of patches and plies must be among the corners.
+    """
+    layers, along = len(wall) - 1, len(arc) - 1
+
+    def position(cells: np.ndarray, xi: np.ndarray, eta: np.ndarray) -> np.ndarray:
+        k, j = np.divmod(cells, along)
+        return place(_between(wall, k, xi), _between(arc, j, eta))
+
+    cells = _cells(layers, along, order)
+    k, j = (part.ravel() for part in np.meshgrid(range(layers), range(along), indexing="ij"))
+    depth, angle = (wall[k] + wall[k + 1]) / 2, (arc[j] + arc[j + 1]) / 2
+    across, length = np.arange(layers), np.arange(along)
+    return SectionMesh(
+        order=order,
+        nodes=_nodes(cells, order, position),
+        cells=cells,
+        region=_regions(depth, angle, patches),
+        regions=(main, *(patch.name for patch in patches)),
+        outer=_edges((layers - 1) * along + length, 1),
+        tread=_edges((layers - 1) * along + length, 1),
+        inner=_edges(length, 0),
+        rim=np.concatenate([_edges(across * along, 2), _edges((across + 1) * along - 1, 3)]),
+        plies={ply.name: _ply(ply, wall, arc) for ply in plies},
+        position=position,
+    )
+
+
+def _between(corners: np.ndarray, element: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Positions within elements of a line; an element's end is exactly the corner."""
+    inside = np.diff(corners)[element] * t + corners[element]
+    return np.where(t == 1.0, corners[element + 1], inside)
+
+
+def _cells(layers: int, along: int, order: int) -> np.ndarray:
+    k, j = np.divmod(np.arange(layers * along)[:, None], along)
+    step_k, step_j = np.divmod(np.arange((order + 1) ** 2), order + 1)
+    return (order * k + step_k) * (order * along + 1) + order * j + step_j
+
+
+def _nodes(
+    cells: np.ndarray,
+    order: int,
+    position: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray],
+) -> np.ndarray:
+    _, first = np.unique(cells, return_index=True)
+    owner, local = np.divmod(first, cells.shape[1])
+    xi, eta = (part[local] for part in grid_points(equispaced(order)))
+    return position(owner, xi, eta)
+
+
+def _regions(depth: np.ndarray, angle: np.ndarray, patches: Sequence[RegionPatch]) -> np.ndarray:
+    """Number of the last patch that contains each cell, from 1; 0: none."""
+    owner = np.zeros(len(depth), int)
+    for number, patch in enumerate(patches):
+        along = [(angle > low) & (angle < high) for low, high in patch.arcs]
+        inside = np.any(along, axis=0) & (depth > patch.depth[0]) & (depth < patch.depth[1])
+        if not inside.any():
+            raise InputError(
+                f"{patch.name}: no part of the wall lies in its arc and depth; the wall ends at the beads"
+            )
+        owner[inside] = number + 1
+    return owner
+
+
+def _edges(cells: np.ndarray, side: int) -> np.ndarray:
+    return np.stack([cells, np.full(len(cells), side)], axis=1)
+
+
+def _ply(ply: PlyLine, wall: np.ndarray, arc: np.ndarray) -> np.ndarray:
+    """Sides xi = 0 of the cells outside the ply, or xi = 1 below the outer face."""
+    level = int(np.abs(wall - ply.depth).argmin())
+    first, last = (int(np.abs(arc - end).argmin()) for end in ply.arc)
+    along, top = len(arc) - 1, level == len(wall) - 1
+    row = level - 1 if top else level
+    return _edges(row * along + np.arange(first, last), 1 if top else 0)
+
+
+def corners(
+    count: int,
+    density: Callable[[np.ndarray], np.ndarray],
+    low: float,
+    high: float,
+    between: Sequence[float] = (),
+) -> np.ndarray:
+    """Ascending corners from low to high, one at each of `between`, for at least `count` elements.
+
+    `density(x)`: relative number of elements per length. Each part gets its share of the count, at
+    least one, and its corners divide the density evenly. Symmetry about the middle is preserved
+    exactly.
+    """
+    fixed = np.unique(np.concatenate([[low, high], between]))
+    small = 1e-9 * (high - low)
+    fixed = fixed[(fixed >= low) & (fixed <= high)]
+    fixed = fixed[np.append(True, np.diff(fixed) > small)]
+    fixed[-1] = high
+    parts = [_cumulative(density, a, b) for a, b in zip(fixed[:-1], fixed[1:], strict=True)]
+    weight = np.array([total[-1] for _, total in parts])
+    numbers = _shared_out(count, weight)
+    lines = [
+        np.interp(np.linspace(0, total[-1], n + 1)[:-1], total, x)
+        for n, (x, total) in zip(numbers, parts, strict=True)
+    ]
+    found = np.append(np.concatenate(lines), high)
+    starts = np.concatenate([[0], np.cumsum(numbers)])
+    if np.allclose(fixed + fixed[::-1], low + high, rtol=0, atol=small) and _even(numbers):
+        found = ((low + high) + (found - found[::-1])) / 2
+    found[starts] = fixed
+    return found
+
+
+_SAMPLES = 2001
+
+
+def _cumulative(
+    density: Callable[[np.ndarray], np.ndarray], a: float, b: float
+) -> tuple[np.ndarray, np.ndarray]:
+    x = np.linspace(a, b, _SAMPLES)
+    middle = density((x[1:] + x[:-1]) / 2) * (b - a) / (_SAMPLES - 1)
+    return x, np.concatenate([[0.0], np.cumsum(middle)])
+
+
+def _even(numbers: np.ndarray) -> bool:
+    return bool((numbers == numbers[::-1]).all())
+
+
+def _shared_out(count: int, weight: np.ndarray) -> np.ndarray:
+    """Elements of each part: near its share, at least one, `count` in all, mirrored parts alike."""
+    share = count * weight / weight.sum()
+    numbers = np.maximum(1, np.floor(share + 0.5 - 1e-9 * len(weight))).astype(int)
+    while numbers.sum() < count:
+        coarse = share / numbers
+        numbers[coarse > (1 - 1e-9) * coarse.max()] += 1
+    return numbers
+
+
+SIZE = Limits(least=0.05, most=1.0)  # of elements at the footprint, relative to that elsewhere
+# (from, to) rad: the footprint's element size holds up to the first, the full size from the second.
+# A deflection of 20 mm reaches 0.35 rad along a ring of 0.32 m and 0.6 rad along a section of 0.1
+# m.
+RING_NEAR = (0.15, 1.2)
+ARC_NEAR = (0.2, 1.2)
+
+
+def near_road(distance: np.ndarray, footprint_size: float, near: tuple[float, float]) -> np.ndarray:
+    """Relative element size at a distance (rad) from the lowest point, linear within `near`."""
+    part = np.clip((distance - near[0]) / (near[1] - near[0]), 0.0, 1.0)
+    return footprint_size + (1 - footprint_size) * part
+
+
+def ring_corners(segments: int, footprint_size: float) -> np.ndarray:
+    """Angles of the element corners, rad, from the lowest point (0) towards +x to 2 pi."""
+
+    def density(angle: np.ndarray) -> np.ndarray:
+        return 1 / near_road(np.pi - np.abs(angle - np.pi), footprint_size, RING_NEAR)
+
+    return corners(segments, density, 0.0, 2 * np.pi)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ring:
+    """The section revolved about the axle (y), `segments` elements of its order around.
+
+    `ring_corners` (segments + 1,) rad: angles of the element corners, ascending from 0, the lowest
+    point, towards +x to 2 pi, or less for a sector. `arc_corners` (k + 1,) rad: ascending section
+    angles of the ends of the k outer-face edges, 0 at the crown, positive for y > 0. `thickness` m
+    of a typical wall and `height` m of the section: scales of motions. `coarser`: the same tire
+    with elements of about twice the size, None if there is none.
+    """
+
+    section: SectionMesh
+    ring_corners: np.ndarray
+    arc_corners: np.ndarray
+    thickness: float
+    height: float
+    coarser: Callable[[], Ring | None] = lambda: None
+
+    @property
+    def segments(self) -> int:
+        """Number of elements around."""
+        return len(self.ring_corners) - 1
+
+    @property
+    def order(self) -> int:
+        """Element order."""
+        return self.section.order
+
+    @property
+    def closed(self) -> bool:
+        """Whether the ring is complete and not a sector."""
+        return bool(self.ring_corners[-1] - self.ring_corners[0] > 2 * np.pi * (1 - 1e-9))
+
+    @property
+    def elements(self) -> int:
+        """Number of hexahedra."""
+        return self.segments * len(self.section.cells)
+
+    @cached_property
+    def faces(self) -> int:
+        """Number of element faces on the outer face."""
+        return self.segments * len(self.section.outer)
+
+    def outer_line(self, element: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """(r, y) (k, 2) m on outer edges (k,) of the chain at t (k,), 0 to 1 from bead to bead."""
+        cell, side = self.section.outer[element].T
+        t = np.where(self._turned[element], 1 - t, t)
+        fixed = np.where(side % 2 == 1, 1.0, 0.0)
+        xi, eta = np.where(side < 2, fixed, t), np.where(side < 2, t, fixed)
+        return self.section.at(cell, xi, eta)
+
+    @cached_property
+    def _turned(self) -> np.ndarray:
+        """Whether each edge of the outer chain runs against its cell's coordinate."""
+        start = self.section.chain(self.section.outer)[:: self.order][:-1]
+        return self.section.side(self.section.outer)[:, 0] != start
+
+
+def revolved(
+    section: SectionMesh,
+    segments: int,
+    footprint_size: float,
+    coarser: Callable[[], Ring | None],
+) -> Ring:
+    """Any section revolved into `segments` elements, with the scales derived from its mesh."""
+    return Ring(
+        section=section,
+        ring_corners=ring_corners(segments, footprint_size),
+        arc_corners=section_angles(section),
+        thickness=wall_thickness(section),
+        height=float(np.ptp(section.nodes[:, 0])),
+        coarser=coarser,
+    )
+
+
+def section_angles(section: SectionMesh) -> np.ndarray:
+    """Section angles (rad) of the outer face's corners, ascending, 0 at the crown.
+
+    Angles about the point of the centre plane halfway between the crown and the beads. If they do
+    not increase monotonically, the same range is distributed by length along the face.
+    """
+    line = section.nodes[section.chain(section.outer)]
+    corners = line[:: section.order]
+    centre = (line[:, 0].max() + line[[0, -1], 0].mean()) / 2
+    angle = np.unwrap(np.arctan2(line[:, 1], line[:, 0] - centre))
+    if (np.diff(angle) > 0).all():
+        return angle[:: section.order]
+    length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1)))
+    crown = np.interp(0.0, corners[:, 1], length) if (np.diff(corners[:, 1]) > 0).all() else None
+    middle = length[-1] / 2 if crown is None else crown
+    return (length - middle) / length[-1] * (angle[-1] - angle[0])
+
+
+def wall_thickness(section: SectionMesh) -> float:
+    """Area over mean length of inner and outer face, m."""
+    corners = section.nodes[section.cells[:, [0, section.order, -1, -1 - section.order]]]
+    x, y = corners[..., 0], corners[..., 1]
+    area = 0.5 * abs((x * np.roll(y, -1, 1) - y * np.roll(x, -1, 1)).sum(axis=1)).sum()
+    lengths = [
+        np.linalg.norm(np.diff(section.nodes[section.side(face)], axis=1), axis=2).sum()
+        for face in (section.inner, section.outer)
+    ]
+    return float(2 * area / sum(lengths))

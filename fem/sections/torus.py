@@ -10,10 +10,19 @@ import numpy as np
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Limits, ParameterError, finite, whole
-from tireroad.fem.sections import grid
-from tireroad.fem.sections.grid import PlyLine, RegionPatch, corners, product
-from tireroad.fem.sections.mesh2d import SectionMesh
-from tireroad.fem.sections.ring import ARC_NEAR, SIZE, Ring, near_road, ring_corners
+from tireroad.fem.sections import mesh2d
+from tireroad.fem.sections.mesh2d import (
+    ARC_NEAR,
+    SIZE,
+    PlyLine,
+    RegionPatch,
+    Ring,
+    SectionMesh,
+    corners,
+    near_road,
+    product,
+    ring_corners,
+)
 
 LEAST = (6, 2)  # elements around and along: minimum for a tire
 # What a section can be made of; those of a scene's tire are narrower.
@@ -102,8 +111,8 @@ class Torus:
             return near
         edge = self.half_angle - np.abs(arc)
         length = 2 * self.half_angle
-        floor = grid.LEAST * self.thickness / self.minor_radius / self.elements_arc
-        return near * grid.size(edge, length, self.elements_arc, floor)
+        floor = mesh2d.LEAST * self.thickness / self.minor_radius / self.elements_arc
+        return near * mesh2d.size(edge, length, self.elements_arc, floor)
 
     def section(
         self, patches: Sequence[RegionPatch] = (), plies: Sequence[PlyLine] = ()

@@ -4,12 +4,20 @@ F_int(u) + p F_pressure(u) + Omega^2 S (X + u) + gamma1 Omega B u + gamma2 Omega
 with f >= 0 and z + u_z >= z_road at the tread dofs, one of the two an equality. On roads other than
 a level plane they move in road coordinates (fem.static.road). Friction: fem.static.friction_road.
 
-Record of the solutions on a load path, so that an interrupted path is retraced without solving.
+An interrupted load path is retraced without solving (`History`): it is a function of the outcomes
+and states of its solutions. From its start, each recorded solution is put in place. The solution
+after the last recorded one may use its tangent, which is not stored; the last solution of each
+problem is therefore solved again, from where it began.
 
-The path is a function of the outcomes and states of its solutions. It is retraced from its start,
-and each recorded solution is put in place. The solution after the last recorded one may use its
-tangent, which is not stored; the last solution of each problem is therefore solved again, from
-where it began.
+Stiffness-proportional damping in the steady shape is f = gamma2 Omega K(u) r, r = M^-1 B u: r is
+the body rate of the displacement per unit speed, projected on the finite-element space: its
+gradient exists, unlike that of grad(u) w across elements. For small motions f becomes the term
+gamma2 Omega K M^-1 B of the rotating pencil.
+
+That product couples each node with the neighbours of its neighbours: with it in the tangent a
+factorisation takes three to six times as long. Newton's method without it leaves K^-1 (gamma2 Omega
+K M^-1 B) = gamma2 Omega M^-1 B of an error in each step, so it converges if the spectral radius of
+this is well below 1, to the same state, as the force is complete.
 """
 
 from __future__ import annotations
@@ -17,20 +25,20 @@ from __future__ import annotations
 import hashlib
 import math
 import weakref
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
+import ufl
+import ufl.algorithms
 from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
+from ufl.core.expr import Expr
 
 from tireroad.fem import compat
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.static.checkpoint import Entry, Journal
 from tireroad.fem.static.road import FLAT, RoadContact, RoadCoordinates, RoadShape
-from tireroad.fem.static.shape_damping import ShapeDamping
 from tireroad.fem.static.tangent import (
     ConstrainedSystem,
     LinearContact,
@@ -41,6 +49,8 @@ from tireroad.fem.static.tangent import (
 from tireroad.fem.static.virtual_work import (
     AT_REST,
     Rolling,
+    body_rate_form,
+    elastic_work,
     inverted_volume,
     static_residual,
     stress_prediction,
@@ -48,6 +58,99 @@ from tireroad.fem.static.virtual_work import (
 )
 from tireroad.fem.timing import Timing
 from tireroad.fem.tire.body import Body
+
+_WEAK = 0.5  # spectral radius up to which the tangent does without the product
+_MARGIN = 1.3  # over it: held nodes and the deformed tire's other tangent
+_ROUNDS = 20  # of the power method: within 2 % of the spectral radius
+
+
+class ShapeDamping:
+    """The force as the UFL form `work`, and the part of its derivative that UFL does not see.
+
+    `lag`: most of an error that a Newton step leaves because its tangent lacks that part; 0 if it
+    has it. Call `update` before assembling `work`. All methods are collective.
+    """
+
+    def __init__(self, body: Body, pressure: Expr, rolling: Rolling) -> None:
+        self._body = body
+        self._rate = fem.Function(body.space)
+        self._factor = float(rolling.speed * rolling.stiffness_damping)
+        elastic = elastic_work(body, pressure)
+        factor = fem.Constant(body.mesh, self._factor)
+        # Expanded at once: UFL numbers the arguments of nested derivatives wrongly.
+        along = ufl.derivative(elastic, body.u, self._rate)
+        self.work = factor * ufl.algorithms.expand_derivatives(along)
+        self._clamp = [body.clamp()]
+        self._rate_matrix, fastest = _rates(body, self._clamp)
+        self._in, self._out = self._rate_matrix.createVecs()
+        radius = abs(self._factor) * fastest
+        self.lag = _MARGIN * radius if radius < _WEAK else 0.0
+        self._stiffness_form = compat.form(ufl.derivative(elastic, body.u, body.trial))
+        self._stiffness: PETSc.Mat | None = None
+        self._assembled = False
+        self._product: PETSc.Mat | None = None
+
+    def update(self) -> None:
+        """Set the rate of the body's present displacement."""
+        self._in.array[:] = self._body.owned(self._body.u.x.array).ravel()
+        self._rate_matrix.mult(self._in, self._out)
+        self._body.owned(self._rate.x.array)[:] = self._out.array_r.reshape(-1, 3)
+        self._rate.x.scatter_forward()
+
+    def completed(self, tangent: PETSc.Mat) -> PETSc.Mat:
+        """tangent + gamma2 Omega K M^-1 B, always in the same matrix; the tangent if it lags."""
+        self._assembled = False
+        if self.lag:
+            return tangent
+        stiffness = self._tangent_stiffness()
+        self._product = stiffness.matMult(self._rate_matrix, result=self._product)
+        self._product.scale(self._factor)
+        self._product.axpy(1.0, tangent, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        return self._product
+
+    def lacking(self, change: np.ndarray) -> np.ndarray:
+        """Forces gamma2 Omega K M^-1 B change (N) at the owned unknowns that the last tangent lacks;
+        `change` in m."""
+        self._in.array[:] = change
+        self._rate_matrix.mult(self._in, self._out)
+        self._tangent_stiffness().mult(self._out, self._in)
+        return self._factor * self._in.array_r
+
+    def _tangent_stiffness(self) -> PETSc.Mat:
+        """K at the displacement of the last tangent, of which it is a part."""
+        if self._stiffness is None:
+            self._stiffness = fem.petsc.create_matrix(self._stiffness_form)
+        if not self._assembled:
+            self._stiffness.zeroEntries()
+            fem.petsc.assemble_matrix(self._stiffness, self._stiffness_form, bcs=self._clamp)
+            self._stiffness.assemble()
+            self._assembled = True
+        return self._stiffness
+
+
+def _rates(body: Body, clamp: list[fem.DirichletBC]) -> tuple[PETSc.Mat, float]:
+    """M^-1 B with the lumped mass, and its spectral radius: strains per radian at most. Collective.
+
+    The rim rotates rigidly with the wheel: it has no body rate and contributes to none.
+    """
+    rates = fem.petsc.assemble_matrix(compat.form(body_rate_form(body)), clamp, 0.0)
+    rates.assemble()
+    root, x = rates.createVecs()
+    root.array[:] = np.sqrt(body.nodal_mass())
+    inverse = root.copy()
+    inverse.reciprocal()
+    rates.diagonalScale(inverse, inverse)  # skew, so powers of it grow by its spectral radius
+    start = np.random.default_rng(0).normal(size=(body.lattice.size, 3))
+    fastest, before = 0.0, root.duplicate()
+    x.array[:] = start[body.ids].ravel()
+    for _ in range(_ROUNDS):
+        x.normalize()
+        x.swap(before)
+        rates.mult(before, x)
+        fastest = x.norm()
+    rates.diagonalScale(inverse, root)
+    return rates, fastest
+
 
 _ROAD = "active", "force", "height"
 
@@ -59,42 +162,47 @@ class SolutionHistory:
         self._journal = journal
         self._problems: list[weakref.ref[Equilibrium]] = []  # a past one may be freed
         self._predicted: list[bool] = []
+        self._open: dict[str, np.ndarray] | None = None  # of the solution being computed
         found = journal.found if journal else []
         last = {int(entry["problem"]): k for k, entry in enumerate(found)}
         self._again = set(last.values())
 
-    def solve(self, problem: Equilibrium, solve: Callable[[], SolveOutcome]) -> SolveOutcome:
-        """Result of `solve()`, with body and road left as it leaves them. Collective."""
+    def retrace(self, problem: Equilibrium) -> SolveOutcome | None:
+        """Outcome of the problem's next solution, with body and road as it left them. Collective.
+
+        None if it has to be solved, from the present state, and passed to `add`.
+        """
         if self._journal is None:
-            return solve()
+            return None
         number, comm = self._number(problem), problem.body.comm
         place = self._journal.done
         entry = self._journal.next(comm, lambda one: _same_mesh(problem, one))
-        predicted, self._predicted = self._predicted, []
+        predicted, self._predicted = np.array(self._predicted, dtype=bool), []
         if entry is None:
-            began = _state(problem, "begin")
-            step = solve()
-            found = began | _state(problem, "end") | _step(step)
-            found |= {"problem": np.array(number), "mesh": _mesh(problem)}
-            self._journal.add(found | {"predicted": np.array(predicted, dtype=bool)})
-            return step
-        if place in self._again:
-            _put(problem, entry, "begin")
-            return solve()
-        _put(problem, entry, "end")
-        return problem.solved(_read(entry))
+            about = {"problem": np.array(number), "mesh": _mesh(problem), "predicted": predicted}
+            self._open = _state(problem, "begin") | about
+            return None
+        again = place in self._again
+        _put(problem, entry, "begin" if again else "end")
+        return None if again else _read(entry)
 
-    def predict(self, predict: Callable[[], bool]) -> bool:
-        """Result of `predict()`, or the recorded one if the next solution is known. Collective."""
-        if self._journal is None:
-            return predict()
-        if self._journal.done < len(self._journal.found):
-            known = self._journal.found[self._journal.done]["predicted"]
-            answer = bool(known[len(self._predicted)])
-        else:
-            answer = predict()
-        self._predicted.append(answer)
-        return answer
+    def add(self, problem: Equilibrium, step: SolveOutcome) -> None:
+        """Record the solution of a problem that `retrace` did not know. Collective."""
+        if self._journal is not None and self._open is not None:
+            self._journal.add(self._open | _state(problem, "end") | _step(step))
+        self._open = None
+
+    def predicted(self) -> bool | None:
+        """Whether the estimate before the next solution succeeded; None if it is to be made."""
+        if self._journal is None or self._journal.done == len(self._journal.found):
+            return None
+        known = self._journal.found[self._journal.done]["predicted"]
+        return bool(known[len(self._predicted)])
+
+    def add_prediction(self, success: bool) -> None:
+        """Record whether an estimate before the next solution succeeded."""
+        if self._journal is not None:
+            self._predicted.append(success)
 
     def _number(self, problem: Equilibrium) -> int:
         for k, one in enumerate(self._problems):
@@ -305,7 +413,12 @@ class Equilibrium(Forces):
         self, road_height: float | None = None, load: float | None = None, allowed: float = 0.0
     ) -> SolveOutcome:
         """`_solve`, or its result from the `history` of an interrupted computation. Collective."""
-        return self.history.solve(self, partial(self._solve, road_height, load, allowed))
+        step = self.history.retrace(self)
+        if step is not None:
+            return self.solved(step)
+        step = self._solve(road_height, load, allowed)
+        self.history.add(self, step)
+        return step
 
     def _solve(self, road_height: float | None, load: float | None, allowed: float) -> SolveOutcome:
         """Equilibrium with the road at the given height (m), or without a road (None). Collective.
@@ -351,7 +464,11 @@ class Equilibrium(Forces):
 
     def predict(self, road_height: float) -> bool:
         """`_predict`, or its outcome in the `history` if the next solution is known. Collective."""
-        return self.history.predict(lambda: self._predict(road_height))
+        success = self.history.predicted()
+        if success is None:
+            success = self._predict(road_height)
+        self.history.add_prediction(success)
+        return success
 
     def _predict(self, road_height: float) -> bool:
         """Move from the last solution to the estimate for `road_height` (m) by the last tangent and

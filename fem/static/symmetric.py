@@ -33,7 +33,7 @@ from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 from scipy.spatial import cKDTree
 
-from tireroad.fem.sections.ring import Ring
+from tireroad.fem.sections.mesh2d import Ring
 from tireroad.fem.static.equilibrium import Equilibrium, SolveOutcome
 from tireroad.fem.static.tangent import ConstrainedSystem, PrescribedMotion
 from tireroad.fem.static.virtual_work import Rolling

@@ -13,7 +13,7 @@ from ufl.core.expr import Expr
 
 from tireroad.fem import compat
 from tireroad.fem.collective import collect, watch
-from tireroad.fem.sections.ring import Ring
+from tireroad.fem.sections.mesh2d import Ring
 from tireroad.fem.sections.torus import Torus
 from tireroad.fem.tire.cords import Cords
 from tireroad.fem.tire.material import Material

@@ -16,8 +16,7 @@ from ufl.core.expr import Expr
 from tireroad.fem import compat
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections import mesh2d
-from tireroad.fem.sections.grid import RegionPatch
-from tireroad.fem.sections.ring import Ring
+from tireroad.fem.sections.mesh2d import RegionPatch, Ring
 from tireroad.fem.sections.torus import Torus
 from tireroad.fem.tire.material import MATERIALS, Kind, Material, MaterialLaw, kinds
 

@@ -8,6 +8,20 @@ the half turn about the vertical.
 The parts are Q^T A Q. What couples them is rounding of A, whose entries are symmetric to about
 1e-13 of the largest. It changes an eigenvalue by at most |R A R - A| / 2. The residual on A itself,
 a bound on twice the relative error of a frequency, is measured.
+
+A ring of equal segments is split by wave number. With tangential, axial and radial components at
+each node, the matrix of an axisymmetric state repeats from segment to segment: blocks A_j couple a
+segment with the j-th after it. The fields
+
+    u_s = Re[e^{i n s alpha} v],  alpha = 2 pi / N,
+    H_n v = lambda v,   H_n = sum_j e^{i n j alpha} A_j
+
+are decoupled for n = 0 ... N / 2; all but the first and, for even N, the last come in pairs
+(Thomas, Int. J. Numer. Meth. Eng. 14 (1979) 81). A symmetry that reverses the sense around the
+ring, a mirror or, with belts at an angle, the half turn, maps v to P conj(v), with P a signed
+permutation once each node's phase e^{i n delta} is taken out. On the fields that it keeps, H_n is
+real and symmetric. Without one, H_n = A + i B is solved as [[A, -B], [B, A]], which has each
+eigenvalue twice.
 """
 
 from __future__ import annotations
@@ -21,8 +35,8 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from tireroad.fem.collective import allgather_rows
-from tireroad.modal.solver.fields import largest_entry, multiply, rows_of
-from tireroad.modal.solver.slicing import ProcessGroup
+from tireroad.modal.solver.fields import congruent, largest_entry, less, multiply, row_sum, rows_of
+from tireroad.modal.solver.slicing import ALONE, ProcessGroup
 
 # Largest entry of R A R - A relative to that of A. A symmetric state converges to about 1e-13; a
 # road load, a slope of the footprint or a different mesh on one side gives 1e-6 and more.
@@ -225,3 +239,214 @@ def _halves(basis: sparse.csr_matrix, image: sparse.csr_matrix) -> list[sparse.c
         values = np.concatenate([root, np.ones(len(fixed)), parity * sign[pairs] * root])
         halves.append((basis @ sparse.csr_matrix((values, (rows, columns)), (size, count))).tocsr())
     return [half for half in halves if half.shape[1]]
+
+
+_LONGEST = 4  # most nodes of a segment along the ring
+
+
+@dataclass(frozen=True)
+class RepeatingMatrix:
+    """A matrix that repeats from segment to segment.
+
+    `turn` (n, n) maps the components of all segments, in sequence, to the unknowns; `blocks`
+    j -> A_j (d, d) sparse; `angle` (d,) within the segment, rad; `kept` (d, d) complex unitary: the
+    columns that a symmetry keeps, None without one; `defect`: the norm of the change of the matrix
+    in a rotation by one segment, in the units of its eigenvalues.
+    """
+
+    segments: int
+    turn: sparse.csr_matrix
+    blocks: dict[int, sparse.csr_matrix]
+    angle: np.ndarray
+    kept: sparse.csr_matrix | None
+    defect: float
+
+    @property
+    def waves(self) -> range:
+        """Wave numbers n."""
+        return range(self.segments // 2 + 1)
+
+    def single(self, n: int) -> bool:
+        """Whether the modes of a wave number are single, not in pairs."""
+        return n == 0 or 2 * n == self.segments
+
+    def wave(self, n: int, team: ProcessGroup = ALONE) -> Wave:
+        """The problem of one wave number, own rows of it in the team."""
+        matrix, basis, copies = self._problem(n)
+        return Wave(self, n, matrix[team.own(matrix.shape[0])], basis, copies)
+
+    def _problem(self, n: int) -> tuple[sparse.csr_matrix, sparse.csr_matrix, int]:
+        """Its whole matrix, its basis, and the number of copies of each of its eigenvalues."""
+        size = len(self.angle)
+        H = self._hermitian(n)
+        if self.single(n):
+            return H.real.tocsr(), sparse.identity(size, format="csr"), 1
+        if self.kept is None:
+            doubled = sparse.bmat([[H.real, -H.imag], [H.imag, H.real]], format="csr")
+            unit = sparse.identity(size, format="csr")
+            return doubled, sparse.hstack([unit, 1j * unit], format="csr"), 1
+        basis = self._basis(n)
+        return (basis.getH() @ H @ basis).real.tocsr(), basis, 2
+
+    def _hermitian(self, n: int) -> sparse.csr_matrix:
+        phase = 2j * np.pi * n / self.segments
+        return sum(np.exp(phase * j) * block for j, block in self.blocks.items()).tocsr()
+
+    def _basis(self, n: int) -> sparse.csr_matrix:
+        return sparse.diags(np.exp(1j * n * self.angle)) @ self.kept
+
+    def is_kept(self) -> bool:
+        """Whether H_n is real on the kept fields, at a wave number that would show it."""
+        n = max(1, self.segments // 3)
+        basis = self._basis(n)
+        H = (basis.getH() @ self._hermitian(n) @ basis).tocsr()
+        return abs(H.imag).max() <= TOLERANCE * abs(H).max()
+
+
+@dataclass(frozen=True)
+class Wave:
+    """The fields of one wave number.
+
+    Own rows of a `matrix` (d, d), real symmetric; `basis` (., d) maps its vectors to v.
+    """
+
+    ring: RepeatingMatrix
+    number: int
+    matrix: sparse.csr_matrix
+    basis: sparse.csr_matrix
+    copies: int
+
+    def fields(self, vectors: np.ndarray) -> np.ndarray:
+        """Fields (n, k copies) on the ring; of a pair, first the one that the symmetry keeps.
+
+        The pair is a cosine about the lowest point, then a sine.
+        """
+        N, v = self.ring.segments, self.basis @ vectors
+        if self.copies == 2:
+            v = np.stack([v, -1j * v], axis=-1).reshape(len(v), -1)
+        phase = np.exp(2j * np.pi * self.number / N * np.arange(N))
+        fields = (phase[:, None, None] * v).real.reshape(-1, v.shape[1])
+        scale = np.sqrt((1 if self.ring.single(self.number) else 2) / N)
+        return self.ring.turn @ (scale * fields)
+
+
+def repeated(matrix: PETSc.Mat, sites: DofPositions) -> RepeatingMatrix | None:
+    """The matrix (n, n) as a ring of as many equal segments as possible; None if it is not one.
+
+    `sites` of all unknowns on every process. Collective.
+    """
+    if len(sites.component) % 3 or (sites.component.reshape(-1, 3) != np.arange(3)).any():
+        return None
+    points = sites.place[::3]
+    angle = np.arctan2(points[:, 0], -points[:, 2]) % (2 * np.pi)
+    near = _NEAR * np.abs(points).max(initial=0.0)
+    circles = np.hypot(points[:, 0], points[:, 2])
+    if not len(points) or circles.min() < near:
+        return None
+    places = len(np.unique(np.rint(angle / _NEAR).astype(int) % round(2 * np.pi / _NEAR)))
+    for nodes in range(1, _LONGEST + 1):
+        if places % nodes or places // nodes < 3:
+            continue
+        found = _segments(points, angle, places // nodes, near)
+        if found is None:
+            continue
+        ring = _verified(matrix, points, angle, found)
+        if ring is not None:
+            return ring
+    return None
+
+
+def _segments(points: np.ndarray, angle: np.ndarray, count: int, near: float) -> np.ndarray | None:
+    """Nodes (segments, nodes of each) in one order; None if the segments are not equal."""
+    alpha = 2 * np.pi / count
+    segment = np.floor((angle + _NEAR) / alpha).astype(int) % count
+    reach, rest = np.hypot(points[:, 0], points[:, 2]), angle - segment * alpha
+    back = np.stack([reach * np.sin(rest), points[:, 1], reach * np.cos(rest)], axis=1)
+    first = np.flatnonzero(segment == 0)
+    if len(first) * count != len(points):
+        return None
+    distance, image = cKDTree(back[first]).query(back)
+    order = segment * len(first) + image
+    if distance.max() > near or len(np.unique(order)) != len(order):
+        return None
+    return np.argsort(order).reshape(count, -1)
+
+
+def _verified(
+    matrix: PETSc.Mat, points: np.ndarray, angle: np.ndarray, nodes: np.ndarray
+) -> RepeatingMatrix | None:
+    """The ring; None if rotation by one segment changes the matrix. Collective."""
+    count, each = nodes.shape[0], 3 * nodes.shape[1]
+    turn = _turned(angle, nodes.ravel())
+    size = turn.shape[0]
+    allowed = TOLERANCE * largest_entry(matrix)
+    along = np.roll(np.arange(size), each)
+    two = np.unique(turn[:, : 2 * each].tocoo().row)
+    first = (turn[two][:, : 2 * each].T @ rows_of(matrix, two) @ turn).tocsr()
+    if abs(first[each:] - first[:each][:, along]).max() > allowed:
+        # A load shows on the second segment already: saves the product with all of them.
+        return None
+    local = congruent(matrix, turn)
+    by_one = congruent(local, sparse.identity(size, format="csr")[:, along])
+    difference = less(by_one, local)
+    far, defect = largest_entry(difference), row_sum(difference)
+    top = rows_of(local, np.arange(each)).tocoo()
+    for one in (local, by_one, difference):
+        one.destroy()
+    if far > allowed:
+        return None
+    blocks = {}
+    for j in np.unique(top.col // each):
+        inside = top.col // each == j
+        entries = top.data[inside], (top.row[inside], top.col[inside] - j * each)
+        blocks[int(j)] = sparse.csr_matrix(entries, (each, each))
+    own = nodes[0]
+    within = np.where(angle[own] > np.pi, angle[own] - 2 * np.pi, angle[own])
+    for along_axle in (1.0, -1.0):
+        kept = _kept(points[own], within, 2 * np.pi / count, along_axle)
+        if kept is not None:
+            ring = RepeatingMatrix(count, turn, blocks, np.repeat(within, 3), kept, defect)
+            if ring.is_kept():
+                return ring
+    return RepeatingMatrix(count, turn, blocks, np.repeat(within, 3), None, defect)
+
+
+def _turned(angle: np.ndarray, order: np.ndarray) -> sparse.csr_matrix:
+    """Tangential, axial and radial components of the nodes, in their order, to x, y, z."""
+    size = 3 * len(order)
+    sine, cosine = np.sin(angle[order]), np.cos(angle[order])
+    one, none = np.ones(len(order)), np.zeros(len(order))
+    axes = np.array([[cosine, none, sine], [none, one, none], [sine, none, -cosine]])
+    rows = np.broadcast_to((3 * order + np.arange(3)[:, None])[:, None], axes.shape)
+    columns = np.broadcast_to((3 * np.arange(len(order)) + np.arange(3)[:, None])[None], axes.shape)
+    turn = sparse.csr_matrix((axes.ravel(), (rows.ravel(), columns.ravel())), (size, size))
+    turn.eliminate_zeros()
+    return turn
+
+
+def _kept(
+    points: np.ndarray, within: np.ndarray, alpha: float, along_axle: float
+) -> sparse.csr_matrix | None:
+    """Columns (d, d) that v -> P conj(v) keeps, for (x, y) -> (-x, `along_axle` y)."""
+    near = _NEAR * np.abs(points).max(initial=0.0)
+    reach = np.hypot(points[:, 0], points[:, 2])
+    here, there = ((angle + _NEAR) % alpha for angle in (within, -within))
+    place = np.stack([reach, points[:, 1], reach * here], axis=1)
+    image = np.stack([reach, along_axle * points[:, 1], reach * there], axis=1)
+    distance, partner = cKDTree(place).query(image)
+    if distance.max(initial=0.0) > near or len(np.unique(partner)) != len(partner):
+        return None
+    sign = np.tile([-1.0, along_axle, 1.0], len(points))
+    to = (3 * partner[:, None] + np.arange(3)).ravel()
+    own = np.arange(len(to))
+    fixed, first = own[own == to], own[own < to]
+    root = np.sqrt(0.5)
+    one, turned = np.full(len(first), root), sign[first] * root
+    # Columns: e_a (or i e_a) of a node that is its own image; (e_a + s e_b) and i (e_a - s e_b) of
+    # a pair.
+    values = [np.where(sign[fixed] > 0, 1.0, 1j), one, turned, 1j * one, -1j * turned]
+    rows = [fixed, first, to[first], first, to[first]]
+    pair = len(fixed) + np.arange(len(first))
+    columns = [np.arange(len(fixed)), pair, pair, pair + len(first), pair + len(first)]
+    entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
+    return sparse.csr_matrix(entries, (len(own), len(own)))

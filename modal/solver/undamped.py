@@ -19,7 +19,6 @@ from petsc4py import PETSc
 from tireroad.fem.collective import summed
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.static.checkpoint import Journal
-from tireroad.modal.solver.circulant import repeated
 from tireroad.modal.solver.fields import (
     CHUNK,
     collect,
@@ -39,7 +38,7 @@ from tireroad.modal.solver.slicing import (
     SymmetricPart,
     SymmetricProblem,
 )
-from tireroad.modal.solver.symmetry import DofPositions, sectors, symmetries, whole
+from tireroad.modal.solver.symmetry import DofPositions, repeated, sectors, symmetries, whole
 
 RESIDUAL_TOLERANCE = 1e-8  # relative, per eigenpair
 MOST = 1e-6  # where rounding alone exceeds the tolerance

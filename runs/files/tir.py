@@ -1,9 +1,10 @@
 """A tire's figures as a .tir file, the form of MF-Tyre/MF-Swift, from a result folder.
 
-What a run computed is written, and nothing else: a key that is absent was not computed. Modes and damping are those of
-the belt as a rigid ring on its rim without a road, by Fourier series around (fem.sections.inflated), with the laws'
-moduli at zero strain; the belt's mass and inertias are what moves with these modes. Meanings: Besselink, Schmeitz and Pacejka,
-"An improved Magic Formula/Swift tyre model", Vehicle System Dynamics 48 S1 (2010) 337-352.
+What a run computed is written, and nothing else: a key that is absent was not computed. Modes and
+damping are those of the belt as a rigid ring on its rim without a road, by Fourier series around
+(fem.sections.inflated), with the laws' moduli at zero strain; the belt's mass and inertias are what
+moves with these modes. Meanings: Besselink, Schmeitz and Pacejka, "An improved Magic Formula/Swift
+tyre model", Vehicle System Dynamics 48 S1 (2010) 337-352.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.sections.inflated import InflatedRing
 from tireroad.fem.sections.mesh2d import SectionMesh
 from tireroad.runs.files.store import opened
-from tireroad.runs.fit.figures import KINDS
+from tireroad.runs.fit import KINDS
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.version import PROGRAM, VERSION

@@ -4,7 +4,9 @@ import signal
 import sys
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from tireroad.fem import parallel
@@ -48,15 +50,25 @@ def on_root(comm: Any, function: Callable[[], T]) -> T:
 KEPT = "completed stages are kept; run the same command or `resume` to continue"
 
 
-def judged(function: Callable[[], None], kept: str = KEPT) -> tuple[int, str]:
-    """Run `function`; returns the resulting exit status and the message for the user.
+@dataclass
+class Ending:
+    """How a piece of work ended: its exit status, and the message for the user."""
+
+    status: int = DONE
+    message: str = ""
+
+
+@contextmanager
+def ending(kept: str = KEPT) -> Iterator[Ending]:
+    """Turn what the block raises into an exit status and a message.
 
     `kept`: what the user is told after a stop that does not say so itself. What fails because of a
     stop that came meanwhile is that stop.
     """
+    end = Ending()
     status, message = DONE, ""
     try:
-        function()
+        yield end
     except (ConvergenceError, Removed, Refused) as error:
         status, message = GAVE_UP, f"error: {error}"
     except InputError as error:
@@ -75,20 +87,23 @@ def judged(function: Callable[[], None], kept: str = KEPT) -> tuple[int, str]:
         clear = explained(error, getattr(error, "filename", None) or "the result folder")
         status, message = (GAVE_UP, f"error: {clear}") if clear else (BUG, traceback.format_exc())
     if status == BUG and raised():
-        return STOPPED, f"stopped by {raised()}: {kept}"
-    return status, message
+        status, message = STOPPED, f"stopped by {raised()}: {kept}"
+    end.status, end.message = status, message
 
 
-def guarded(comm: Any, function: Callable[[], None]) -> int:
-    """Run `function` on every process of `comm`; the exit status, the same on all of them.
+@contextmanager
+def common_ending(comm: Any) -> Iterator[Ending]:
+    """As `ending`, for a block that every process of `comm` runs: the same status on all of them.
 
     If all processes end, in whatever way, each distinct message is shown once and the worst status
-    is returned. If one fails and the others do not follow within three seconds, they are stuck in a
+    counts. If one fails and the others do not follow within three seconds, they are stuck in a
     collective call: the failing process prints its message and aborts them all. Collective: called
     at the same place on every process.
     """
     agreement = comm.Dup()
-    status, message = judged(function)
+    with ending() as end:
+        yield end
+    status, message = end.status, end.message
     for number in STOP_SIGNALS:
         signal.signal(number, signal.SIG_IGN)
     higher = range(comm.rank + 1, comm.size) if status else ()
@@ -114,7 +129,7 @@ def guarded(comm: Any, function: Callable[[], None]) -> int:
         for number in STOP_SIGNALS:
             signal.signal(number, signal.SIG_DFL)
     failed = [code for code, _ in endings if code != DONE]
-    return BUG if BUG in failed else max(failed, default=DONE)
+    end.status = BUG if BUG in failed else max(failed, default=DONE)
 
 
 def all_here(comm: Any, patience: float | None) -> bool:

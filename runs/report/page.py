@@ -23,15 +23,7 @@ from tireroad.runs.files.disk import is_as_signed, is_table_as_signed, write_tex
 from tireroad.runs.report import live
 from tireroad.runs.report.read import Absent, Results, Section, bounded, digits, quantity
 from tireroad.runs.report.realism import unusual
-from tireroad.runs.report.sections import (
-    forces,
-    rotating,
-    sound,
-    spectra,
-    stiffness,
-    tire,
-    vibration,
-)
+from tireroad.runs.report.sections import forces, modes, sound, spectra, tire
 from tireroad.runs.scene.plan import STAGES
 from tireroad.runs.scene.schema import every_field, key_of, table_of
 from tireroad.runs.scene.tables.scene import Scene
@@ -232,11 +224,11 @@ SECTIONS: Mapping[str, Callable[[Results], Section]] = {
     "contact.h5": forces.contact,
     "spectra.h5": spectra.spectra,
     "sound.h5": sound.sound,
-    "vibration.h5": vibration.vibration,
+    "vibration.h5": modes.vibration,
     "response.h5": forces.response,
-    "stiffness.h5": stiffness.section,
+    "stiffness.h5": tire.stiffness,
     "modes.h5": tire.modes,
-    "rotating.h5": rotating.rotating,
+    "rotating.h5": modes.rotating,
 }
 
 

@@ -7,7 +7,7 @@ from tireroad.runs.process.surroundings import crowded
 from tireroad.runs.scene.estimate import check_demand, duration, estimate, memory_of, out_of_core
 from tireroad.runs.scene.plan import STAGES, meets_road, skipped
 from tireroad.runs.scene.resolved import literal
-from tireroad.runs.scene.road_rules import check_road, remarks
+from tireroad.runs.scene.rules import check_road, remarks
 from tireroad.runs.scene.schema import applies, entries, key_of, table_of
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.search.settings import Ladders, applied, bounds

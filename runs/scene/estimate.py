@@ -35,7 +35,7 @@ DAMPING = "static damping by the stiffness"
 WIDE = 3.5
 """Time of a static state whose tangent holds this damping over that of one without, as measured with
 8,316, 13,860 and 23,760 unknowns (3.0, 4.1, 3.7)."""
-_WEAK = 0.5  # as in fem.static.shape_damping, which is not imported just to estimate
+_WEAK = 0.5  # as in fem.static.equilibrium, which is not imported just to estimate
 # Tangents with friction, as counted on the built-in tire with 25,056 and 40,176 unknowns: a rolling
 # tire takes 7 or 8 with its friction, 13 or 14 to find its free travel and 8 with its slip; a
 # standing one 6 or 7 a step, and 4 for its load.
@@ -64,7 +64,7 @@ def _rolls(scene: Scene) -> bool:
 
 
 def holds_damping(scene: Scene) -> bool:
-    """Whether the tangent holds the damping by the stiffness (fem.static.shape_damping).
+    """Whether the tangent holds the damping by the stiffness (fem.static.equilibrium).
 
     Strains per radian at most: 20 with 40 elements of order 1 around, 33 and 62 with 22 and 40 of
     order 2.
@@ -284,7 +284,7 @@ GB for a passenger tire of 102,060 unknowns on one process, 1.6 to 1.8 GB on eac
 BASES = 3
 """Copies of all modes held at peak: slices, the sorted vectors, their products."""
 ANSWERS = 6 * 64
-"""Columns held while solving for the flexibility of the patch (fem.matrices.direct.solve_parts):
+"""Columns held while solving for the flexibility of the patch (fem.matrices.compliance.solve_parts):
 loads, solutions, copies."""
 SHAPES = {"attachment": 3, "second-order": 5}
 """By residual: full-length columns per force on the patch held at peak; other residuals hold only

@@ -25,7 +25,9 @@ from tireroad.runs.scene import rules
 from tireroad.runs.scene.plan import meets_road, skipped
 from tireroad.runs.scene.resolved import literal
 from tireroad.runs.scene.schema import (
+    Path_,
     Pitch,
+    Source,
     Table,
     applies,
     every_field,
@@ -34,10 +36,11 @@ from tireroad.runs.scene.schema import (
     key_of,
     names,
     owners,
+    parts,
+    shortened,
     table_of,
     variant_of,
 )
-from tireroad.runs.scene.source import Path_, Source, parts, shortened
 from tireroad.runs.scene.tables.scene import DampingTable, ModalTable, RoadTable, Scene, filled
 from tireroad.runs.scene.tables.tire import SECTIONS, check_series
 

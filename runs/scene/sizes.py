@@ -11,11 +11,11 @@ import numpy as np
 
 from tireroad.contact.patch import ON_A_NODE
 from tireroad.contact.roads.kinds.shapes import Edges
-from tireroad.contact.roads.placement import begun_at
+from tireroad.contact.roads.under_tire import begun_at
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections.mesh2d import SectionMesh
-from tireroad.fem.turning import SHAPE_TOLERANCE
-from tireroad.runs.scene.road_rules import least_travel, made
+from tireroad.fem.wheel import SHAPE_TOLERANCE
+from tireroad.runs.scene.rules import least_travel, made
 from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.scene.tables.scene import Scene
 

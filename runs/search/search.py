@@ -324,7 +324,7 @@ class Search:
         chosen = applied(self.scene, trial.settings)
         on_root(self.comm, lambda: write_text(self.directory / CHOSEN, signed(dumps(chosen))))
         console.say(f"  chosen: {trial.settings}; {self.directory / CHOSEN} needs no search")
-        _tell(chosen, self._final(chosen))
+        tell_error(chosen, self._final(chosen))
         on_root(self.comm, lambda: journal.forget(self.directory))
 
     def _final(self, scene: Scene) -> Finished:
@@ -366,39 +366,32 @@ def seconds(folder: Path) -> dict[str, float]:
     }
 
 
-def run(
+def searches(scene: Scene, until: str | None) -> bool:
+    """Whether a run up to the stage `until` (None: all) searches for its settings."""
+    return scene.accuracy.searches and not (
+        until and STAGES.index(until) < STAGES.index("accuracy")
+    )
+
+
+def search(
     scene: Scene,
     directory: Path,
     comm: MPI.Comm,
     *,
-    until: str | None,
     fresh: bool,
     petsc_options: list[str],
     cache: Cache = NO_CACHE,
 ) -> None:
-    """A run as the user starts it, with a search if the scene has a target and `until` allows.
+    """Search for the settings that meet the scene's target. Collective.
 
-    `fresh`: reuse nothing of earlier runs and trials. Collective.
+    `fresh`: reuse nothing of earlier runs and trials.
     """
-    if not scene.accuracy.searches or (until and STAGES.index(until) < STAGES.index("accuracy")):
-        on_root(comm, lambda: journal.leave(directory))
-        done = run_scene(
-            scene,
-            directory,
-            comm,
-            until=until,
-            fresh=fresh,
-            petsc_options=petsc_options,
-            cache=cache,
-        )
-        _tell(scene, done)
-        return
     if fresh:
         on_root(comm, lambda: _forget(directory))
     Search(scene, directory, comm, petsc_options, cache).run()
 
 
-def _tell(scene: Scene, done: Finished) -> None:
+def tell_error(scene: Scene, done: Finished) -> None:
     """Report whether the target error is met, if it was estimated. Collective."""
     if not scene.accuracy.aimed or "accuracy" not in done.done:
         return

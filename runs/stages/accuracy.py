@@ -31,7 +31,7 @@ from tireroad.contact.tread.between_nodes import Backed, on_nodes, over_rectangl
 from tireroad.contact.tread.compliance import Influence
 from tireroad.contact.tread.laws.elastic import ElasticLayer, HalfSpace
 from tireroad.fem.errors import ConvergenceError, InputError
-from tireroad.fem.sections.ring import Ring
+from tireroad.fem.sections.mesh2d import Ring
 from tireroad.fem.static.load_error import carried_over
 from tireroad.fem.static.state import StaticState
 from tireroad.greens.response import Response
@@ -48,11 +48,16 @@ from tireroad.runs.stages.cavity import AirColumn
 from tireroad.runs.stages.contact_file import ContactHistory
 from tireroad.runs.stages.greens import GreensStage, Responses
 from tireroad.runs.stages.modes import Fields, ModesStage, Motions
-from tireroad.runs.stages.obtained import obtained
 from tireroad.runs.stages.rolling import ContactForces, bristles, first_step, forces, recursive
 from tireroad.runs.stages.rotating import FullMatrices, RotatingStage
 from tireroad.runs.stages.setup import Setup, points_of, tread_surface
-from tireroad.runs.stages.stage import Computed, Done, Job, PipelinePart, Record, Shared, Stage
+from tireroad.runs.stages.stage import (
+    Computed,
+    Job,
+    PipelinePart,
+    Record,
+    Result,
+)
 from tireroad.runs.stages.static import StaticStage
 
 _WHOLE = 0.9  # share of the wall from which a compound counts as all of it
@@ -123,7 +128,7 @@ class Given:
     """
 
     job: Job
-    static: Done[StaticState]
+    static: Result[StaticState]
     setup: ContactSetup
     response: Response
     rolling: RollingModes
@@ -228,7 +233,7 @@ class CoarserStatic(StaticStage):
 
     forgets: ClassVar[bool] = False  # the run's own matrices are kept for the next member
     run: Job
-    near: Done[StaticState]
+    near: Result[StaticState]
 
     def inputs(self) -> dict:
         """Those of any static state, and the state it starts from."""
@@ -244,9 +249,9 @@ class CoarserStatic(StaticStage):
         return super().compute(record)
 
 
-def coarser(run: Job, static: Done[StaticState]) -> tuple[Job, dict[str, Done]]:
+def coarser(run: Job, static: Result[StaticState]) -> tuple[Job, dict[str, Result]]:
     """The coarser job, and its parts from the static state to the Green's functions. Collective."""
-    job, done = coarser_job(run), dict[str, Done]()
+    job, done = coarser_job(run), dict[str, Result]()
     if (contact := job.scene.contact) is not None:
         # Contact points as in the run, not those its own footprint would ask for.
         contact = replace(contact, points=points_of(run, static.product))
@@ -292,14 +297,12 @@ def coarser_job(job: Job) -> Job:
 
 
 def _made(
-    job: Job, kind: type[PipelinePart], part: PipelinePart | None, done: dict[str, Done]
-) -> Done | None:
+    job: Job, kind: type[PipelinePart], part: PipelinePart | None, done: dict[str, Result]
+) -> Result | None:
     """The result of one part of the chain; None if it has none. Collective."""
     if kind is RotatingStage and not job.speed:
         return RotatingStage.instead(job, done)
-    if isinstance(part, Stage):
-        return obtained(part).done
-    return Done("", part.make) if isinstance(part, Shared) else None
+    return part.result() if part else None
 
 
 SHARE = 0.33  # of the run's own cost: budget of all companion runs together
@@ -544,11 +547,11 @@ class AccuracyStage(Computed[Accuracy]):
     """Error bars of mean, deviation and third octaves of the contact force and the axle force."""
 
     name: ClassVar[str] = "accuracy"
-    static: Done[StaticState]
-    rotating: Done[RollingModes]
-    greens: Done[Responses]
-    setup: Done[ContactSetup]
-    contact: Done[ContactHistory]
+    static: Result[StaticState]
+    rotating: Result[RollingModes]
+    greens: Result[Responses]
+    setup: Result[ContactSetup]
+    contact: Result[ContactHistory]
 
     def inputs(self) -> dict:
         """The key of the contact forces, and the upper frequency."""

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import h5py
 import numpy as np
 
-from tireroad.fem.cavity.duct import Duct
+from tireroad.fem.cavity import Duct
 from tireroad.fem.model import SmallMotions
 from tireroad.modal.basis import Air, ModalBasis
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
 from tireroad.runs.scene.tables.scene import has_air
-from tireroad.runs.stages.stage import Done, Job, Record, Shared
+from tireroad.runs.stages.stage import Job, Record, Result, Shared
 
 if TYPE_CHECKING:
-    from tireroad.fem.cavity.column import Column
+    from tireroad.fem.cavity import Column
 
 
 _SHOWN = 4
@@ -51,7 +51,7 @@ def make_air(job: Job, motions: SmallMotions) -> Column | None:
     """The air inside the deformed wall, or None. Collective."""
     if not has_air(job.scene):
         return None
-    from tireroad.fem.cavity.column import make_column
+    from tireroad.fem.cavity import make_column
 
     wanted, static = job.scene.tire.cavity, motions.static
     return make_column(
@@ -70,8 +70,8 @@ class AirColumn(Shared["Column | None"]):
     """The air at the wall, from the modes' computation, or rebuilt if they are reused."""
 
     name: ClassVar[str] = "air"
-    modes: Done[ModalBasis]
-    motions: Done[SmallMotions]
+    modes: Result[ModalBasis]
+    motions: Result[SmallMotions]
 
     def make(self) -> Column | None:
         """The air column. Collective."""

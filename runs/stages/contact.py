@@ -60,7 +60,7 @@ from tireroad.runs.stages.rolling import (
     shortest_period,
 )
 from tireroad.runs.stages.setup import leaning, leaning_loads
-from tireroad.runs.stages.stage import Done, Record, Stage
+from tireroad.runs.stages.stage import Record, Result, Stage
 
 # Fewest point spacings per footprint width. Measured on cobblestones on two tires: deviation 23 %
 # too large at 1.8, 2 % at 2.4 (torus.toml), 5 % too small at 2.5, 3 % at 3.6. Only on a mesh
@@ -420,10 +420,10 @@ class ContactStage(Stage[ContactHistory]):
     """The time loop. Its file is written as it proceeds, from the last checkpoint if any."""
 
     name: ClassVar[str] = "contact"
-    static: Done[StaticState]
-    rotating: Done[RollingModes]
-    greens: Done[Responses]
-    setup: Done[ContactSetup]
+    static: Result[StaticState]
+    rotating: Result[RollingModes]
+    greens: Result[Responses]
+    setup: Result[ContactSetup]
 
     def inputs(self) -> dict:
         """The Green's functions, the contact, the road (a file by its content) and the time."""

@@ -32,7 +32,7 @@ from tireroad.runs.files.disk import part_of, replacing, seal
 from tireroad.runs.files.store import put
 from tireroad.runs.process import console
 from tireroad.runs.process.mpi import on_root
-from tireroad.runs.scene.road_rules import foot, never_met, within_run_in, without_relief
+from tireroad.runs.scene.rules import foot, never_met, within_run_in, without_relief
 from tireroad.runs.scene.tables.scene import RoadTable
 from tireroad.runs.stages import corner
 from tireroad.runs.stages import setup as stages_setup
@@ -219,7 +219,7 @@ class ContactHistory:
     """The contact over n steps of `step` s ending at `time` (n,) s: `total_force` (n, 3) N;
     `axle_force` (n, 3) N if stored; `driven` (n, k, 3) m: displacement at driven points, if any;
     `wheel`: hub moments, and motions of a moving wheel, by the names of
-    runs.stages.corner; `free_slip`: slip added so that the wheel rolls freely."""
+    runs.stages.coupled; `free_slip`: slip added so that the wheel rolls freely."""
 
     step: float
     scheme: str

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from tireroad.contact.patch import Patch
-from tireroad.fem.axle import Axle
+from tireroad.fem.wheel import Axle
 from tireroad.greens.basis import Basis
 from tireroad.greens.outputs import disagreement
 from tireroad.modal.corner import ARRAYS, SEEN, Corner

@@ -22,7 +22,7 @@ from tireroad.runs.scene.tables.scene import PointForceTable, has_air
 from tireroad.runs.stages import cavity, corner, rotating
 from tireroad.runs.stages.modes import fill_projection, read_projection
 from tireroad.runs.stages.setup import components, leaning, leaning_loads, points_of, probes
-from tireroad.runs.stages.stage import Computed, Done, Record, turning_of
+from tireroad.runs.stages.stage import Computed, Record, Result, turning_of
 
 _UNITS = {
     "eigenvalue": "1/s",
@@ -100,11 +100,11 @@ class GreensStage(Computed[Responses]):
     """The Green's functions with their residual flexibility, and the choice of dynamic states."""
 
     name: ClassVar[str] = "greens"
-    static: Done[StaticState]
-    wheel: Done[Wheel]
-    fields: Done[ModalBasis]
-    rotating: Done[RollingModes]
-    setup: Done[ContactSetup | None]
+    static: Result[StaticState]
+    wheel: Result[Wheel]
+    fields: Result[ModalBasis]
+    rotating: Result[RollingModes]
+    setup: Result[ContactSetup | None]
 
     def inputs(self) -> dict:
         """The states and what is driven; the road enters only through the reach of the patch."""

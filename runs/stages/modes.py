@@ -14,11 +14,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from tireroad.fem.axle import Axle
-from tireroad.fem.cavity.column import Column
+from tireroad.fem.cavity import Column
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.static.state import StaticState
+from tireroad.fem.wheel import Axle
 from tireroad.modal.basis import ModalBasis, Projection, same_fields
 from tireroad.modal.damping import Damping, StrainEnergy
 from tireroad.modal.rotation_shapes import up_to
@@ -30,16 +30,17 @@ from tireroad.runs.process import console
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.process.surroundings import available_memory
 from tireroad.runs.scene.estimate import estimate
-from tireroad.runs.stages import cavity, corner, reuse
+from tireroad.runs.stages import cavity, corner
 from tireroad.runs.stages.stage import (
     Computed,
-    Done,
     Job,
     Record,
+    Result,
     Shared,
     checkpointed,
     damping_of,
     forget_checkpoint,
+    memoize,
     shapes_of,
 )
 
@@ -187,14 +188,14 @@ class Motions(Shared[SmallMotions]):
     """The finite-element matrices about the static state, shared by all stages that need them."""
 
     name: ClassVar[str] = "motions"
-    static: Done[StaticState]
+    static: Result[StaticState]
 
     def make(self) -> SmallMotions:
         """No matrices yet: each is assembled when first used."""
         tire, static, modal = self.job.tire, self.static.product, self.job.scene.modes
         rim, road = modal.rim, modal.road
         key = self.static.key, rim, road
-        return reuse.once("matrices", key, lambda: SmallMotions(tire, static, rim=rim, road=road))
+        return memoize("matrices", key, lambda: SmallMotions(tire, static, rim=rim, road=road))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -202,8 +203,8 @@ class ModesStage(Computed[ModalBasis]):
     """The modes of the non-rotating tire."""
 
     name: ClassVar[str] = "modes"
-    static: Done[StaticState]
-    motions: Done[SmallMotions]
+    static: Result[StaticState]
+    motions: Result[SmallMotions]
 
     def inputs(self) -> dict:
         """The static state and the modal table; rotation matrices only if the wheel turns."""
@@ -284,9 +285,9 @@ class Fields(Shared[ModalBasis]):
     """The modes with fields on all unknowns: of this run, of the shared cache, or solved again."""
 
     name: ClassVar[str] = "fields"
-    modes: Done[ModalBasis]
-    motions: Done[SmallMotions]
-    air: Done[Column | None]
+    modes: Result[ModalBasis]
+    motions: Result[SmallMotions]
+    air: Result[Column | None]
 
     def make(self) -> ModalBasis:
         """The basis with fields. Collective."""

@@ -25,7 +25,7 @@ from tireroad.runs.files.disk import FACTORS, remove_factors
 from tireroad.runs.files.folder import Summary, make_folder
 from tireroad.runs.process import console
 from tireroad.runs.process.mpi import on_root
-from tireroad.runs.process.surroundings import factors_on_disk, forget_peak, peak_memory
+from tireroad.runs.process.surroundings import factors_on_disk, forget_peak
 from tireroad.runs.scene.estimate import (
     Estimate,
     check_demand,
@@ -37,18 +37,23 @@ from tireroad.runs.scene.estimate import (
 from tireroad.runs.scene.load import with_modal
 from tireroad.runs.scene.plan import meets_road, skipped
 from tireroad.runs.scene.resolved import dumps
-from tireroad.runs.scene.road_rules import check_road, keep, made
+from tireroad.runs.scene.rules import check_road, keep, made
 from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.stages import obtained as stages_obtained
 from tireroad.runs.stages.accuracy import STATIC_TO_GREENS, AccuracyStage
 from tireroad.runs.stages.contact import ContactStage
 from tireroad.runs.stages.greens import Responses
-from tireroad.runs.stages.obtained import obtained
 from tireroad.runs.stages.response import ResponseStage
 from tireroad.runs.stages.setup import Setup
 from tireroad.runs.stages.sound import RadiationStage, SoundStage
 from tireroad.runs.stages.spectra import SpectraStage
-from tireroad.runs.stages.stage import Done, Job, PipelinePart, Shared, Stage
+from tireroad.runs.stages.stage import (
+    Job,
+    PipelinePart,
+    Result,
+    Stage,
+    entered,
+    largest_memory,
+)
 from tireroad.runs.stages.static import StaticStage
 from tireroad.runs.stages.stiffness import StiffnessStage
 from tireroad.runs.stages.vibration import MotionStage, VibrationStage
@@ -116,7 +121,7 @@ class Finished:
     """What a run leaves in memory: its `job`, and the parts that are `done`, by name."""
 
     job: Job
-    done: Mapping[str, Done]
+    done: Mapping[str, Result]
 
     @property
     def static(self) -> StaticState:
@@ -168,28 +173,30 @@ def run_scene(
 
     `cache`: finished stages shared with other runs, by default none.
     """
-    scene = with_modal(scene, until)
+    job = Job(with_modal(scene, until), directory, comm, fresh, cache)
     forget_peak()  # of an earlier member of a sweep in the same process
-    job = Job(scene, directory, comm, fresh, cache)
-    on_root(comm, lambda: make_folder(directory))
-    summary = on_root(comm, lambda: Summary(directory, scene.name, comm.size, dumps(scene)))
-    if scene.road is not None and meets_road(until):
-        # Report an unusable road file before hours of solving, not after.
-        share(scene.road.surface, comm)
-        on_root(comm, lambda: check_road(scene))
-    wanted = on_root(comm, lambda: estimate(scene, until))  # may read the road's file
-    on_disk = on_root(comm, lambda: out_of_core(wanted, comm.size))
-    each = 1e-9 * sum(memory_of(wanted, comm.size, on_disk).values()) / comm.size
-    _say_demand(wanted, each, directory, comm)
-    on_root(comm, summary.begin)  # not before: a scene that is refused replaces nothing
-    reasons = skipped(scene, until)
+    summary, needed, on_disk = _begun(job, until)
+    reasons = skipped(job.scene, until)
     if petsc_options:
         console.say(f"PETSc options: {' '.join(petsc_options)}")
+    done: dict[str, Result] = {}
     with _factors(on_disk, directory, comm):
-        done = _parts(job, reasons, summary)
+        for kind in PARTS:
+            with entered(kind.name, summary, comm):
+                if issubclass(kind, Stage) and kind.name in reasons:
+                    found = _skipped(kind, job, done, reasons[kind.name], summary)
+                else:
+                    part = kind.taken(job, done)
+                    found = part.result(summary) if part else None
+                if found is not None:
+                    done[kind.name] = found
+                job.settle(done)
+                if found is not None and kind is Setup and "contact" not in reasons:
+                    _ = found.product  # a road narrower than the footprint is refused before modes
     stages = on_root(comm, lambda: summary.data["stages"])
     _check_options(petsc_options, [k for k, one in stages.items() if one["status"] == "reused"])
-    console.say(f"memory: {_peak(comm):.2g} GB of a process at most, {each:.2g} GB estimated")
+    peak = largest_memory(comm)
+    console.say(f"memory: {peak:.2g} GB of a process at most, {needed:.2g} GB estimated")
     if "report" in reasons:
         on_root(comm, lambda: summary.record("report", "skipped", reason=reasons["report"]))
     else:
@@ -197,29 +204,27 @@ def run_scene(
     return Finished(job, done)
 
 
-def _parts(job: Job, reasons: Mapping[str, str], summary: Summary) -> dict[str, Done]:
-    """The product of each part of the pipeline, by name. Collective."""
-    done: dict[str, Done] = {}
-    for kind in PARTS:
-        with stages_obtained.entered(kind.name, summary, job.comm):
-            found: Done | None = None
-            if issubclass(kind, Stage) and kind.name in reasons:
-                found = _skipped(kind, job, done, reasons[kind.name], summary)
-            else:
-                part = kind.taken(job, done)
-                if isinstance(part, Shared):
-                    found = Done("", part.make)
-                elif isinstance(part, Stage):
-                    found = _run(part, summary)
-            if found is not None:
-                done[kind.name] = found
-            job.settle(done)
-            if found is not None and kind is Setup and "contact" not in reasons:
-                _ = found.product  # a road too narrow for the footprint is refused before the modes
-    return done
+def _begun(job: Job, until: str | None) -> tuple[Summary, float, bool]:
+    """The folder's summary, the memory (GB) a process needs, and whether factors go to disk.
+
+    Raises InputError for a road file that cannot be used, before hours of solving, and if the
+    machine has far too little memory or disk. Collective.
+    """
+    scene, directory, comm = job.scene, job.directory, job.comm
+    on_root(comm, lambda: make_folder(directory))
+    summary = on_root(comm, lambda: Summary(directory, scene.name, comm.size, dumps(scene)))
+    if scene.road is not None and meets_road(until):
+        share(scene.road.surface, comm)
+        on_root(comm, lambda: check_road(scene))
+    wanted = on_root(comm, lambda: estimate(scene, until))  # may read the road's file
+    on_disk = on_root(comm, lambda: out_of_core(wanted, comm.size))
+    each = 1e-9 * sum(memory_of(wanted, comm.size, on_disk).values()) / comm.size
+    _say_demand(wanted, each, directory, comm)
+    on_root(comm, summary.begin)  # not before: a scene that is refused replaces nothing
+    return summary, each, on_disk
 
 
-def _skipped(kind: type[Stage], job: Job, done, reason: str, summary: Summary) -> Done | None:
+def _skipped(kind: type[Stage], job: Job, done, reason: str, summary: Summary) -> Result | None:
     """What later parts receive instead of a stage that is skipped for a `reason`. Collective."""
     console.say(f"{kind.name:9s} skipped: {reason}")
     on_root(job.comm, lambda: summary.record(kind.name, "skipped", reason=reason))
@@ -250,32 +255,6 @@ def _say_demand(wanted: Estimate, each: float, directory: Path, comm: MPI.Comm) 
         f"{sum(wanted.disk.values()) / 1e9:.2g} GB of disk, "
         f"{duration(sum(wanted.seconds.values()))} of one core"
     )
-
-
-def _run(stage: Stage, summary: Summary) -> Done:
-    """The stage's product; reports where it comes from and what it cost. Collective."""
-    job, name = stage.job, stage.name
-    began = time.perf_counter()
-    found = obtained(stage)
-    record = found.record
-    if record is None:
-        console.say(f"{name:9s} reused: computed from the same inputs {found.reused}")
-        known = {"reason": "same inputs", "input_hash": found.done.key, **found.known}
-        on_root(job.comm, lambda: summary.record(name, "reused", **known))
-        return found.done
-    record.indicators["largest memory of a process so far"] = (_peak(job.comm), "GB")
-    seconds = time.perf_counter() - began
-    for text in record.warnings:
-        console.warn(f"{name}: {text}")
-    console.say(f"{name:9s} done in {seconds:.1f} s: {record.line()}")
-    figures = {"input_hash": found.done.key, **vars(record)}
-    on_root(job.comm, lambda: summary.record(name, "computed", seconds=seconds, **figures))
-    return found.done
-
-
-def _peak(comm: MPI.Comm) -> float:
-    """Largest resident memory of any process since its start (forget_peak), GB. Collective."""
-    return 1e-9 * comm.allreduce(peak_memory(), MPI.MAX)
 
 
 def _report(directory: Path, summary: Summary) -> None:

@@ -32,7 +32,7 @@ from tireroad.runs.stages.rolling import (
     shortest_period,
 )
 from tireroad.runs.stages.setup import driven_points
-from tireroad.runs.stages.stage import Computed, Done, Job, Record, turning_of
+from tireroad.runs.stages.stage import Computed, Job, Record, Result, turning_of
 
 Array = np.ndarray
 
@@ -47,9 +47,9 @@ class Driven:
 
     job: Job
     static: StaticState
-    modes: Done[ModalBasis]
-    wheel: Done[Wheel]
-    greens: Done[Responses]
+    modes: Result[ModalBasis]
+    wheel: Result[Wheel]
+    greens: Result[Responses]
     time: Array | None = None
     integration: Integration | None = None
     history: ContactHistory | None = None
@@ -136,11 +136,11 @@ class ResponseStage(Computed[PointResponse]):
     """The response to the prescribed forces, alone or together with contact."""
 
     name: ClassVar[str] = "response"
-    static: Done[StaticState]
-    modes: Done[ModalBasis]
-    wheel: Done[Wheel]
-    greens: Done[Responses]
-    contact: Done[ContactHistory] | None = None
+    static: Result[StaticState]
+    modes: Result[ModalBasis]
+    wheel: Result[Wheel]
+    greens: Result[Responses]
+    contact: Result[ContactHistory] | None = None
 
     def inputs(self) -> dict:
         """The Green's functions, the forces, the time and the frequency outputs."""

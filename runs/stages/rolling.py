@@ -19,8 +19,7 @@ from tireroad.contact.roads.under_tire import is_level
 from tireroad.contact.setup import ContactSetup
 from tireroad.contact.solver.stick_slip import BrushFriction
 from tireroad.contact.tread.brush import Brush, BrushLaw, free_slip
-from tireroad.greens.convolution import Convolution
-from tireroad.greens.recursion import Recursion, sharers
+from tireroad.greens.recursion import Convolution, Recursion, sharers
 from tireroad.greens.response import Response
 from tireroad.runs.process import console
 from tireroad.runs.scene.tables.contact import TimeTable

@@ -2,8 +2,8 @@
 
 The states in rotating.h5: those of the modes and, apart, those of the shapes that joined them.
 
-A state dominated by rotation shapes (modal.rotation_shapes) is not an eigenfrequency of the tire: it
-represents the coupling of its modes to faster ones. There are as many as shapes; `turning/place`
+A state dominated by rotation shapes (modal.rotation_shapes) is not an eigenfrequency of the tire:
+it represents the coupling of its modes to faster ones. There are as many as shapes; `turning/place`
 holds their indices among all states.
 """
 
@@ -15,7 +15,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from tireroad.fem.cavity.column import Column
+from tireroad.fem.cavity import Column
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.parallel import on_root
 from tireroad.fem.static.state import StaticState
@@ -34,7 +34,7 @@ from tireroad.modal.rolling import RollingModes, full_states, rolling_modes
 from tireroad.modal.states import StateModes
 from tireroad.runs.files.store import put
 from tireroad.runs.stages import cavity, corner
-from tireroad.runs.stages.stage import Computed, Done, Job, Record, Shared, turning_of
+from tireroad.runs.stages.stage import Computed, Job, Record, Result, Shared, turning_of
 
 _STATES = {"eigenvalue": "1/s", "right": "-", "left": "s", "residual": "-", "left_residual": "-"}
 _BLOCK = {"block": "1/s", "block_right": "-", "block_left": "s"}
@@ -91,9 +91,9 @@ class FullMatrices(Shared[Wheel]):
     """The full matrices of the rotating wheel."""
 
     name: ClassVar[str] = "wheel"
-    motions: Done[SmallMotions]
-    modes: Done[ModalBasis]
-    air: Done[Column | None]
+    motions: Result[SmallMotions]
+    modes: Result[ModalBasis]
+    air: Result[Column | None]
 
     def make(self) -> Wheel:
         """Assemble them. Collective."""
@@ -107,17 +107,17 @@ class RotatingStage(Computed[RollingModes]):
     """The states of the rolling tire; for a wheel at rest, those of the modes."""
 
     name: ClassVar[str] = "rotating"
-    static: Done[StaticState]
-    modes: Done[ModalBasis]
-    wheel: Done[Wheel]
+    static: Result[StaticState]
+    modes: Result[ModalBasis]
+    wheel: Result[Wheel]
 
     @classmethod
-    def instead(cls, job: Job, done: Mapping[str, Done]) -> Done[RollingModes] | None:
+    def instead(cls, job: Job, done: Mapping[str, Result]) -> Result[RollingModes] | None:
         """For a wheel at rest, the states follow from the modes in closed form."""
         if "modes" not in done or job.speed:
             return None
         modes = done["modes"]
-        return Done(modes.key, lambda: rolling_modes(modes.product, turning_of(job), job.comm))
+        return Result(modes.key, lambda: rolling_modes(modes.product, turning_of(job), job.comm))
 
     def inputs(self) -> dict:
         """The modes, damping, speed and inertia; the number of states only for the full method."""

@@ -24,12 +24,12 @@ from tireroad.fem.matrices import probe
 from tireroad.fem.static.state import StaticState
 from tireroad.runs.files import store
 from tireroad.runs.files.store import put
-from tireroad.runs.scene.road_rules import made
+from tireroad.runs.scene.rules import made
 from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.scene.tables.contact import PatternTable
-from tireroad.runs.stages import corner, reuse
+from tireroad.runs.stages import corner
 from tireroad.runs.stages.rolling import run_time
-from tireroad.runs.stages.stage import Done, Job, Record, Shared, wheel_slip
+from tireroad.runs.stages.stage import Job, Record, Result, Shared, memoize, wheel_slip
 
 if TYPE_CHECKING:
     from tireroad.fem.static.footprint import TreadSurface
@@ -133,7 +133,7 @@ class Setup(Shared[ContactSetup | None]):
     """The patch and the road under it; None without contact in time."""
 
     name: ClassVar[str] = "setup"
-    static: Done[StaticState]
+    static: Result[StaticState]
 
     def make(self) -> ContactSetup | None:
         """The setup from the static state and the scene's road."""
@@ -149,7 +149,7 @@ def tread_surface(job: Job, state: StaticState, key: str) -> TreadSurface:
     """The deformed tread of the static state with this key."""
     from tireroad.fem.static.footprint import TreadSurface  # not needed for points at nodes
 
-    return reuse.once("surface", key, lambda: TreadSurface(job.tire.lattice, state.seen))
+    return memoize("surface", key, lambda: TreadSurface(job.tire.lattice, state.seen))
 
 
 def scene_setup(job: Job, state: StaticState, surface: TreadSurface | None = None) -> ContactSetup:

@@ -35,7 +35,7 @@ from tireroad.runs.files.store import dataset, put, read_fields, write_fields
 from tireroad.runs.scene.plan import skipped
 from tireroad.runs.scene.tables.sound import SoundTable
 from tireroad.runs.stages.spectra import Spectra
-from tireroad.runs.stages.stage import Computed, Done, Job, Record, Shared, Stage
+from tireroad.runs.stages.stage import Computed, Job, Record, Result, Shared, Stage
 from tireroad.runs.stages.vibration import HANN, POWER, decibels
 from tireroad.runs.stages.whole_tire import Lines, WholeTire
 
@@ -98,7 +98,7 @@ class RadiationStage(Computed[Paths]):
     """Once for a tire, load and speed: the same on every road."""
 
     name: ClassVar[str] = "radiation"
-    static: Done[StaticState]
+    static: Result[StaticState]
 
     @property
     def table(self) -> SoundTable:
@@ -247,9 +247,9 @@ class SoundStage(WholeTire[SoundPressure]):
     """Pressure from the coordinates of the run and the Green's functions of the air."""
 
     name: ClassVar[str] = "sound"
-    radiation: Done[Paths]
-    lines: Done[Lines | None]
-    spectra: Done[Spectra] | None = None
+    radiation: Result[Paths]
+    lines: Result[Lines | None]
+    spectra: Result[Spectra] | None = None
 
     def inputs(self) -> dict[str, Any]:
         """The forces and states, their limit and error bars, and the air."""
@@ -591,17 +591,17 @@ def listen(
         }
     )
     job = Job(replace(scene, sound=table), results.directory, MPI.COMM_SELF)
-    done: dict[str, Done] = {}
+    done: dict[str, Result] = {}
     for kind in PARTS:
         part = kind.taken(job, done)
         if isinstance(part, RadiationStage | SoundStage):
-            done[kind.name] = Done("", partial(part.compute, Record()))
+            done[kind.name] = Result("", partial(part.compute, Record()))
         elif isinstance(part, Shared):
-            done[kind.name] = Done("", part.make)
+            done[kind.name] = Result("", part.make)
         elif isinstance(part, Stage) and kind.name not in skipped(scene):
             if f"{kind.name}.h5" in results.left_out or not job.path(kind.name).is_file():
                 continue
-            done[kind.name] = Done("", part.stored)
+            done[kind.name] = Result("", part.stored)
         job.settle(done)
     if "sound" not in done:
         raise InputError(

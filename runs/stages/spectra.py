@@ -35,7 +35,7 @@ from tireroad.runs.stages import corner
 from tireroad.runs.stages.accuracy import Accuracy, all_limits
 from tireroad.runs.stages.contact_file import ContactHistory
 from tireroad.runs.stages.rolling import first_step, run_in
-from tireroad.runs.stages.stage import Computed, Done, Record
+from tireroad.runs.stages.stage import Computed, Record, Result
 
 # name in `third_octave/`: name in `density/`, reference of the level, its unit, unit of the
 # density, whether the rate is taken
@@ -199,7 +199,7 @@ class Spectra:
     its low bands, empty if it has them; `level_error` and `contact_level_error` (b, 3) dB:
     estimated errors of the third octaves of axle and contact force, NaN where unknown, None if not
     requested; `wheel`: hub moments and motions of a moving wheel, (f, 3) or (f, 1), by the names of
-    runs.stages.corner.
+    runs.stages.coupled.
     """
 
     frequency: np.ndarray = dataset("Hz")
@@ -221,10 +221,10 @@ class SpectraStage(Computed[Spectra]):
     """Spectra of the contact history after the run-in."""
 
     name: ClassVar[str] = "spectra"
-    contact: Done[ContactHistory]
-    setup: Done[ContactSetup]
-    rotating: Done[RollingModes]
-    accuracy: Done[Accuracy] | None = None
+    contact: Result[ContactHistory]
+    setup: Result[ContactSetup]
+    rotating: Result[RollingModes]
+    accuracy: Result[Accuracy] | None = None
 
     def inputs(self) -> dict:
         """The contact forces, whose key covers modes and run-in length, and the error bars."""

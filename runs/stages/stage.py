@@ -1,21 +1,29 @@
 """A stage: a function of typed inputs whose frozen product is written to a file and read back.
 
-Checkpoints of the stages static and modes, for runs that are stopped or killed.
+A product comes from its own file, from the shared cache, or is computed. Matrices can be held in
+memory for a family's next run with the same static state.
 
-Each process stores its own results, part by part, in
+Checkpoints: in the stages static and modes each process stores its own results, part by part, in
 `<stage>_checkpoint/<rank>of<size>-<number>.h5`, where `number` is that of the part's first result.
 Parts carry a checksum and the key of the stage's inputs; reading ends at the first part that is
 absent, damaged or of other inputs.
+
+Failures are entered in the summary. Members of a sweep that share a stage do not repeat its
+failure: the environment variable TIREROAD_FAILURES names a folder with a file for each stage that
+has failed, by its name and the hash of its inputs. A sweep on this machine gives its workers an
+empty one. Without it nothing is remembered: a run by itself may be tried again.
 """
 
 from __future__ import annotations
 
 import math
+import os
 import shutil
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager, suppress
+from collections import OrderedDict
+from collections.abc import Callable, Hashable, Iterator, Mapping
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import MISSING, dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
@@ -24,31 +32,62 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 import numpy as np
 from mpi4py import MPI
 
-from tireroad.fem.axle import Axle
+from tireroad.fem.collective import collect
+from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.model import TireModel
 from tireroad.fem.static.checkpoint import Entry, Journal
 from tireroad.fem.static.friction_press import Friction
 from tireroad.fem.static.state import StaticState
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.timing import Timing
-from tireroad.fem.turning import Turning
+from tireroad.fem.wheel import Axle, Turning
 from tireroad.modal.damping import Damping, Proportional, StrainEnergy
 from tireroad.runs.files import store
 from tireroad.runs.files.cache import NO_CACHE, Cache
+from tireroad.runs.files.disk import write_text
+from tireroad.runs.files.folder import Summary
 from tireroad.runs.process import console
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.process.signals import Stopped
+from tireroad.runs.process.surroundings import peak_memory
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.tables.scene import Scene, axle_of
 
 if TYPE_CHECKING:
-    from mpi4py import MPI
-
-    from tireroad.fem.sections.ring import Ring
+    from tireroad.fem.sections.mesh2d import Ring
     from tireroad.fem.static.road import RoadShape
     from tireroad.fem.tire.body import Body
-    from tireroad.runs.scene.tables.scene import Scene
     from tireroad.runs.scene.tables.tire import TireTable
+
+T = TypeVar("T")
+
+MOST = 2  # per kind: those of a run and of its coarser companion
+_kept: dict[str, OrderedDict[Hashable, Any]] | None = None
+
+
+def keep_matrices() -> None:
+    """Start keeping: this process computes the members of a family one after the other."""
+    global _kept
+    _kept = {}
+
+
+def memoize(kind: str, key: Hashable, make: Callable[[], T]) -> T:
+    """The value of `make`, or that of an earlier run with the same key. Collective if `make` is."""
+    if _kept is None:
+        return make()
+    known = _kept.setdefault(kind, OrderedDict())
+    if key not in known:
+        while len(known) >= MOST:  # freed before the new ones need the memory
+            known.popitem(last=False)
+        known[key] = make()
+    known.move_to_end(key)
+    return known[key]
+
+
+def forget_matrices() -> None:
+    """Drop everything, before a new static state: matrices belong to one state."""
+    if _kept is not None:
+        _kept.clear()
 
 
 Figures = dict[str, tuple[Any, str]]
@@ -111,9 +150,6 @@ def make_body(comm: MPI.Comm, tire: TireTable, section: Ring) -> Body:
     from tireroad.fem.tire.body import Body
 
     return Body(comm, section, tire.shape.rubbers(tire), cords=tire.shape.cords(tire))
-
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -199,7 +235,7 @@ class Job:
 P = TypeVar("P")
 
 
-class Done(Generic[P]):
+class Result(Generic[P]):
     """A product with the `key` (hash) of all its inputs; the key is "" if the product has no file.
 
     It is computed or read on first use, so that an unused product is never read. That use is
@@ -222,8 +258,12 @@ class PipelinePart(ABC, Generic[P]):
     name: ClassVar[str]
     job: Job
 
+    @abstractmethod
+    def result(self, summary: Summary | None = None) -> Result[P]:
+        """The part's product and its key; with a `summary`, its cost is reported. Collective."""
+
     @classmethod
-    def taken(cls, job: Job, done: Mapping[str, Done]) -> PipelinePart | None:
+    def taken(cls, job: Job, done: Mapping[str, Result]) -> PipelinePart | None:
         """The part with its inputs from `done`; None if a required input is missing."""
         given: dict[str, Any] = {}
         for item in fields(cls):
@@ -242,6 +282,10 @@ class Shared(PipelinePart[P]):
     @abstractmethod
     def make(self) -> P:
         """The product. Collective where its parts are."""
+
+    def result(self, summary: Summary | None = None) -> Result[P]:
+        """The product, made on first use."""
+        return Result("", self.make)
 
 
 class Stage(PipelinePart[P]):
@@ -267,8 +311,32 @@ class Stage(PipelinePart[P]):
         """The product as stored in its file. Collective."""
         return self.restored(self.job.read(self.job.path(self.name), self.read))
 
+    def result(self, summary: Summary | None = None) -> Result[P]:
+        """Reuse the product from its folder or the shared cache, or compute it. Collective."""
+        job, name, began = self.job, self.name, time.perf_counter()
+        key, path = store.wanted_hash(name, self.inputs()), job.path(name)
+        with ExitStack() as claim:
+            reason, source, known = on_root(job.comm, lambda: _looked_up(self, key, claim))
+            if not reason:
+                if summary is not None:
+                    _tell_reused(self, key, source, known, summary)
+                return Result(key, self.stored)
+            if reason != "absent":
+                console.say(f"{name:9s} computed anew: {path.name} exists, but {reason}")
+            if settings := solver_settings(name, job.scene):
+                console.log(settings)
+            record = Record()
+            with _remembering(self, key):
+                product = self.produce(key, record)
+            collect(job.comm)
+            figures = vars(record).copy()
+            on_root(job.comm, lambda: job.cache.keep(name, key, path, figures))
+        if summary is not None:
+            _tell_computed(self, key, record, time.perf_counter() - began, summary)
+        return Result(key, lambda: product)
+
     @classmethod
-    def instead(cls, job: Job, done: Mapping[str, Done]) -> Done[P] | None:
+    def instead(cls, job: Job, done: Mapping[str, Result]) -> Result[P] | None:
         """What later parts receive if this stage is skipped; None: nothing."""
         return None
 
@@ -473,3 +541,187 @@ def turning_of(job: Job) -> Turning:
 def shapes_of(job: Job) -> Turning | None:
     """The wheel's rotation if rotation shapes join its modes (modal.rotation_shapes), else None."""
     return turning_of(job) if job.speed and job.scene.joins_shapes else None
+
+
+FAILURES = "TIREROAD_FAILURES"
+
+
+@contextmanager
+def entered(stage: str, summary: Summary, comm: MPI.Comm) -> Iterator[None]:
+    """Within the context, an error or a stop is entered in the summary by the root process."""
+    try:
+        yield
+    except BaseException as error:
+        if comm.rank == 0:
+            stopped = isinstance(error, Stopped)
+            told = f"stopped by {error}: resume continues" if stopped else str(error) or repr(error)
+            with suppress(Exception):  # of the first error, whatever else goes wrong
+                summary.end(stage, told)
+        raise
+
+
+def remember(stage: str, key: str, run: str, error: ConvergenceError) -> None:
+    """Keep why the stage of a `run` failed, if failures are kept. Root process only."""
+    if (file := _file(stage, key)) and not file.exists():
+        with suppress(OSError):
+            write_text(file, f"{error} (as in {run}, which failed first and has the same inputs)")
+
+
+def check(stage: str, key: str) -> None:
+    """Raise ConvergenceError if the stage has failed on these inputs. Root process only."""
+    file = _file(stage, key)
+    if file and file.exists():
+        raise ConvergenceError(file.read_text(encoding="utf-8"))
+
+
+def _file(stage: str, key: str) -> Path | None:
+    folder = os.environ.get(FAILURES)
+    return Path(folder) / f"{stage}-{key}.txt" if folder else None
+
+
+_MUMPS = "MUMPS through PETSc, ICNTL(14) = 100 %"
+
+
+def solver_settings(stage: str, scene: Scene) -> str:
+    """One line about the solvers that a stage of the scene uses; "" if it has none.
+
+    Options given after `--` are logged where they are taken and change those of their prefix.
+    """
+    told = _TOLD.get(stage)
+    return f"{stage:9s} solver: {told(scene)}" if told else ""
+
+
+def _static(scene: Scene) -> str:
+    from tireroad.fem.static.equilibrium import MOST_STEPS, TOLERANCE
+    from tireroad.fem.static.load_steps import LOAD_TOLERANCE
+
+    return (
+        f"Newton's method, residual at most {TOLERANCE:g} of the force scale, at most {MOST_STEPS} "
+        f"tangents a load step; load to {LOAD_TOLERANCE:g}; tangents factorised by {_MUMPS}, options -static_…"
+    )
+
+
+def _modes(scene: Scene) -> str:
+    from tireroad.modal.solver.slicing import AUTO, BLOCK, TOLERANCE
+    from tireroad.modal.solver.undamped import ORTHONORMALITY_TOLERANCE, RESIDUAL_TOLERANCE
+
+    solver = AUTO if scene.modes.solver == "auto" else scene.modes.solver
+    how = {
+        "lanczos": f"block Lanczos, {BLOCK} vectors a block, on (A - sigma I)^-1 of each slice",
+        "slepc": "SLEPc's spectrum slicing, Krylov-Schur, options -modes_…",
+    }[solver]
+    rotation = scene.rotation
+    shapes = f"; rotation shapes of {rotation.shape_tolerance:g} and more" if rotation else ""
+    return (
+        f"{how} to {TOLERANCE:g}; counted by "
+        f"the inertia of L D L^T, {_MUMPS}; residual at most {RESIDUAL_TOLERANCE:g}, orthonormal to "
+        f"{ORTHONORMALITY_TOLERANCE:g}{shapes}"
+    )
+
+
+def _rotating(scene: Scene) -> str:
+    if scene.rotation is None or scene.rotation.method == "projected":
+        from tireroad.modal.rotating import LIMITS
+
+        return f"LAPACK on the modal basis; residual at most {LIMITS[0]:g}, identities to {LIMITS[1]:g}"
+    from tireroad.modal.solver.quadratic import ITERATIONS, RESIDUAL_TOLERANCE, TOLERANCE
+
+    return (
+        f"SLEPc PEP nearest to 0 by shift-and-invert to {TOLERANCE:g}, at most {ITERATIONS} restarts, {_MUMPS}, "
+        f"options -rotating_…; residual at most {RESIDUAL_TOLERANCE:g}"
+    )
+
+
+def _greens(scene: Scene) -> str:
+    if scene.greens.residual == "none":
+        return "none: states alone"
+    from tireroad.fem.matrices.compliance import RESIDUAL_TOLERANCE
+
+    return f"static shapes by {_MUMPS}; residual at most {RESIDUAL_TOLERANCE:g}"
+
+
+def _contact(scene: Scene) -> str:
+    from tireroad.contact.solver.conditions import TOLERANCE
+
+    assert scene.contact is not None, "the stage runs with [contact] only"
+    parts = [f"{scene.contact.solver}, complementarity to {TOLERANCE:g} of the scale"]
+    if scene.contact.solver == "snes-vi":
+        from tireroad.contact.solver.snes_vi import MAX_ITERATIONS
+
+        parts.append(f"PETSc SNES vinewtonrsls, at most {MAX_ITERATIONS} iterations")
+    if scene.contact.has_friction:
+        from tireroad.contact.solver.stick_slip import TOLERANCE as change
+        from tireroad.contact.solver.stick_slip import TURNS
+
+        parts.append(f"friction to {change:g} of the largest force in at most {TURNS} iterations")
+    return "; ".join([*parts, f"scheme {scene.time.scheme}"])
+
+
+_TOLD: dict[str, Callable[[Scene], str]] = {
+    "static": _static,
+    "modes": _modes,
+    "rotating": _rotating,
+    "greens": _greens,
+    "contact": _contact,
+}
+
+
+def _tell_reused(
+    stage: Stage, key: str, source: str, known: Mapping[str, Any], summary: Summary
+) -> None:
+    """Report that a product was computed before, and by which run. Collective."""
+    console.say(f"{stage.name:9s} reused: computed from the same inputs {source}")
+    figures = {"reason": "same inputs", "input_hash": key, **known}
+    on_root(stage.job.comm, lambda: summary.record(stage.name, "reused", **figures))
+
+
+def _tell_computed(
+    stage: Stage, key: str, record: Record, seconds: float, summary: Summary
+) -> None:
+    """Report a computed product's figures and what it cost. Collective."""
+    comm, name = stage.job.comm, stage.name
+    record.indicators["largest memory of a process so far"] = (largest_memory(comm), "GB")
+    for text in record.warnings:
+        console.warn(f"{name}: {text}")
+    console.say(f"{name:9s} done in {seconds:.1f} s: {record.line()}")
+    figures = {"input_hash": key, **vars(record)}
+    on_root(comm, lambda: summary.record(name, "computed", seconds=seconds, **figures))
+
+
+def largest_memory(comm: MPI.Comm) -> float:
+    """Largest resident memory of any process since its start (forget_peak), GB. Collective."""
+    return 1e-9 * comm.allreduce(peak_memory(), MPI.MAX)
+
+
+@contextmanager
+def _remembering(stage: Stage, key: str) -> Iterator[None]:
+    """A failure within is remembered for the other members of a sweep."""
+    try:
+        yield
+    except ConvergenceError as error:
+        if stage.job.comm.rank == 0:  # not on_root: other processes need not have failed
+            remember(stage.name, key, stage.job.scene.name, error)
+        raise
+
+
+def _looked_up(stage: Stage, key: str, claim: ExitStack) -> tuple[str, str, dict[str, Any]]:
+    """Look for a stored product.
+
+    Returns why the stage has to be computed ("" if not), by which run the product was computed, and
+    the figures that this folder's summary lacks. A stage to be computed is claimed: another run
+    that needs it waits until it is in the cache. Raises ConvergenceError if another member of the
+    sweep failed to compute it. Root process only.
+    """
+    job, name = stage.job, stage.name
+    if job.fresh:
+        return "absent", "", {}
+    path = job.path(name)
+    reason = store.why_not(path, key, name)
+    if not reason:
+        return "", "before", {}
+    claim.enter_context(job.cache.claimed(name, key))
+    figures = job.cache.fetch(name, key, path)
+    if figures is None:
+        check(name, key)
+        return reason, "", {}
+    return "", "by another run", figures

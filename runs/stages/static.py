@@ -16,20 +16,19 @@ from tireroad.fem.static.footprint import Footprint
 from tireroad.fem.static.load_error import UNKNOWN, load_error
 from tireroad.fem.static.load_steps import LoadStepper, with_cause
 from tireroad.fem.static.press import Near, place
-from tireroad.fem.static.state import StaticState, static_state
+from tireroad.fem.static.state import CordForce, StaticState, static_state
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.timing import Timing
-from tireroad.fem.tire.cord_forces import CordForce
 from tireroad.runs.files.store import put
 from tireroad.runs.process import console
 from tireroad.runs.process.mpi import on_root
-from tireroad.runs.stages import reuse
 from tireroad.runs.stages.stage import (
     Computed,
     Job,
     Record,
     checkpointed,
     forget_checkpoint,
+    forget_matrices,
     friction_of,
     road_shape,
     rolling_shape,
@@ -282,7 +281,7 @@ class StaticStage(Computed[StaticState]):
     def begin(self) -> None:
         """Discard the matrices of an earlier state."""
         if self.forgets:
-            reuse.forget()
+            forget_matrices()
 
     def end(self, key: str, product: StaticState) -> None:
         """Remove the last state of an earlier, failed run, and what resumes it. Collective."""

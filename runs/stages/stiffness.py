@@ -13,13 +13,13 @@ from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.matrices.road_stiffness import RoadStiffness, road_stiffness
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.friction_press import Slid, Slide
-from tireroad.fem.static.load_curve import CurvePoint, load_curve, slopes
 from tireroad.fem.static.load_steps import LoadStepper
+from tireroad.fem.static.press import CurvePoint, load_curve, slopes
 from tireroad.fem.static.state import StaticState
 from tireroad.runs.files.store import put
 from tireroad.runs.process import console
 from tireroad.runs.scene.tables.scene import deflections
-from tireroad.runs.stages.stage import Computed, Done, Job, Record, wheel_slip
+from tireroad.runs.stages.stage import Computed, Job, Record, Result, wheel_slip
 from tireroad.runs.stages.static import steady_rolling
 
 AXES = ("longitudinal", "lateral")
@@ -161,7 +161,7 @@ class StiffnessStage(Computed[Stiffness]):
     """The load curve from the undeformed tire, and the stiffness about the scene's own state."""
 
     name: ClassVar[str] = "stiffness"
-    static: Done[StaticState]
+    static: Result[StaticState]
 
     def inputs(self) -> dict:
         """The static state, which includes the wheel's slip, and the table [stiffness]."""

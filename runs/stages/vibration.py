@@ -14,7 +14,7 @@ from tireroad.greens.outputs import Surface, mean_square_velocity, radiated_powe
 from tireroad.runs.files.store import attribute, dataset
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.stages.spectra import Spectra
-from tireroad.runs.stages.stage import Done, Record
+from tireroad.runs.stages.stage import Record, Result
 from tireroad.runs.stages.whole_tire import Lines, PatchForces, WholeTire, replayed
 
 VELOCITY, POWER = 1e-9, 1e-12  # m/s, W: reference values of the levels, ISO 1683
@@ -59,8 +59,8 @@ class VibrationStage(WholeTire[Vibration]):
 
     name: ClassVar[str] = "vibration"
     kind: ClassVar[type] = Vibration
-    lines: Done[Lines | None]
-    spectra: Done[Spectra] | None = None
+    lines: Result[Lines | None]
+    spectra: Result[Spectra] | None = None
 
     def inputs(self) -> dict:
         """Also the spectra, which set the run-in and the model's frequency limit."""

@@ -25,7 +25,7 @@ from tireroad.runs.stages.contact_file import ContactHistory
 from tireroad.runs.stages.rolling import histories, of_given_forces, recursive
 from tireroad.runs.stages.setup import components, leaning, leaning_loads, probes
 from tireroad.runs.stages.spectra import Spectra
-from tireroad.runs.stages.stage import Computed, Done, Job, PipelinePart, Shared
+from tireroad.runs.stages.stage import Computed, Job, PipelinePart, Result, Shared
 
 _ROWS = 1024  # steps read at a time
 _AT_ONCE = 64  # coordinates transformed at a time, to save memory
@@ -111,10 +111,10 @@ P = TypeVar("P")
 class OfRun(PipelinePart[P]):
     """A part that takes the run's forces and states."""
 
-    static: Done[StaticState]
-    rotating: Done[RollingModes]
-    setup: Done[ContactSetup | None]
-    contact: Done[ContactHistory] | None = None
+    static: Result[StaticState]
+    rotating: Result[RollingModes]
+    setup: Result[ContactSetup | None]
+    contact: Result[ContactHistory] | None = None
 
     @property
     def band(self) -> float:
@@ -149,7 +149,7 @@ class LinesOfRun(OfRun[Lines | None], Shared[Lines | None]):
     """Not the receptance times the forces of the window: what rings at its start is part of it."""
 
     name: ClassVar[str] = "lines"
-    spectra: Done[Spectra] | None = None
+    spectra: Result[Spectra] | None = None
 
     def make(self) -> Lines | None:
         """On the root process, None on the others. Collective."""

@@ -15,7 +15,7 @@
 
 `samples` and `seed` belong to the latin hypercube. [slurm] holds options of sbatch (account,
 partition, time); [queue] names the template and the commands of another batch system
-(runs.sweep.local).
+(runs.sweep.command).
 """
 
 from __future__ import annotations

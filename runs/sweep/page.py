@@ -34,7 +34,7 @@ from tireroad.runs.report.figures import canvas, encode, styled
 from tireroad.runs.report.read import quantity
 from tireroad.runs.scene.load import with_modal
 from tireroad.runs.scene.resolved import dumps, literal
-from tireroad.runs.scene.source import parts
+from tireroad.runs.scene.schema import parts
 from tireroad.runs.search.journal import NAME, read_trials
 from tireroad.runs.search.settings import applied
 from tireroad.runs.sweep.definition import Member, Sweep

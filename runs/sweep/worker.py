@@ -21,9 +21,9 @@ def work() -> int:
     from mpi4py import MPI
 
     from tireroad.runs.cli import main
-    from tireroad.runs.stages import reuse
+    from tireroad.runs.stages import stage
 
-    reuse.begin()
+    stage.keep_matrices()
     status = DONE
     while status != STOPPED and (told := MPI.COMM_WORLD.bcast(_told())) is not None:
         signals.stop_on_signals()

@@ -9,14 +9,13 @@ from mpi4py import MPI
 from scipy import optimize, sparse
 from scipy.sparse.linalg import eigsh
 
-from tireroad.fem.axle import Axle
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import Material, compound
 from tireroad.fem.tire.mesh import Torus
-from tireroad.fem.turning import Turning
+from tireroad.fem.wheel import Axle, Turning
 from tireroad.greens.basis import Basis
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response, couple

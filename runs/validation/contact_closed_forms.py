@@ -45,19 +45,20 @@ from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.solver.stick_slip import BrushFriction, Carcass, SlidingStiffness, stick_slip
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import (
+    GridPlaces,
     Influence,
+    KernelTread,
     dense_compliance,
     half_space_compliance,
     half_space_influence,
     rectangle_potential,
     winkler_compliance,
 )
-from tireroad.contact.tread.kernel import GridPlaces, KernelTread
 from tireroad.contact.tread.memory import steady
 from tireroad.contact.tread.pattern import Pattern, pitch_starts
 from tireroad.contact.tread.shear import KernelShear, half_space_shear
 from tireroad.fem.errors import ConvergenceError
-from tireroad.fem.sections.grid import product
+from tireroad.fem.sections.mesh2d import product
 from tireroad.fem.sections.torus import Torus
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.friction_press import RubbingEquilibrium

@@ -18,8 +18,7 @@ from tireroad.contact.loop import roll
 from tireroad.contact.model import ContactSpec, step_solver
 from tireroad.contact.results.spectra import BAND, Distance, distance
 from tireroad.contact.setup import ContactSetup
-from tireroad.fem.transient.linear import FullTire, ModalDamping
-from tireroad.fem.transient.nonlinear import NonlinearTire
+from tireroad.fem.transient import FullTire, ModalDamping, NonlinearTire
 from tireroad.greens.coupling import Wheel
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response

@@ -7,7 +7,7 @@ from scipy import sparse
 
 from tireroad.fem.sections.inflated import InflatedRing, mean_over
 from tireroad.fem.sections.radial import BELT_ANGLE, STEEL, radial
-from tireroad.fem.turning import StrainEnergy, Turning
+from tireroad.fem.wheel import StrainEnergy, Turning
 from tireroad.runs import library
 from tireroad.runs.validation.tables import Table
 

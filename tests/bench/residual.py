@@ -15,7 +15,7 @@ from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.state import static_state
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
-from tireroad.fem.turning import Turning
+from tireroad.fem.wheel import Turning
 from tireroad.greens.coupling import Basis, Wheel, wheel_of
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import keep

@@ -89,7 +89,7 @@ def unknowns(folder: Path, meshes: tuple[Mesh, ...], modes: int) -> Table:
 
 
 def _size(folder: Path, mesh: Mesh, modes: int) -> list:
-    from tireroad.fem.matrices.direct import factorise, solve_columns
+    from tireroad.fem.matrices.compliance import factorise, solve_columns
 
     operators = prepared(folder, mesh, modes=modes).run.motions.operators
     stages = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["stages"]

@@ -12,8 +12,7 @@ from tireroad.contact.roads.kinds.shapes import Flat
 from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.tread.compliance import half_space_compliance
 from tireroad.fem.errors import ConvergenceError
-from tireroad.greens.convolution import Convolution
-from tireroad.greens.recursion import Recursion
+from tireroad.greens.recursion import Convolution, Recursion
 from tireroad.runs.validation.cases import RollingStrip, oval_patch
 
 PATCH = oval_patch((9, 7), (0.015, 0.02), 500.0)

@@ -34,7 +34,9 @@ def compile_one():
     print("compiled", flush=True)
 
 signals.stop_on_signals()
-sys.exit(mpi.guarded(MPI.COMM_WORLD, compile_one))
+with mpi.common_ending(MPI.COMM_WORLD) as end:
+    compile_one()
+sys.exit(end.status)
 """
 
 

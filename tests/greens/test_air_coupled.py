@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 from scipy import sparse
 
-from tireroad.fem.cavity.column import make_column
+from tireroad.fem.cavity import make_column
 from tireroad.fem.matrices import probe
 from tireroad.fem.matrices.operators import Operators, Support
 from tireroad.fem.matrices.rim_motion import rim_motion
@@ -16,7 +16,7 @@ from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
-from tireroad.fem.transient.linear import FullTire
+from tireroad.fem.transient import FullTire
 from tireroad.greens.coupling import Basis, Wheel
 from tireroad.greens.outputs import by_free_rim
 from tireroad.greens.recursion import Recursion

@@ -7,7 +7,8 @@ import pytest
 from mpi4py import MPI
 from scipy import sparse
 
-from tireroad.fem.matrices import direct, probe
+from tireroad.fem.matrices import compliance as compliance_module
+from tireroad.fem.matrices import probe
 from tireroad.fem.matrices.compliance import LoadedShapes, compliance, on_own_rows
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.static.equilibrium import Equilibrium
@@ -78,7 +79,7 @@ def test_fields_of_all_loads_are_never_held(tire, monkeypatch):
     """The flexibility of 200 loads, solved four at a time, takes a third of their fields at most, and is that of all fields."""
     operators, _, probes = tire
     few = sparse.identity(probes.shape[1], format="csr")[::7][:200]
-    monkeypatch.setattr(direct, "_CHUNK", 4)
+    monkeypatch.setattr(compliance_module, "_CHUNK", 4)
     tracemalloc.start()
     flexibility = compliance(operators, operators.stiffness, few, few)
     _, peak = tracemalloc.get_traced_memory()

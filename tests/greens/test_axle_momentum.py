@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 from scipy import sparse
 
-from tireroad.fem.turning import Turning
+from tireroad.fem.wheel import Turning
 from tireroad.greens.basis import Basis
 from tireroad.greens.coupling import with_left_out
 from tireroad.greens.outputs import by_momentum

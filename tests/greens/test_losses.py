@@ -15,7 +15,7 @@ from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound, power_law
 from tireroad.fem.tire.mesh import Region
-from tireroad.fem.transient.linear import FullTire, ModalDamping
+from tireroad.fem.transient import FullTire, ModalDamping
 from tireroad.greens.coupling import Basis, Wheel
 from tireroad.modal.basis import project
 from tireroad.modal.damping import StrainEnergy, beyond, rates, tail_growth

@@ -9,8 +9,7 @@ from scipy import linalg
 from systems import make
 
 from tireroad.fem.errors import InputError
-from tireroad.greens.convolution import Convolution
-from tireroad.greens.recursion import Recursion, marched
+from tireroad.greens.recursion import Convolution, Recursion, marched
 
 STEPS = 60
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from tireroad.fem.cavity import duct
-from tireroad.fem.cavity.duct import Gas, inflated
+from tireroad.fem import cavity
+from tireroad.fem.cavity import Gas, inflated
 from tireroad.modal.basis import Air
 from tireroad.modal.rotating import checks, rotating
 
@@ -19,11 +19,11 @@ def profile(depth=0.0, count=24, at=0.0, width=0.5):
     angle = 2 * np.pi * np.arange(t) / t
     distance = (angle - at + np.pi) % (2 * np.pi) - np.pi
     area = AREA * (1 - depth * np.exp(-((distance / width) ** 2)))
-    chi = duct.waves(count, angle) * 2 * np.pi / t
-    return duct.DuctProfile(chi.T @ (area * RADIUS), chi.T @ area), angle, area
+    chi = cavity.waves(count, angle) * 2 * np.pi / t
+    return cavity.DuctProfile(chi.T @ (area * RADIUS), chi.T @ area), angle, area
 
 
-def states(own: duct.Duct, speed: float):
+def states(own: cavity.Duct, speed: float):
     return rotating(*own.pencil(speed))
 
 
@@ -37,7 +37,7 @@ def test_gas_of_a_passenger_tire():
 @pytest.mark.parametrize("speed", [0.0, 80.0])
 def test_rigid_annulus_has_its_closed_form_rolling_too(speed):
     """f_n = n c / (2 pi r) +- n Omega / (2 pi), to 1e-9 (0.1 % is asked)."""
-    own = duct.modes(profile()[0], GAS, 1000.0, 0.0)
+    own = cavity.modes(profile()[0], GAS, 1000.0, 0.0)
     assert len(own.circular) == 8
     found = np.sort(states(own, speed).eigenvalue.imag)
     n = np.arange(1, 5)
@@ -49,7 +49,7 @@ def test_rigid_annulus_has_its_closed_form_rolling_too(speed):
 
 def test_a_wave_that_runs_with_the_wheel_carries_the_momentum_of_moving_air():
     """(1 + M) rho0 A v of a wave v whose density and Coriolis terms come with the flow: closed form."""
-    speed, own = 80.0, duct.modes(profile()[0], GAS, 300.0, 0.0)
+    speed, own = 80.0, cavity.modes(profile()[0], GAS, 300.0, 0.0)
     drag, stiffness = own.pencil(speed)
     values, vectors = linalg.eig(np.block([[0 * drag, np.eye(2)], [-stiffness, -drag]]))
     fast = np.argmax(values.imag)
@@ -82,9 +82,9 @@ def test_narrowed_duct_against_differences_and_first_order_split():
     given, _, _ = profile(depth=0.3)
     angle = 2 * np.pi * np.arange(2000) / 2000
     area = given.at(angle)[1]
-    own = duct.modes(given, GAS, 800.0, 0.0)
+    own = cavity.modes(given, GAS, 800.0, 0.0)
     assert own.circular[:6] == pytest.approx(differences(area), rel=1e-4)
-    small = duct.modes(profile(depth=0.03)[0], GAS, 300.0, 0.0)
+    small = cavity.modes(profile(depth=0.03)[0], GAS, 300.0, 0.0)
     shrunk = profile(depth=0.03)[0].area
     second = 2 * shrunk[3] / shrunk[0]
     split = np.diff(small.circular)[0] / small.circular.mean()
@@ -94,7 +94,7 @@ def test_narrowed_duct_against_differences_and_first_order_split():
 def test_pressure_on_the_enclosure_is_the_rate_of_momentum_of_the_air():
     """Standing: -rho0 int A v t ds and the closed surface's pressure integral have one set of numbers;
     a round duct's first pair carries rho0 V times the mean of its velocity, higher ones nothing."""
-    own = duct.modes(profile()[0], GAS, 1000.0, 0.0)
+    own = cavity.modes(profile()[0], GAS, 1000.0, 0.0)
     air_mass = GAS.density * 2 * np.pi * RADIUS * AREA
     assert np.linalg.norm(own.momentum[:, :2]) ** 2 == pytest.approx(air_mass, rel=1e-9)
     assert np.abs(own.momentum[:, 2:]).max() < 1e-9 * np.sqrt(air_mass)
@@ -107,8 +107,8 @@ def test_waves_far_above_the_band_add_their_mass_to_the_wall(n):
 
     Cut at the tire's highest mode, the air gave these motions no mass.
     """
-    own = duct.modes(profile()[0], GAS, None, 0.0)
-    assert len(own.circular) == 2 * duct.WAVES
+    own = cavity.modes(profile()[0], GAS, None, 0.0)
+    assert len(own.circular) == 2 * cavity.WAVES
     flux = np.zeros((49, 1))
     flux[2 * n - 1] = np.pi * RADIUS
     e, s = own.coupling(flux), 2j * np.pi * 80.0
@@ -121,7 +121,7 @@ def test_waves_far_above_the_band_add_their_mass_to_the_wall(n):
 def coupled(depth=0.2, m=6, seed=4):
     """A tire of m modes in the narrowed duct, its flux of the size of a passenger tire's."""
     rng = np.random.default_rng(seed)
-    own = duct.modes(profile(depth)[0], GAS, 1000.0, 0.0)
+    own = cavity.modes(profile(depth)[0], GAS, 1000.0, 0.0)
     flux = rng.normal(size=(49, m)) * 0.02 / (1 + np.arange(49))[:, None]
     skew = rng.normal(size=(m, m))
     squares = (2 * np.pi * np.linspace(60, 300, m)) ** 2
@@ -175,7 +175,7 @@ def test_energy_is_kept_standing_and_only_the_turning_wheel_feeds_it():
 
 def test_one_mode_and_the_air_veer_as_two_oscillators_do():
     """A mode of the tire near the air's first pair: 2 x 2 closed form of two coupled oscillators."""
-    own = duct.modes(profile()[0], GAS, 300.0, 0.0)
+    own = cavity.modes(profile()[0], GAS, 300.0, 0.0)
     flux = np.zeros((49, 1))
     flux[1] = 0.01  # a cos theta
     found = Air(own, own.coupling(flux))
@@ -190,7 +190,7 @@ def test_one_mode_and_the_air_veer_as_two_oscillators_do():
 
 def test_losses_turn_with_the_wheel_and_walls_take_what_kirchhoff_says():
     """A loss of the body rate shifts the states by n Omega and damps each alike at any speed."""
-    own = duct.modes(profile()[0], GAS, 1000.0, 0.02)
+    own = cavity.modes(profile()[0], GAS, 1000.0, 0.02)
     rest, turning = (states(own, speed) for speed in (0.0, 60.0))
     assert np.sort(rest.eigenvalue.real) == pytest.approx(
         np.sort(turning.eigenvalue.real), rel=1e-8

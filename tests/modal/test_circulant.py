@@ -8,8 +8,7 @@ from scipy import sparse
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.modal.solver import undamped
-from tireroad.modal.solver.circulant import repeated
-from tireroad.modal.solver.symmetry import DofPositions
+from tireroad.modal.solver.symmetry import DofPositions, repeated
 
 COMM = MPI.COMM_WORLD
 

@@ -9,17 +9,17 @@ from scipy import sparse
 from steel_cords import cords
 
 from tireroad.fem.matrices import probe
-from tireroad.fem.matrices.direct import solve_all
+from tireroad.fem.matrices.compliance import solve_all
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.model import SmallMotions, TireModel
-from tireroad.fem.sections.grid import PlyLine
+from tireroad.fem.sections.mesh2d import PlyLine
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.state import static_state
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.mesh import compounds
-from tireroad.fem.turning import Turning
+from tireroad.fem.wheel import Turning
 from tireroad.greens.basis import Basis
 from tireroad.greens.coupling import wheel_of
 from tireroad.modal.basis import project

@@ -14,7 +14,7 @@ from tireroad.contact.roads.kinds.laser import LaserFile
 from tireroad.contact.roads.kinds.measured import GridFile
 from tireroad.contact.roads.road import RoadKind
 from tireroad.fem.errors import InputError
-from tireroad.runs.scene.road_rules import made
+from tireroad.runs.scene.rules import made
 from tireroad.runs.stages.pipeline import share
 
 COMM = MPI.COMM_WORLD

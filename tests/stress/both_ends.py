@@ -2,9 +2,10 @@
 
     PYTHONPATH=.:tests:tests/stress python3 -P tests/stress/both_ends.py --limit 60
 
-Each value is laid over the first scene that `check` accepts with it, on a small mesh. Allowed ends: exit status 0
-with results that are numbers, 2 or 3 with a message; never a traceback; memory within the estimate. A run that
-takes longer than the limit is stopped: that must end it, too. `--only NAME` takes the keys that begin so.
+Each value is laid over the first scene that `check` accepts with it, on a small mesh. Allowed ends:
+exit status 0 with results that are numbers, 2 or 3 with a message; never a traceback; memory within
+the estimate. A run that takes longer than the limit is stopped: that must end it, too. `--only
+NAME` takes the keys that begin so.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from scene_makers import BASES, SIZES, needed, write_files
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.check import explain
 from tireroad.runs.scene.load import load
-from tireroad.runs.scene.road_rules import made
+from tireroad.runs.scene.rules import made
 from tireroad.runs.scene.schema import walk
 from tireroad.runs.scene.tables.scene import Scene
 

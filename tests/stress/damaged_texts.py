@@ -2,7 +2,8 @@
 
     PYTHONPATH=.:tests:tests/stress:tests/fem/decks python3 -P tests/stress/damaged_texts.py --count 3000 --seed 7
 
-Allowed ends: what the reader makes of it, or an InputError. `test_mutant_decks.py` runs a short form for decks.
+Allowed ends: what the reader makes of it, or an InputError. `test_mutant_decks.py` runs a short
+form for decks.
 """
 
 from __future__ import annotations
@@ -68,7 +69,7 @@ def _new_forms() -> Iterator[tuple[str, bytes, Callable[[Path], object]]]:
     from torus_decks import RUBBER, Torus, plain
 
     from tireroad.fem.decks.history import history
-    from tireroad.runs.fit.figures import read as read_figures
+    from tireroad.runs.fit import read as read_figures
     from tireroad.tests.fem.decks.test_instances import belted, parted
     from tireroad.tests.runs.fit.test_fit import TIR
     from tireroad.tests.runs.report.test_tire_file import REVOLVE

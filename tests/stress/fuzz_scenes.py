@@ -28,7 +28,7 @@ from in_child import judged as ended
 from scene_makers import BASES, damaged, overrides, write_files
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.process.mpi import judged
+from tireroad.runs.process.mpi import ending
 from tireroad.runs.scene.check import explain
 from tireroad.runs.scene.load import load
 
@@ -79,10 +79,11 @@ def fuzz_check(folder: Path, seed: int, number: int) -> tuple[str, str]:
         changed = overrides(rng, rng.random() < 0.5, focus)
 
     def run() -> str:
-        status, message = judged(lambda: explain(load(path, changed)))
-        if status not in (0, 2):
-            return f"crash {status} {message}"
-        return f"exit {status}" if len(message) < 20_000 else "crash: endless message"
+        with ending() as end:
+            explain(load(path, changed))
+        if end.status not in (0, 2):
+            return f"crash {end.status} {end.message}"
+        return f"exit {end.status}" if len(end.message) < 20_000 else "crash: endless message"
 
     return limited(run), f"{name} {changed}"
 

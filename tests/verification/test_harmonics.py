@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tireroad.fem.sections.grid import PlyLine
+from tireroad.fem.sections.mesh2d import PlyLine
 from tireroad.runs.validation.cases import thesis_torus
 from tireroad.tests.bench.parts.harmonics import Membrane, Rubber, frequencies
 

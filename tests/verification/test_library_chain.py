@@ -22,7 +22,7 @@ from tireroad.fem.static.press import press
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
-from tireroad.fem.turning import Turning
+from tireroad.fem.wheel import Turning
 from tireroad.greens.coupling import wheel_of
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.responses import make_response

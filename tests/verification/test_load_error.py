@@ -1,18 +1,24 @@
 """The estimated error of the load against a sequence that converges.
 
-Soft torus, 0.2 MPa, road at z = -0.3184244 m, 4 mm above first touch: 30 x 14 elements of order 3, those at the
-footprint cut in two once and twice, carry 531.50, 532.26, 532.59 N, so 532.8 N (0.1 %) in the limit.
+Soft torus, 0.2 MPa, road at z = -0.3184244 m, 4 mm above first touch: 30 x 14 elements of order 3,
+those at the footprint cut in two once and twice, carry 531.50, 532.26, 532.59 N, so 532.8 N (0.1 %)
+in the limit.
 """
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
-from tireroad.fem.sections.split import split_ring
 from tireroad.fem.static import load_error as of_load
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.footprint import Footprint
-from tireroad.fem.static.load_error import ENOUGH, LoadError, at_finer_footprint, load_error
+from tireroad.fem.static.load_error import (
+    ENOUGH,
+    LoadError,
+    at_finer_footprint,
+    load_error,
+    split_ring,
+)
 from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.state import static_state
 from tireroad.fem.static.virtual_work import AT_REST, Rolling

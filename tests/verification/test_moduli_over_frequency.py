@@ -12,7 +12,7 @@ from scipy.sparse import linalg
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.operators import Operators
-from tireroad.fem.sections.grid import PlyLine
+from tireroad.fem.sections.mesh2d import PlyLine
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.cords import Cords

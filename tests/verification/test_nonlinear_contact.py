@@ -17,8 +17,7 @@ from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.state import static_state
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
-from tireroad.fem.transient.linear import FullTire
-from tireroad.fem.transient.nonlinear import NonlinearTire
+from tireroad.fem.transient import FullTire, NonlinearTire
 from tireroad.runs.validation.cases import thesis_torus
 
 INFLATION, STEP = 2e5, 2e-4

@@ -9,13 +9,11 @@ from typing import Any
 import numpy as np
 
 from tireroad.contact.results.band import USABLE
-from tireroad.contact.roads.placement import Placement
 from tireroad.contact.roads.road import ROADS, RoadKind
-from tireroad.contact.roads.under_tire import Motion
-from tireroad.fem.axle import DIRECTIONS, Axle
+from tireroad.contact.roads.under_tire import Motion, Placement
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Key, Limits, OnlyFor, described, finite, parameter, text
-from tireroad.fem.turning import SHAPE_TOLERANCE
+from tireroad.fem.wheel import DIRECTIONS, SHAPE_TOLERANCE, Axle
 from tireroad.runs.scene.outputs import OUTPUTS, Output
 from tireroad.runs.scene.schema import (
     Collects,

@@ -2,7 +2,7 @@
 
 Base of the kinds of section: own keys, and the resulting ring of elements, compounds and cords.
 
-A new kind is one file in runs.scene.sections.kinds, or a class in a user's script. The scene's
+A new kind is one file in runs.scene.sections, or a class in a user's script. The scene's
 keys, `check`, the key reference and the range tests derive from it.
 """
 
@@ -16,9 +16,10 @@ import numpy as np
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Limits, Parameters, Registry, numbers
-from tireroad.fem.sections.ring import SIZE
+from tireroad.fem.sections.mesh2d import SIZE
 from tireroad.fem.tire.material import CONSTANT, MATERIALS, MaterialLaw, Spectrum, power_law, prony
 from tireroad.runs.scene.schema import (
+    Source,
     Variants,
     choice,
     integer,
@@ -30,11 +31,9 @@ from tireroad.runs.scene.schema import (
     variant,
     vector,
 )
-from tireroad.runs.scene.source import Source
 
 if TYPE_CHECKING:
-    from tireroad.fem.sections.mesh2d import SectionMesh
-    from tireroad.fem.sections.ring import Ring
+    from tireroad.fem.sections.mesh2d import Ring, SectionMesh
     from tireroad.fem.tire.cords import Cords
     from tireroad.fem.tire.material import Material
 
@@ -153,9 +152,7 @@ class SectionKind(Parameters):
         return []
 
 
-SECTIONS: Registry[SectionKind] = Registry(
-    "section", "tireroad.runs.scene.sections.kinds", SectionKind
-)
+SECTIONS: Registry[SectionKind] = Registry("section", "tireroad.runs.scene.sections", SectionKind)
 section_kind = SECTIONS.register
 
 

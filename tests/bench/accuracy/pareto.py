@@ -121,7 +121,7 @@ def _choices(
 def _full(given: Prepared, exact: FullHistory, mesh: str, step: float) -> Choice:
     """All degrees of freedom of the same mesh, integrated in time."""
     from tireroad.fem.matrices.probe import nodes
-    from tireroad.fem.transient.linear import FullTire
+    from tireroad.fem.transient import FullTire
     from tireroad.modal.damping import StrainEnergy
 
     console.say(f"  full finite elements, {step:g} s ...")

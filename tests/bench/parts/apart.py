@@ -57,7 +57,8 @@ def _answered(asked: Path, answer: Path) -> None:
 
 if __name__ == "__main__":
     signals.stop_on_signals()
-    status, message = mpi.judged(lambda: _answered(*map(Path, sys.argv[1:])))
-    if message:
-        print(message, file=sys.stderr)
-    sys.exit(status)
+    with mpi.ending() as end:
+        _answered(*map(Path, sys.argv[1:]))
+    if end.message:
+        print(end.message, file=sys.stderr)
+    sys.exit(end.status)

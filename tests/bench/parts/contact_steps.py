@@ -12,8 +12,7 @@ from tireroad.contact.loop import Drive, LinearTire, roll
 from tireroad.contact.roads.kinds.shapes import Flat
 from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.tread.compliance import half_space_compliance
-from tireroad.greens.convolution import Convolution
-from tireroad.greens.recursion import Recursion
+from tireroad.greens.recursion import Convolution, Recursion
 from tireroad.runs.validation.cases import RollingStrip, oval_patch
 from tireroad.runs.validation.tables import Table
 from tireroad.tests.bench.parts.contact_points import median

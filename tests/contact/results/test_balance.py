@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from tireroad.contact.results.energy import StateMotion, Work, energy_left, springs
-from tireroad.fem.turning import Turning
+from tireroad.fem.wheel import Turning
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import couple
 from tireroad.modal.basis import ModalBasis, Projection

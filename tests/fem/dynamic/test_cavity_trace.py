@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from tireroad.fem.cavity import duct
-from tireroad.fem.cavity.column import CavityTrace, _bead_ends, rim_cone
-from tireroad.fem.cavity.duct import inflated
+from tireroad.fem import cavity
+from tireroad.fem.cavity import CavityTrace, _bead_ends, inflated, rim_cone
 from tireroad.fem.matrices.operators import Operators, Support, rigid_motions
 
 R, B, HALF = 0.22, 0.088, np.radians(120)  # centre circle and inner radius of the torus of conftest
@@ -87,7 +86,7 @@ def test_wall_and_rim_together_obey_gauss(make_body):
     motions = np.vstack([rigid[unknowns.free], np.linalg.inv(unknowns.rim.coordinates)])
     closed = trace.columns(unknowns).T @ motions
     fine = CavityTrace(body, 12).profile()
-    expected = duct.momentum_of_waves(fine)[:, :9]
+    expected = cavity.momentum_of_waves(fine)[:, :9]
     assert pytest.approx(expected, abs=1e-3 * np.abs(expected).max()) == closed[:, :3].T
     assert np.abs(closed[0]).max() < 1e-6 * np.abs(closed).max()
 
@@ -106,7 +105,7 @@ def test_a_tire_175_to_205_wide_has_its_first_pair_near_223_hz(make_body):
     """The torus inside: n c / (2 pi r) with r its own centroid's distance, 0.1 %."""
     area, moment = segment()
     profile = CavityTrace(make_body(segments=24, arc=10), 12).profile()
-    own = duct.modes(profile, AIR, 500.0)
+    own = cavity.modes(profile, AIR, 500.0)
     expected = AIR.sound_speed * area / moment / (2 * np.pi)
     assert own.frequency[:2] == pytest.approx([expected, expected], rel=1e-3)
 

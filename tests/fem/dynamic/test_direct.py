@@ -6,7 +6,7 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from tireroad.fem.errors import ConvergenceError
-from tireroad.fem.matrices.direct import factorise, solve_all, solve_columns, solve_parts
+from tireroad.fem.matrices.compliance import factorise, solve_all, solve_columns, solve_parts
 
 
 def chain(stiffness: float) -> tuple[PETSc.Mat, sparse.csr_matrix]:

@@ -6,7 +6,7 @@ from mpi4py import MPI
 from turning_torus import DAMPING, inflated, pulse
 
 from tireroad.fem.matrices.compliance import compliance, rotating_stiffness
-from tireroad.fem.transient.linear import FullTire
+from tireroad.fem.transient import FullTire
 
 
 @pytest.fixture(scope="module")

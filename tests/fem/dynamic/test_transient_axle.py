@@ -6,11 +6,11 @@ from mpi4py import MPI
 from scipy import sparse
 from turning_torus import DAMPING, inflated, pulse
 
-from tireroad.fem.axle import Axle
 from tireroad.fem.matrices import probe
 from tireroad.fem.matrices.rim_motion import rim_motion
 from tireroad.fem.static.virtual_work import AT_REST
-from tireroad.fem.transient.linear import FullTire
+from tireroad.fem.transient import FullTire
+from tireroad.fem.wheel import Axle
 
 
 def on_axle(comm, axle, speed, step=2e-4, steps=60, load=(0.3, 0.1, 1.0)):

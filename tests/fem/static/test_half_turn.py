@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from tireroad.fem.sections.grid import PlyLine
+from tireroad.fem.sections.mesh2d import PlyLine
 from tireroad.fem.static import load_steps
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.load_steps import LoadStepper

@@ -6,12 +6,12 @@ from mpi4py import MPI
 from scipy import sparse
 
 from tireroad.fem.errors import InputError
-from tireroad.fem.matrices.direct import solve_all
+from tireroad.fem.matrices.compliance import solve_all
 from tireroad.fem.matrices.operators import Operators, rigid_motions
 from tireroad.fem.matrices.road_stiffness import road_stiffness
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.load_curve import load_curve, slopes
 from tireroad.fem.static.load_steps import LoadStepper
+from tireroad.fem.static.press import load_curve, slopes
 
 pytestmark = pytest.mark.slow
 

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from tireroad.fem.matrices.compliance import on_own_rows, rotating_stiffness
-from tireroad.fem.matrices.direct import solve_all
+from tireroad.fem.matrices.compliance import on_own_rows, rotating_stiffness, solve_all
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.matrices.probe import nodes
 from tireroad.fem.static.equilibrium import Equilibrium

@@ -6,7 +6,7 @@ from mpi4py import MPI
 from scipy import sparse
 from scipy.sparse.linalg import eigs
 
-from tireroad.fem.static import shape_damping
+from tireroad.fem.static import equilibrium as equilibrium_module
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.friction_press import Friction
 from tireroad.fem.static.load_steps import LoadStepper
@@ -55,8 +55,8 @@ TILTED = RoadShape(camber=np.radians(2.0))
 def test_the_state_is_that_of_the_complete_tangent(make_body, monkeypatch, road) -> None:
     """Close to the most damping that the tangent does without: nearly half of an error remains."""
     found = []
-    for weak in (shape_damping._WEAK, 0.0):
-        monkeypatch.setattr(shape_damping, "_WEAK", weak)
+    for weak in (equilibrium_module._WEAK, 0.0):
+        monkeypatch.setattr(equilibrium_module, "_WEAK", weak)
         equilibrium = problem(make_body, 1.2e-3, road, MPI.COMM_WORLD)
         assert (equilibrium.lag > 0.5) == (weak > 0)
         loader = LoadStepper(equilibrium, lambda progress: None)
@@ -76,8 +76,8 @@ def test_what_a_step_with_friction_gains_is_that_of_the_complete_tangent(
 ) -> None:
     """Horizontal forces after a small change of the travel per radian."""
     found = []
-    for weak in (shape_damping._WEAK, 0.0):
-        monkeypatch.setattr(shape_damping, "_WEAK", weak)
+    for weak in (equilibrium_module._WEAK, 0.0):
+        monkeypatch.setattr(equilibrium_module, "_WEAK", weak)
         loader = LoadStepper(problem(make_body, 1.2e-3), lambda progress: None)
         loader.inflate(2e5)
         friction = Friction(coefficient=0.5, radius=0.31, slip=(0.01, 0.005))

@@ -10,11 +10,11 @@ from steel_cords import STEEL, cords
 from wheel_shapes import cylinder
 
 from tireroad.fem import compat
-from tireroad.fem.sections.grid import PlyLine
+from tireroad.fem.sections.mesh2d import PlyLine
 from tireroad.fem.sections.torus import Torus
+from tireroad.fem.static.state import cord_forces
 from tireroad.fem.static.virtual_work import tangent
 from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.cord_forces import cord_forces
 from tireroad.fem.tire.material import compound
 
 

@@ -15,10 +15,10 @@ from wheel_shapes import cylinder
 from tireroad.fem import compat
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.operators import ROTATION, Operators
-from tireroad.fem.sections.grid import PlyLine
+from tireroad.fem.sections.mesh2d import PlyLine
 from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.state import cord_forces
 from tireroad.fem.static.virtual_work import Rolling, static_residual, tangent
-from tireroad.fem.tire.cord_forces import cord_forces
 from tireroad.fem.tire.plies import Face
 
 

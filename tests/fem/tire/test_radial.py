@@ -11,7 +11,7 @@ from tireroad.fem.sections.construction import Outline, arcs
 from tireroad.fem.sections.radial import GROOVES, MOST_GROOVES, radial, size
 from tireroad.fem.sections.section_file import read
 from tireroad.runs.scene.schema import key_of
-from tireroad.runs.scene.sections.kinds.radial import RadialSection
+from tireroad.runs.scene.sections.radial import RadialSection
 
 FILE = """
 unit = "mm"

@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from tireroad.fem.errors import LoadingStopped
-from tireroad.fem.sections.grid import PlyLine
+from tireroad.fem.sections.mesh2d import PlyLine
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.symmetric import AxisymmetricEquilibrium

@@ -7,7 +7,7 @@ import pytest
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections import mesh2d
-from tireroad.fem.sections.grid import PlyLine, RegionPatch, corners
+from tireroad.fem.sections.mesh2d import PlyLine, RegionPatch, corners
 from tireroad.fem.sections.torus import Torus
 from tireroad.runs.validation.cases import thesis_torus
 

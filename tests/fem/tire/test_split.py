@@ -5,7 +5,7 @@ import pytest
 
 from tireroad.fem.sections import mesh2d
 from tireroad.fem.sections.radial import radial
-from tireroad.fem.sections.split import split_ring, split_section
+from tireroad.fem.static.load_error import split_ring, split_section
 from tireroad.runs.validation.cases import thesis_torus
 
 

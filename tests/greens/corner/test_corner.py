@@ -8,7 +8,6 @@ import pytest
 from mpi4py import MPI
 from scipy import sparse
 
-from tireroad.fem.axle import Axle
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices import probe
 from tireroad.fem.matrices.compliance import on_own_rows
@@ -19,7 +18,7 @@ from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
-from tireroad.fem.turning import Turning
+from tireroad.fem.wheel import Axle, Turning
 from tireroad.greens.basis import Basis
 from tireroad.greens.coupling import Wheel
 from tireroad.greens.outputs import disagreement

@@ -7,7 +7,6 @@ from scipy import sparse
 from test_corner import COMM, DAMPING, FREQUENCY, SPOTS, body, loads, places, wheel
 
 from tireroad.fem import compat
-from tireroad.fem.axle import Axle
 from tireroad.fem.matrices.operators import FIXED, Operators
 from tireroad.fem.matrices.rim_motion import rim_motion
 from tireroad.fem.static.virtual_work import (
@@ -18,7 +17,7 @@ from tireroad.fem.static.virtual_work import (
     static_residual,
     tangent,
 )
-from tireroad.fem.turning import Turning
+from tireroad.fem.wheel import Axle, Turning
 from tireroad.greens.basis import Basis
 from tireroad.greens.coupling import Wheel
 from tireroad.greens.recursion import Recursion

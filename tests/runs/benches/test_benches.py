@@ -6,7 +6,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from tireroad.runs.scene.sections.kinds import torus
+from tireroad.runs.scene.sections import torus
 from tireroad.runs.search.journal import Trial
 from tireroad.runs.search.settings import CAUSES, Settings
 from tireroad.runs.validation import tables

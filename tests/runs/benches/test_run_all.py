@@ -6,7 +6,7 @@ import os
 import pytest
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.process.mpi import judged
+from tireroad.runs.process.mpi import ending
 from tireroad.runs.process.signals import STOPPED, Stopped
 from tireroad.runs.validation import tables
 from tireroad.runs.validation.tables import Table
@@ -23,14 +23,14 @@ def test_a_stop_says_what_is_kept(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(tables, "modules", lambda package: {"done": done, "late": late})
     out = tmp_path / "not yet" / "out.json"
     for at, told in ((out, f"kept are done in {out}; "), (None, "nothing is kept; with --out")):
-        status, text = judged(lambda at=at: tables.run_all("tireroad.tests.bench", [], at))
-        assert status == STOPPED and f"stopped by SIGTERM: {told}" in text
+        with ending() as end:
+            tables.run_all("tireroad.tests.bench", [], at)
+        assert end.status == STOPPED and f"stopped by SIGTERM: {told}" in end.message
     assert list(json.loads(out.read_text())["results"]) == ["done"]
     out.with_suffix(".kept").mkdir()
-    assert (
-        "the same command continues"
-        in judged(lambda: tables.run_all("tireroad.tests.bench", [], out))[1]
-    )
+    with ending() as end:
+        tables.run_all("tireroad.tests.bench", [], out)
+    assert "the same command continues" in end.message
 
 
 @pytest.mark.parametrize("name", ["page.html", ".", "file/out.json", "pipe"])

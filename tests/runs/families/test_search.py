@@ -15,7 +15,7 @@ from tireroad.runs.process import console
 from tireroad.runs.process.signals import Stopped
 from tireroad.runs.scene.estimate import estimate
 from tireroad.runs.scene.load import load
-from tireroad.runs.scene.sections.kinds import torus
+from tireroad.runs.scene.sections import torus
 from tireroad.runs.search import search as searching
 from tireroad.runs.search.journal import ErrorsByCause, SearchJournal, Trial, to_resume, worst
 from tireroad.runs.search.search import Search

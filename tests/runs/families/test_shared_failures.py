@@ -10,8 +10,7 @@ from mpi4py import MPI
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.runs.files.cache import NO_CACHE
-from tireroad.runs.stages import obtained as stages_obtained
-from tireroad.runs.stages.obtained import obtained
+from tireroad.runs.stages.stage import FAILURES
 
 
 class Folding:
@@ -36,19 +35,19 @@ class Folding:
 
 def messages(folder: Path, monkeypatch) -> tuple[list[str], list[str]]:
     """What three members say, the last of another load, and which of them tried."""
-    monkeypatch.setattr("tireroad.runs.stages.obtained.solver_settings", lambda name, scene: "")
+    monkeypatch.setattr("tireroad.runs.stages.stage.solver_settings", lambda name, scene: "")
     tried: list[str] = []
     said = []
     for scene, load in (("one", 6e4), ("two", 6e4), ("three", 7e4)):
         with pytest.raises(ConvergenceError) as caught:
-            obtained(Folding(folder, scene, load, tried))
+            Folding(folder, scene, load, tried).result()
         said.append(str(caught.value))
     return said, tried
 
 
 def test_a_failure_is_told_to_the_members_with_the_same_inputs(tmp_path, monkeypatch) -> None:
     """Three members of one static state failed after two minutes each."""
-    monkeypatch.setenv(stages_obtained.VARIABLE, str(tmp_path))
+    monkeypatch.setenv(FAILURES, str(tmp_path))
     said, tried = messages(tmp_path, monkeypatch)
     assert tried == ["one", "three"]
     assert said[0] == said[2] == "static: it folds"
@@ -56,6 +55,6 @@ def test_a_failure_is_told_to_the_members_with_the_same_inputs(tmp_path, monkeyp
 
 
 def test_a_run_by_itself_tries_again(tmp_path, monkeypatch) -> None:
-    monkeypatch.delenv(stages_obtained.VARIABLE, raising=False)
+    monkeypatch.delenv(FAILURES, raising=False)
     said, tried = messages(tmp_path, monkeypatch)
     assert tried == ["one", "two", "three"] and set(said) == {"static: it folds"}

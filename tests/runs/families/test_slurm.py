@@ -14,7 +14,7 @@ from tires import soft_torus
 
 import tireroad
 from tireroad.fem.errors import ConvergenceError, InputError
-from tireroad.runs.sweep.local import Queue, _directives, _environment
+from tireroad.runs.sweep.command import Queue, _directives, _environment
 
 pytestmark = pytest.mark.slow
 

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from tireroad.runs.sweep import local
+from tireroad.runs.sweep import command
 from tireroad.runs.sweep.definition import Member
 
 STAND_IN = """
@@ -32,13 +32,13 @@ def test_a_worker_takes_members_until_it_crashes(tmp_path, monkeypatch, at_a_tim
     script.write_text(STAND_IN)
     began.mkdir()
     monkeypatch.setattr(
-        local, "_program", lambda sweep, *_: [sys.executable, str(script), str(began)]
+        command, "_program", lambda sweep, *_: [sys.executable, str(script), str(began)]
     )
-    monkeypatch.setattr(local, "_LOOK", 0.02)
+    monkeypatch.setattr(command, "_LOOK", 0.02)
     names = "one", "fails", "crashes", "last"
     members = tuple(Member(name, {}) for name in names)
     sweep = SimpleNamespace(members=members, processes=1, scene=Path("base.toml"))
-    ended = local.run(sweep, tmp_path, at_a_time)
+    ended = command.run(sweep, tmp_path, at_a_time)
     assert [one.member.name for one in ended] == list(names)
     assert [one.status for one in ended] == [0, 3, -11, 0]
     assert ended[1].said == "this was fails" and "a bug" in ended[2].line

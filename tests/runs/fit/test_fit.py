@@ -9,10 +9,9 @@ import pytest
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections.inflated import InflatedRing
+from tireroad.runs import fit as fitting
 from tireroad.runs.cli import main
-from tireroad.runs.fit import fit as fitting
-from tireroad.runs.fit.figures import KINDS, FitFigures, read
-from tireroad.runs.fit.fit import Model, construction, fit, report, tire_table
+from tireroad.runs.fit import KINDS, FitFigures, Model, construction, fit, read, report, tire_table
 from tireroad.runs.scene.load import load
 
 FACTORS = {"density": 0.9, "sidewall": 0.7, "apex": 0.5, "carcass": 0.8}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tireroad.runs.cli import main
-from tireroad.runs.fit.figures import read, tir_values
+from tireroad.runs.fit import read, tir_values
 
 SCENE = """[tire]
 section = "radial"

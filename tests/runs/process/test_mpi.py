@@ -37,7 +37,9 @@ cases = {
     "wait": lambda: (print("begun", flush=True), time.sleep(60)),
 }
 signals.stop_on_signals()
-sys.exit(mpi.guarded(comm, cases[sys.argv[1]]))
+with mpi.common_ending(comm) as end:
+    cases[sys.argv[1]]()
+sys.exit(end.status)
 """
 
 

@@ -13,7 +13,7 @@ from tireroad.contact.roads.road import ROADS
 from tireroad.contact.roads.under_tire import mean_profile_depth, texture_of
 from tireroad.fem.errors import InputError
 from tireroad.runs.cli import main
-from tireroad.runs.report.road_figure import describe_road, iso_class
+from tireroad.runs.report.input_file import describe_road, iso_class
 
 
 def test_a_grid_and_a_line(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:

@@ -5,7 +5,7 @@ import pytest
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.image import imread
 
-from tireroad.fem.sections.grid import PlyLine
+from tireroad.fem.sections.mesh2d import PlyLine
 from tireroad.runs.report.section_figure import draw_section, save_section
 from tireroad.runs.validation.cases import thesis_torus
 

@@ -11,7 +11,7 @@ import pytest
 from tireroad.fem.decks.history import history
 from tireroad.fem.errors import InputError
 from tireroad.runs.cli import main
-from tireroad.runs.report.tire_file import describe_tire
+from tireroad.runs.report.input_file import describe_tire
 from tireroad.runs.scene.load import load
 
 DECKS = Path(__file__).parents[2] / "fem" / "decks"

@@ -15,7 +15,7 @@ from tireroad.fem.errors import InputError
 from tireroad.runs.cli import main
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.resolved import dumps
-from tireroad.runs.scene.sections.kinds.file import fingerprint, own_section
+from tireroad.runs.scene.sections.file import fingerprint, own_section
 
 TIRE = """
 [tire]
@@ -135,7 +135,7 @@ def test_messages(folder, add, message):
 
 def test_materials_of_the_scene(folder):
     """[[tire.region]] by name replaces the file's compound, [[tire.cords]] by name its cords."""
-    from tireroad.runs.scene.sections.kinds.file import own_cords, own_materials
+    from tireroad.runs.scene.sections.file import own_cords, own_materials
 
     (folder / "own.toml").write_text(
         TIRE + '[[tire.region]]\nname = "wall"\ndynamic = 1.4\nloss_factor = 0.1\n'
@@ -156,7 +156,7 @@ def test_materials_of_the_scene(folder):
 
 def test_a_compound_without_losses_of_its_own_has_those_of_the_tire(folder):
     """They were dropped without a word, and a run, whose damping was taken to be theirs, crashed."""
-    from tireroad.runs.scene.sections.kinds.file import own_materials
+    from tireroad.runs.scene.sections.file import own_materials
 
     (folder / "own.toml").write_text(TIRE)
     tire = load(folder / "own.toml", ["tire.loss_factor=0.2", "tire.dynamic=1.3"]).tire

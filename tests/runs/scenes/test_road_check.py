@@ -8,7 +8,7 @@ import pytest
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.check import explain
 from tireroad.runs.scene.load import load
-from tireroad.runs.scene.road_rules import foot
+from tireroad.runs.scene.rules import foot
 
 SCENE = """
 [static]

@@ -193,7 +193,7 @@ def test_names_of_parts_are_matched_in_any_case(tmp_path):
 
 def test_the_ring_of_a_file_is_made_once(tmp_path, monkeypatch):
     """However often sizes are asked for; anew when the file, the order or the elements change."""
-    from tireroad.runs.scene.sections.kinds import file
+    from tireroad.runs.scene.sections import file
 
     made = []
     revolved = file._revolved
@@ -214,8 +214,8 @@ def test_the_ring_of_a_file_is_made_once(tmp_path, monkeypatch):
 
 def test_a_section_file_is_a_tire(tmp_path):
     """Compounds and cords by name, of the order asked for; the hash changes with the drawing."""
-    from tireroad.fem.sections.ring import wall_thickness
-    from tireroad.runs.scene.sections.kinds.file import fingerprint, own_cords, own_materials
+    from tireroad.fem.sections.mesh2d import wall_thickness
+    from tireroad.runs.scene.sections.file import fingerprint, own_cords, own_materials
 
     drawing = tmp_path / "section.toml"
     drawing.write_text(DRAWING)

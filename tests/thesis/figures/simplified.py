@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from tireroad.fem.transient.linear import FullTire
+from tireroad.fem.transient import FullTire
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.greens.responses import make_response

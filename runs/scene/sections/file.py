@@ -11,7 +11,7 @@ import numpy as np
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import choice, filename, flag, number, text, texts
-from tireroad.runs.scene.source import Source
+from tireroad.runs.scene.schema import Source
 from tireroad.runs.scene.tables.tire import (
     Proportions,
     SectionKind,
@@ -27,8 +27,7 @@ from tireroad.runs.scene.tables.tire import (
 if TYPE_CHECKING:
     from tireroad.fem.decks.compounds import Rubber
     from tireroad.fem.decks.own import OwnSection, Wishes
-    from tireroad.fem.sections.mesh2d import SectionMesh
-    from tireroad.fem.sections.ring import Ring
+    from tireroad.fem.sections.mesh2d import Ring, SectionMesh
     from tireroad.fem.tire.cords import Cords
     from tireroad.fem.tire.material import Material
     from tireroad.runs.scene.tables.tire import CordsTable, TireTable
@@ -86,7 +85,7 @@ def _ring(
 
 def _revolved(mesh: SectionMesh, segments: int, footprint_size: float) -> Ring:
     """The section as a ring; its coarser companion has half as many elements around."""
-    from tireroad.fem.sections.ring import revolved
+    from tireroad.fem.sections.mesh2d import revolved
     from tireroad.fem.sections.torus import LEAST
 
     def coarser() -> Ring | None:

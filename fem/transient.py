@@ -1,37 +1,5 @@
 """Full finite elements in time about a static state, in the non-rotating frame: the reference.
 
-Modal damping in the full finite-element model: a low-rank matrix in addition to the sparse ones.
-
-    D_x = M Phi diag(e) Phi^T M,   and in the rolling pencil
-    K_x = Omega D_x M^-1 B = Omega M Phi diag(e) Phi^T B,
-
-e_k being the damping rate of mode k in excess of the sparse matrices' uniform one. A system A + c
-D_x + K_x is solved with A's factorisation and a small matrix (Sherman, Morrison and Woodbury).
-
-The cavity's air in an implicit step of the full finite elements, eliminated.
-
-    [A + E E^T    -E' w ] [u]   [r]
-    [ -w E'^T       Z   ] [g] = [q],    Z = c2 + c1 D_a + K_a,
-
-A being the tire's matrix of the step, E = e^T, the rest as in fem.cavity.column. The air's unknowns
-follow the tire's on the last process.
-
-A moving wheel in an implicit step of the full finite elements, eliminated.
-
-Small motions w of the tire relative to its rim, and xi of rim and body, have the blocks of
-modal.corner with the unit matrix in place of modes:
-
-    X_ww, X_wr = X R, X_rw = +-(X R)^T, X_rr    of mass, damping and stiffness.
-
-The unknowns are the tire's whole motion u = w + R xi, and x with xi = L^-T x, L L^T being the
-inertia of rim, wheel and body alone. The mass is then diagonal, and contact and loads involve u
-only. With T = (1, -R; 0, L^-T), X' = T^T X T, a step solves
-
-    [A   B] [u]   [r]
-    [C^T Z] [x] = [s].
-
-The wheel's unknowns follow the tire's on the last process.
-
     M u'' + (D + 2 Omega G) u' + K_Omega u = W^T f,   D = gamma1 M + gamma2 K,
 
 integrated by the method of Wood, Bossak and Zienkiewicz (1980), M [(1 - a) u''_{n+1} + a u''_n] +
@@ -46,23 +14,50 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import sparse
+from ufl.core.expr import Expr
 
-from tireroad.fem.axle import Axle
-from tireroad.fem.cavity.column import Column
+from tireroad.fem import compat, kinematics
+from tireroad.fem.cavity import Column
 from tireroad.fem.collective import summed
-from tireroad.fem.errors import InputError
-from tireroad.fem.matrices.compliance import on_own_rows, rotating_damping, rotating_stiffness
-from tireroad.fem.matrices.direct import factorise, multiply, solve_columns
+from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.fem.matrices.compliance import (
+    factorise,
+    multiply,
+    on_own_rows,
+    rotating_damping,
+    rotating_stiffness,
+    solve_columns,
+)
 from tireroad.fem.matrices.operators import Operators, Rotation
 from tireroad.fem.matrices.rim_motion import RimMotion, carried_pencil
+from tireroad.fem.static.virtual_work import (
+    AT_REST,
+    Rolling,
+    added_energy,
+    added_stress,
+    static_residual,
+)
+from tireroad.fem.tire.body import Body
+from tireroad.fem.wheel import Axle
 
 
 class ModalDamping:
     """`fields`: own rows (n, m) of M-orthonormal modes, kg^-1/2; `excess` (m,) 1/s. Collective.
 
     `body`: the matrix B of a wheel that rotates at `speed` (rad/s), None if standing.
+
+    A low-rank matrix in addition to the sparse ones,
+
+        D_x = M Phi diag(e) Phi^T M,   and in the rolling pencil
+        K_x = Omega D_x M^-1 B = Omega M Phi diag(e) Phi^T B,
+
+    e_k being the damping rate of mode k in excess of the sparse matrices' uniform one. A system A + c
+    D_x + K_x is solved with A's factorisation and a small matrix (Sherman, Morrison and Woodbury).
     """
 
     def __init__(
@@ -101,6 +96,14 @@ class ModalDamping:
 class AirStep:
     """`solve` maps own rows (n, k) to own rows of A^-1 times them; `weights` are (c1 1/s, c2 1/s2).
     Creation and all methods are collective.
+
+    The air in an implicit step, eliminated:
+
+        [A + E E^T    -E' w ] [u]   [r]
+        [ -w E'^T       Z   ] [g] = [q],    Z = c2 + c1 D_a + K_a,
+
+    A being the tire's matrix of the step, E = e^T, the rest as in fem.cavity. The air's unknowns
+    follow the tire's on the last process.
     """
 
     def __init__(
@@ -214,7 +217,22 @@ def _transposed(matrix: PETSc.Mat, vectors: Array) -> Array:
 
 
 class WheelStep:
-    """AirStep's counterpart for the `wheel`; `weights` (c1 1/s, c2 1/s2). All is collective."""
+    """AirStep's counterpart for the `wheel`; `weights` (c1 1/s, c2 1/s2). All is collective.
+
+    Small motions w of the tire relative to its rim, and xi of rim and body, have the blocks of
+    modal.corner with the unit matrix in place of modes:
+
+        X_ww, X_wr = X R, X_rw = +-(X R)^T, X_rr    of mass, damping and stiffness.
+
+    The unknowns are the tire's whole motion u = w + R xi, and x with xi = L^-T x, L L^T being the
+    inertia of rim, wheel and body alone. The mass is then diagonal, and contact and loads involve u
+    only. With T = (1, -R; 0, L^-T), X' = T^T X T, a step solves
+
+        [A   B] [u]   [r]
+        [C^T Z] [x] = [s].
+
+    The wheel's unknowns follow the tire's on the last process.
+    """
 
     def __init__(
         self, wheel: MovingWheel, solve: Callable[[Array], Array], weights: tuple[float, float]
@@ -438,3 +456,160 @@ class FullTire:
     def inertia_force(self) -> np.ndarray:
         """Rate of momentum (3,) of tire and air, N; convective parts cancel around the ring."""
         return summed(self.comm, self._carried @ self.balanced)
+
+
+TOLERANCE = 1e-9  # of the largest displacement
+_FLOOR = 1e-11  # of the wall's thickness: rounding of F
+MOST_TURNS = 60
+
+
+class NonlinearTire(FullTire):
+    """The nonlinear tire between forces and displacements of the patch, about its static state.
+
+    FullTire's interface plus `settle`: after each contact solve it tells whether the motion is in
+    equilibrium, or for which free displacement to solve the contact again. `operators` are those of
+    the static state at `inflation` (Pa); `turning`: rotation matrices and rolling of that state,
+    None: standing. `turns`: iterations so far. All methods are collective.
+
+        M u'' + (D + 2 Omega G) u' + F(u) = W^T f + f_static,   D = gamma1 M + gamma2 K,
+
+    F being the internal forces of the hyperelastic wall and its cords, the follower pressure and, for a
+    rotating wheel, the steady-rolling forces (fem.static.virtual_work) at the total displacement, K
+    their tangent at the static state. The integration method is that of `fem.transient` (Wood,
+    Bossak and Zienkiewicz); the two differ in F only. Each step is solved by iterations with the
+    factorisation of the linear step, to which inertia keeps the true tangent close; contact is solved
+    in each iteration.
+    """
+
+    def __init__(
+        self,
+        *,
+        operators: Operators,
+        inflation: float,
+        damping: tuple[float, float],
+        step: float,
+        outputs: sparse.csr_matrix,
+        loads: sparse.csr_matrix,
+        spectral_radius: float = 0.0,
+        modal: ModalDamping | None = None,
+        turning: tuple[Rotation, Rolling] | None = None,
+    ) -> None:
+        if operators.unknowns.rim:
+            raise InputError(
+                'nonlinear tire in time: modal.rim = "free" is not available; take "fixed"'
+            )
+        rolling = turning[1] if turning else AT_REST
+        super().__init__(
+            operators=operators,
+            rotation=turning[0] if turning else None,
+            speed=rolling.speed,
+            damping=damping,
+            step=step,
+            outputs=outputs,
+            loads=loads,
+            spectral_radius=spectral_radius,
+            modal=modal,
+        )
+        body = operators.body
+        self._body, self._small = body, _FLOOR * body.ring.thickness
+        self._static = body.u.x.array.copy()
+        pressure = fem.Constant(body.mesh, float(inflation))
+        work, potential = static_residual(body, pressure, rolling), _potential(body, pressure)
+        if body.wall.stiffens:
+            before, share = fem.Function(body.space), body.wall.stiffening()
+            before.x.array[:] = self._static
+            work += added_stress(body, share, before)
+            potential += added_energy(body, share, before)
+        self._force_form, self._potential_form = compat.form(work), compat.form(potential)
+        self._assembled = compat.force_vector(self._force_form, body.space)
+        n = len(self._mass)
+        self._rest = self._at(np.zeros(n), self._forces)
+        self._rest_potential = self._at(np.zeros(n), self._stored)
+        self._elastic = np.zeros(n)
+        self.turns = 0
+
+    def predict(self) -> np.ndarray:
+        """First estimate of the displacement (r,) m at the end of the step without new force."""
+        self._tried = 0
+        here = self.displacement
+        return self._freed(here - self._solved(self._dynamic(here) + self._elastic))
+
+    def settle(self, force: np.ndarray) -> np.ndarray | None:
+        """None if the motion under a force (k,) N is in equilibrium; then call `advance`.
+
+        Otherwise a better displacement (r,) m without new force, for which to solve the contact
+        again. Raises ConvergenceError after MOST_TURNS iterations.
+        """
+        new = self._free + self._answer @ force
+        elastic = self._at(new, self._forces) - self._rest
+        defect = self._dynamic(new) + elastic - self._columns @ force
+        change = self._solved(defect)
+        largest = (float(abs(v).max(initial=0.0)) for v in (change, new))
+        off, size = (self.comm.allreduce(v, op=MPI.MAX) for v in largest)
+        self.turns += 1
+        if off <= TOLERANCE * size + self._small:
+            self._elastic = elastic
+            return None
+        self._tried += 1
+        if self._tried > MOST_TURNS or not np.isfinite(off):
+            raise ConvergenceError(
+                f"full finite elements: a step of {self._step:g} s leaves {off:.1e} m of "
+                f"{size:.1e} m out of balance after {self._tried} iterations; the motion is too large for "
+                "the step or the tire buckles: take a smaller step or a smaller motion."
+            )
+        return self._freed(new - change - self._answer @ force)
+
+    def _freed(self, free: np.ndarray) -> np.ndarray:
+        self._free = free
+        return summed(self.comm, self._outputs @ free)
+
+    def _dynamic(self, new: np.ndarray) -> np.ndarray:
+        """Inertia and damping forces, N, if the step ends at displacement `new` (own rows)."""
+        h, a, beta, gamma = self._step, self._a, self._beta, self._gamma
+        moved = new - self.displacement - h * self.velocity
+        acceleration = moved / (beta * h**2) - (0.5 / beta - 1) * self.acceleration
+        rate = self.velocity + h * ((1 - gamma) * self.acceleration + gamma * acceleration)
+        balanced = (1 - a) * acceleration + a * self.acceleration
+        return self._mass * balanced + self._product(rate)
+
+    def _at(self, motion: np.ndarray, work: ufl.Form) -> np.ndarray:
+        """Value of `work()` at the static state plus a motion; the body is restored."""
+        field = self._body.u.x
+        field.array[self._operators.unknowns.free] += motion
+        field.scatter_forward()
+        result = work()
+        field.array[:] = self._static
+        return result
+
+    def _forces(self) -> np.ndarray:
+        """F at the body's displacement, own free rows, N."""
+        with self._assembled.localForm() as local:
+            local.set(0.0)
+        fem.petsc.assemble_vector(self._assembled, self._force_form)
+        self._assembled.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        return self._assembled.array_r[self._operators.unknowns.free]
+
+    def _stored(self) -> float:
+        return self.comm.allreduce(fem.assemble_scalar(self._potential_form))
+
+    def restore(self, kept: dict[str, np.ndarray]) -> None:
+        """Continue from a snapshot, before `predict`; written by any number of processes."""
+        super().restore(kept)
+        self._elastic = self._at(self.displacement, self._forces) - self._rest
+
+    def energy(self) -> float:
+        """Kinetic energy and energy stored since the static state, J; standing wheel only."""
+        kinetic = self.comm.allreduce(self._mass @ self.velocity**2) / 2
+        return kinetic + self._at(self.displacement, self._stored) - self._rest_potential
+
+
+def _potential(body: Body, pressure: Expr) -> ufl.Form:
+    """Strain energy of wall and cords plus p V, J, in UFL.
+
+    V(u) is the volume enclosed by the inner face, whose edges are fixed."""
+    F = kinematics.deformation_gradient(body.u)
+    distortion, dilatation = body.wall.energy(F.T * F)
+    place = ufl.SpatialCoordinate(body.mesh) + body.u
+    swept = kinematics.pressure_virtual_work(body.u, place, ufl.FacetNormal(body.mesh)) / 3
+    wall = distortion * body.dx + dilatation * body.reduced_dx
+    return wall + body.plies.energy(body.u) + pressure * swept * body.inner_ds

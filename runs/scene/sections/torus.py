@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tireroad.fem.parameters import choice, integer, number
-from tireroad.fem.sections.grid import PlyLine, RegionPatch
-from tireroad.fem.sections.ring import Ring
+from tireroad.fem.sections.mesh2d import PlyLine, RegionPatch, Ring
 from tireroad.fem.sections.torus import Torus
-from tireroad.runs.scene.source import Source
+from tireroad.runs.scene.schema import Source
 from tireroad.runs.scene.tables.tire import (
     Proportions,
     SectionKind,

@@ -11,9 +11,9 @@ import numpy as np
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import integer, text
-from tireroad.fem.sections.ring import Ring
+from tireroad.fem.sections.mesh2d import Ring
 from tireroad.runs.scene.resolved import literal
-from tireroad.runs.scene.source import Source
+from tireroad.runs.scene.schema import Source
 from tireroad.runs.scene.tables.tire import (
     Proportions,
     SectionKind,

@@ -1,1 +1,0 @@
-"""The air inside the tire: gas, annular duct, and coupling to the wall."""

@@ -1,1 +1,0 @@
-"""Time integration of the full finite-element model: the reference for modal runs."""

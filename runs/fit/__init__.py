@@ -1,1 +1,0 @@
-"""A built-in tire fitted to the figures of a real one."""

@@ -1,1 +1,0 @@
-"""One module per kind of section: its keys, elements, compounds and cords."""
