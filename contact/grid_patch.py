@@ -24,7 +24,7 @@ from scipy.sparse.linalg import LinearOperator
 from tireroad.contact.loop import RoadNormal, looking_ahead
 from tireroad.contact.patch import Patch
 from tireroad.contact.solver.conditions import ContactSolver
-from tireroad.contact.tread.compliance import GridPlaces
+from tireroad.contact.tread.kernel import GridPlaces
 from tireroad.fem.errors import ConvergenceError, UnsuitedSettings
 from tireroad.greens.recursion import LoadedColumns
 

@@ -10,7 +10,7 @@ from tireroad.contact.patch import Patch
 from tireroad.contact.solver.active_set import make_solver
 from tireroad.contact.solver.conditions import ContactSolver
 from tireroad.contact.solver.projected_cg import Compliance, SpreadCompliance
-from tireroad.contact.tread.compliance import KernelTread
+from tireroad.contact.tread.kernel import KernelTread
 from tireroad.contact.tread.law import TreadLaw
 from tireroad.contact.tread.memory import TreadMemory, steady
 from tireroad.contact.tread.shear import KernelShear, MatrixShear, Shear

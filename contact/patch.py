@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import sparse
 
-from tireroad.contact.tread.compliance import GridPlaces
+from tireroad.contact.tread.kernel import GridPlaces
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.parameters import second_digit
 

@@ -427,24 +427,13 @@ class Column:
         pull = weight @ np.linalg.solve(core, answers[-q:, :-q])
         return answers[:-q, :-q] - answers[:-q, -q:] @ pull
 
-    def with_air(self, solution: np.ndarray, transposed: bool = False) -> np.ndarray:
-        """Own rows (n, p) of static shapes with air, from A^-1 [B, e^T] (n, p + 1 + a). Collective.
-
-        `transposed`: for A^T.
-        """
+    def with_air(self, solution: np.ndarray) -> np.ndarray:
+        """Own rows (n, p) of static shapes with air, from A^-1 [B, e^T] (n, p + 1 + a). Collective."""
         q = self.pushed.shape[1]
         x, v = solution[:, :-q], solution[:, -q:]
         weight = self.duct.dynamic_stiffness(0.0, self.speed)
-        weight = weight.T if transposed else weight
         core = np.eye(q) + self.coupling(v) @ weight
         return x - v @ (weight @ np.linalg.solve(core, self.coupling(x)))
-
-    def following(self, shapes: np.ndarray, transposed: bool = False) -> np.ndarray:
-        """The air's coordinates g (a, p) under constant shapes, own rows (n, p). Collective."""
-        _, stiffness = self.duct.pencil(self.speed)
-        stiffness = stiffness.T if transposed else stiffness
-        driven = self.duct.circular[:, None] * self.coupling(shapes)[1:]
-        return np.linalg.solve(stiffness, driven)
 
 
 def make_column(

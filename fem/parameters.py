@@ -13,9 +13,10 @@ module; it needs only the standard library.
 import importlib
 import math
 import pkgutil
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import Field, dataclass, field, fields
 from numbers import Integral, Real
+from types import MappingProxyType
 from typing import Any, Generic, TypeVar, dataclass_transform
 
 from tireroad.fem.errors import InputError
@@ -231,14 +232,23 @@ def flag(default: bool, doc: str, *, only_for: OnlyFor = None) -> Any:
 
 
 def choice(
-    default: str | None, choices: tuple[str, ...], doc: str, *, only_for: OnlyFor = None
+    default: str | None,
+    choices: tuple[str, ...],
+    doc: str,
+    *,
+    only_for: OnlyFor = None,
+    dropped: Mapping[str, str] = MappingProxyType({}),
 ) -> Any:
-    """One of several words. A default of None makes it optional."""
+    """One of several words. A default of None makes it optional.
+
+    `dropped`: words of earlier versions, and what to take in their place.
+    """
     words = ", ".join(choices)
 
     def read(value: Any) -> str:
         if not isinstance(value, str) or value not in choices:
-            raise ValueError(f"must be one of {words}, not {described(value)}")
+            advice = f"; dropped: {dropped[value]}" if value in dropped else ""
+            raise ValueError(f"must be one of {words}, not {described(value)}{advice}")
         return value
 
     optional = default is None

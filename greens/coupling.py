@@ -34,7 +34,6 @@ from tireroad.fem.matrices.compliance import (
     receptance,
     rotating_damping,
     rotating_stiffness,
-    static_shapes,
     statics,
 )
 from tireroad.fem.matrices.operators import Compound, Operators, Rotation
@@ -44,16 +43,14 @@ from tireroad.fem.wheel import Axle, Turning
 from tireroad.greens.basis import (
     Array,
     Basis,
-    Moments,
     Pencil,
     Probes,
-    modal_moments,
+    modal_statics,
     regained,
-    second_order,
 )
 from tireroad.greens.response import Response
 from tireroad.modal.basis import Projection, extended, project, same_fields, with_air, with_corner
-from tireroad.modal.damping import Damping, StrainEnergy, beyond, tail_growth, tail_loss
+from tireroad.modal.damping import Damping, StrainEnergy, beyond, tail_growth
 from tireroad.modal.rolling import decouple
 from tireroad.modal.rotating import held_matrices
 from tireroad.modal.solver.slicing import Modes
@@ -147,7 +144,7 @@ def with_static_correction(
         return with_left_out(response, basis.felt(beside[:3]))
     held = basis.held
     pencil = held_matrices(basis.projection, turning.speed, turning.damping, turning.inertia)
-    known = modal_moments(*pencil, held.seen(outputs), held.seen(loads), held.beside(hub))
+    known = modal_statics(pencil[1], held.seen(outputs), held.seen(loads), held.beside(hub))
     missing = flexibility - known.compliance
     if hub.nnz:
         missing += hub @ known.momentum[3:6]
@@ -237,7 +234,7 @@ class Wheel:
         """Response with the residual `option`. Collective.
 
         The forces of `light` follow those of the `loads`; they act on the states alone, without what
-        these lack (and like all others where "second-order" adds states).
+        these lack.
         `modes` on all unknowns, for "attachment" only, must be the solution that `basis` projects:
         another one has other signs and vectors of repeated frequencies. InputError otherwise."""
         if option in ("static", "dirac"):
@@ -246,17 +243,8 @@ class Wheel:
                 whole = whole.with_forces(basis.couple(outputs, light))
             moved = outputs.shape[0] - np.count_nonzero(basis.of_hub(outputs).getnnz(axis=1))
             return replace(whole, pulse=moved if option == "dirac" else 0)
-        if option == "second-order" and basis.projection.moves:
-            raise InputError(
-                "greens.residual: second-order is not available for a wheel that moves"
-            )
-        if option == "attachment":
-            assert modes is not None, "attachment modes need the modes on all unknowns"
-            return self.respond_attached(basis, modes, outputs, loads, light)[0]
-        probes = _together(outputs, loads)
-        if light is not None:
-            probes = sparse.vstack([probes, light], format="csr")
-        return _between(self._of_second_order(basis, probes), outputs, loads, light)
+        assert modes is not None, "attachment modes need the modes on all unknowns"
+        return self.respond_attached(basis, modes, outputs, loads, light)[0]
 
     def respond_attached(
         self,
@@ -271,26 +259,6 @@ class Wheel:
         probes = _together(outputs, loads)
         whole, grown = self._attached(basis, modes, probes, light)
         return _between(whole, outputs, loads, light), grown
-
-    def _of_second_order(self, basis: Basis, probes: Probes) -> Response:
-        """The states, and residual states in place of the truncated modes. Collective."""
-        hub = basis.of_hub(probes)
-        face = probes[:, : 3 * len(self.operators.body.surface.ids)] if hub.nnz else probes
-        full = self.rotating_stiffness, self.rotating_damping
-        shapes = static_shapes(self.operators, *full, face, self.air, self._beside(hub))
-        moments = Moments(shapes.compliance, shapes.damping, shapes.inertia, shapes.momentum)
-        poles, loss = basis.couple(face, face), None
-        if self._apart:
-            pencils = self._pencils(basis.projection)
-            moments = moments.plus(regained(basis.held, *pencils, probes, probes))
-        if self.beyond is not None:
-            loss = self.beyond[0], tail_loss(basis.projection)
-        given = basis.states, basis.seen(face), basis.beside(hub), moments
-        whole = second_order(poles, *given, loss, hub, basis.felt)
-        if hub.nnz:
-            whole = replace(whole, residual=whole.residual + hub @ basis.loaded(face))
-        moment = basis.felt(moments.momentum[:3])
-        return whole if self.air is not None else with_left_out(whole, moment)
 
     def _beside(self, hub: Probes) -> Array:
         """Own rows (3, n) of momentum; with A_0 to A_2 of greens.response (12, n) if `hub` is read."""

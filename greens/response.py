@@ -186,14 +186,6 @@ class Response:
         k = len(self.block) - self.rigid
         return self.block[:k, :k], self.block_output[:, :k], self.block_input[:k]
 
-    def spectral_moment(self) -> np.ndarray:
-        """-dH/ds (r, k) at s = 0, m s/N: the first-order effect of damping under a slow force."""
-        first = ((self.output / self.eigenvalue**2) @ self.input).real
-        block, output, push = self.held_block()
-        if len(block):
-            first += output @ np.linalg.solve(block, np.linalg.solve(block, push))
-        return first
-
     def keeping(self, keep: np.ndarray) -> Response:
         """The poles where `keep` (q,) is true stay dynamic; the others follow statically."""
         return self if keep.all() else poles_made_static(self, keep)
@@ -460,15 +452,12 @@ def _lost(response: Response, output: np.ndarray, band: float) -> np.ndarray:
     return np.sqrt(np.maximum(loss, 0.0)) / 2
 
 
-def keep(
-    response: Response, count: int, band: float, by: str, counted: slice = slice(None)
-) -> Response:
-    """The response with its `count` foremost states dynamic; the others follow statically.
+def keep(response: Response, count: int, band: float, counted: slice = slice(None)) -> Response:
+    """The response with the `count` states that participate most in the band (Hz) dynamic.
 
-    `by` "participation" within the band, or "frequency": the slowest. A state is a pair of complex
-    eigenvalues or one real eigenvalue; `counted` are the outputs and forces that decide.
+    The others follow statically. A state is a pair of complex eigenvalues or one real eigenvalue;
+    `counted` are the outputs and forces that decide.
     """
-    seen = response.between(counted, counted)
-    merit = participation(seen, band) if by == "participation" else -np.abs(response.eigenvalue)
+    merit = participation(response.between(counted, counted), band)
     foremost = np.argsort(-merit, kind="stable")[:count]
     return response.keeping(np.isin(np.arange(len(merit)), foremost))

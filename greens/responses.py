@@ -1,14 +1,12 @@
 """Responses with the residual flexibility asked for, and the error that truncated modes leave.
 
-Estimated error of the receptance within a band, due to the truncated modes.
-
 Every truncated mode is faster than the last one kept, w_c. With a damping rate d, its static
 response differs from its true one by at most the share
 b(w) = |w^2 - i w d| / |w_c^2 - w^2 + i w d|.  Hence
 
     none          |G_t| (1 + b) / |H|     G_t: upper half of the modes, for the tail
     dirac, static |G_res| b / |H|         a bound for a standing wheel
-    attachment, second-order: (|H_x(w) - H_x(0)| + |G_res|) b / |H|, H_x the states beyond w_c,
+    attachment    (|H_x(w) - H_x(0)| + |G_res|) b / |H|, H_x the states beyond w_c,
 
 in Frobenius norms over all outputs and forces. The axle force, the sum of the loads less the second
 rate of the first moment, lacks  w^2 |m_r| (1 + b)  per unit load, m_r being the static moment
@@ -91,8 +89,7 @@ def _size(matrices: np.ndarray) -> np.ndarray:
 Figures = dict[str, tuple[float, str]]
 
 Answer = TypeVar("Answer")
-RESIDUALS = ("none", "dirac", "static", "second-order", "attachment")
-CHOICES = ("participation", "frequency")
+RESIDUALS = ("none", "dirac", "static", "attachment")
 # Points and frequencies at which the truncation error is estimated: enough for its magnitude.
 _SAMPLE = 40
 _FREQUENCIES = 25
@@ -103,18 +100,16 @@ class Wanted:
     """Options of a response.
 
     `residual`: how truncated modes are represented; `dynamic`: how many states stay dynamic (None:
-    all), and `choice` by what; `band` (Hz) of interest (None: up to half the highest mode).
-    InputError for unknown values.
+    all); `band` (Hz) of interest (None: up to half the highest mode). InputError for an unknown
+    residual.
     """
 
     residual: str = "static"
     dynamic: int | None = None
-    choice: str = "participation"
     band: float | None = None
 
     def __post_init__(self) -> None:
         _check_known("residual", self.residual, RESIDUALS)
-        _check_known("choice", self.choice, CHOICES)
 
 
 def _check_known(name: str, value: str, known: tuple[str, ...]) -> None:
@@ -220,7 +215,7 @@ def selected(
     """
     if wanted.dynamic is None:
         return whole
-    kept = keep(whole, wanted.dynamic, band(rolling, wanted), wanted.choice, counted)
+    kept = keep(whole, wanted.dynamic, band(rolling, wanted), counted)
     return replace(kept, residual=whole.residual) if wanted.residual == "none" else kept
 
 

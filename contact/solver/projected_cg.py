@@ -19,7 +19,7 @@ from tireroad.contact.solver.conditions import (
     complementarity_residual,
     penetration,
 )
-from tireroad.contact.tread.compliance import Box, KernelTread
+from tireroad.contact.tread.kernel import Box, KernelTread
 from tireroad.fem.errors import ConvergenceError
 from tireroad.greens.recursion import LoadedColumns
 

@@ -21,7 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.contact.patch import Patch
-from tireroad.contact.tread.compliance import Influence, KernelTread
+from tireroad.contact.tread.compliance import Influence
+from tireroad.contact.tread.kernel import KernelTread
 from tireroad.contact.tread.law import TreadLaw
 
 Array = NDArray[np.float64]

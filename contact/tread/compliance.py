@@ -1,18 +1,13 @@
 """Compliance of the tread rubber between carcass and road: the half space under rectangles.
 
-A dense (n, n) array in m/N: entry (i, j) is the approach of point i to the carcass under a unit
-force on point j. On a regular grid of points it is a convolution (`KernelTread`) and needs no
-matrix. No function is collective.
+Each function returns a dense (n, n) array in m/N: entry (i, j) is the approach of point i to the
+carcass under a unit force on point j. None of them is collective.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import fft
 
 from tireroad.fem.errors import InputError, UnsuitedSettings
 
@@ -174,107 +169,3 @@ def _check_positive_definite(compliance: Array) -> None:
             f"{eigenvalues[0]:.3g} m/N, "
             f'largest {eigenvalues[-1]:.3g}); use a more even contact grid, or tread = "winkler"'
         ) from None
-
-
-MARGIN = 4  # points
-Box = tuple[int, int, int, int]  # first row, one past the last, first column, one past the last
-
-
-@dataclass(frozen=True)
-class GridPlaces:
-    """Places of c points on a regular grid of `shape`: flat indices `place` (c,), `spacing` m."""
-
-    shape: tuple[int, int]
-    spacing: tuple[float, float]
-    place: NDArray[np.intp]
-
-
-class KernelTread:
-    """C~ f by FFT over twice the grid: c log c work and c memory for c points.
-
-    `precondition` is the inverse of the same kernel, periodic over the grid and a `MARGIN`, since it
-    falls off within a few points. Measured on one core, 100 x 100 points: 1.1 ms per product; the
-    matrix would take 0.8 GB.
-    """
-
-    def __init__(self, grid: GridPlaces, influence: Influence) -> None:
-        self._grid, self._influence = grid, influence
-        self._size, x, y = doubled(grid)
-        a, b = (np.full(x.shape, d / 2) for d in grid.spacing)
-        kernel = influence(x, y, a, b)
-        # Nothing is read between the two ends; a smooth transition keeps the periodic kernel
-        # positive.
-        self.diagonal = float(kernel[0, 0])
-        for axis, n in enumerate(grid.shape):
-            kernel = _bridged(kernel, axis, n)
-        self._kernel = kernel
-        self._transform = fft.rfft2(kernel).real
-        self._period = tuple(
-            min(fft.next_fast_len(n + MARGIN, real=True), most)
-            for n, most in zip(grid.shape, self._size, strict=True)
-        )
-        around = np.ix_(*(np.fft.ifftshift(np.arange(n) - n // 2) for n in self._period))
-        least = 1e-3 * self.diagonal
-        self._inverse = 1.0 / np.maximum(fft.rfft2(kernel[around]).real, least)
-
-    @property
-    def cells(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Row and column (c,) of each point in the grid."""
-        rows, columns = np.divmod(self._grid.place, self._grid.shape[1])
-        return rows, columns
-
-    def inside(self, box: Box) -> tuple[KernelTread, NDArray[np.intp]]:
-        """The same for the points in a box of the grid, and which those are (a,)."""
-        (top, bottom, left, right), (rows, columns) = box, self.cells
-        index = np.flatnonzero(
-            (rows >= top) & (rows < bottom) & (columns >= left) & (columns < right)
-        )
-        shape = bottom - top, right - left
-        place = (rows[index] - top) * shape[1] + columns[index] - left
-        return KernelTread(GridPlaces(shape, self._grid.spacing, place), self._influence), index
-
-    def block(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Array:
-        """The matrix between the points `rows` (a,) and `columns` (b,), (a, b) m/N."""
-        i, j = np.divmod(self._grid.place[rows, None], self._grid.shape[1])
-        k, m = np.divmod(self._grid.place[columns], self._grid.shape[1])
-        return self._kernel[i - k, j - m]
-
-    def apply(self, force: Array) -> Array:
-        """Approach (c,) m under forces (c,) N."""
-        return self._convolve(force, self._transform, self._size)
-
-    def precondition(self, approach: Array) -> Array:
-        """Approximate forces (c,) N for an approach (c,) m."""
-        return self._convolve(approach, self._inverse, self._period)
-
-    def _convolve(self, values: Array, transform: Array, size: tuple[int, ...]) -> Array:
-        nx, ny = self._grid.shape
-        field = np.zeros(nx * ny)
-        field[self._grid.place] = values
-        spectrum = fft.rfft2(field.reshape(nx, ny), size)
-        spectrum *= transform
-        return fft.irfft2(spectrum, size)[:nx, :ny].ravel()[self._grid.place]
-
-
-def doubled(grid: GridPlaces) -> tuple[tuple[int, ...], Array, Array]:
-    """Size of the grid on which convolutions do not wrap around, and the offsets x, y (m) on it.
-
-    Between the two ends, where nothing is read, the offsets are 0.
-    """
-    size = tuple(fft.next_fast_len(2 * n - 1, real=True) for n in grid.shape)
-    offsets = [
-        d * np.concatenate([np.arange(n), np.zeros(whole - 2 * n + 1), np.arange(1 - n, 0)])
-        for n, d, whole in zip(grid.shape, grid.spacing, size, strict=True)
-    ]
-    x, y = np.meshgrid(*offsets, indexing="ij")
-    return size, x, y
-
-
-def _bridged(kernel: Array, axis: int, n: int) -> Array:
-    """Interpolate linearly over the unused middle of a doubled axis."""
-    kernel = np.moveaxis(kernel, axis, 0)
-    count = len(kernel) - 2 * n + 1
-    if count:
-        share = (np.arange(count) + 1.0)[:, None] / (count + 1)
-        kernel[n : n + count] = (1 - share) * kernel[n - 1] + share * kernel[n + count]
-    return np.moveaxis(kernel, 0, axis)

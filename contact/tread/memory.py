@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.contact.patch import Patch
-from tireroad.contact.tread.compliance import GridPlaces, Influence, KernelTread
+from tireroad.contact.tread.compliance import Influence
+from tireroad.contact.tread.kernel import GridPlaces, KernelTread
 from tireroad.contact.tread.shear import KernelShear
 from tireroad.fem.errors import InputError
 

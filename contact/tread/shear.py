@@ -24,13 +24,12 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from tireroad.contact.tread.compliance import (
-    GridPlaces,
     Influence,
-    doubled,
     over_rectangle,
     primitive_product,
     rectangle_potential,
 )
+from tireroad.contact.tread.kernel import GridPlaces, doubled
 
 Array = NDArray[np.float64]
 Plane = NDArray[np.complex128]  # x + iy

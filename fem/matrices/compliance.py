@@ -25,7 +25,6 @@ The receptance of the full matrices, frequency by frequency, is the reference fo
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 
 import numpy as np
 from petsc4py import PETSc
@@ -297,23 +296,6 @@ def add_diagonal(matrix: PETSc.Mat, values: np.ndarray) -> None:
     diagonal.destroy()
 
 
-@dataclass(frozen=True)
-class StaticShapes:
-    """Shapes under constant unit loads b, and the full matrices projected on them.
-
-    `columns`: this process's rows (n, p) of x = K_Omega^-1 b. With y = K_Omega^-T b, all (p, p) and
-    on every process: `compliance` b^T x m/N, `damping` y^T (D + 2 Omega G) x m s/N, `inertia` y^T M
-    x m s2/N. `momentum` (3, p): int rho x, kg m/N, or (b, p) for other rows requested in its
-    place.
-    """
-
-    columns: np.ndarray
-    compliance: np.ndarray
-    damping: np.ndarray
-    inertia: np.ndarray
-    momentum: np.ndarray
-
-
 class LoadedShapes:
     """Shapes K_Omega^-1 b under constant loads b, with coupling to the air in the cavity.
 
@@ -364,56 +346,6 @@ class LoadedShapes:
         """Free the factor's memory."""
         if self._factor is not None:
             self._factor.destroy()
-
-
-def static_shapes(
-    operators: Operators,
-    stiffness: PETSc.Mat,
-    damping: PETSc.Mat,
-    probes: sparse.csr_matrix,
-    air: Column | None = None,
-    beside: np.ndarray | None = None,
-) -> StaticShapes:
-    """Static shapes of the probes (p, 3 s), both loads and readings, with the air. Collective.
-
-    `beside`: own rows (b, n) that replace those of the momentum; its first three rows must be the
-    momentum if there is air. An unsymmetric stiffness is factorised a second time, transposed; a
-    free standing tire is solved by inertia relief (above).
-    """
-    comm = operators.body.comm
-    loads = on_own_rows(operators, probes)
-    pushed = loads if air is None else sparse.hstack([loads, air.pushed], format="csc")
-    x = y = statics(operators, stiffness, pushed)
-    if not symmetric(stiffness):
-        transposed = stiffness.transpose(PETSc.Mat())
-        y = solve_all(transposed, pushed)
-        transposed.destroy()
-    if air is not None:
-        x, y = air.with_air(x), air.with_air(y, transposed=True)
-    shapes = StaticShapes(
-        x,
-        summed(comm, loads.T @ x),
-        summed(comm, y.T @ multiply(damping, x)),
-        summed(comm, y.T @ (operators.mass[:, None] * x)),
-        summed(comm, (operators.carried if beside is None else beside) @ x),
-    )
-    return shapes if air is None else _with_following(shapes, air, x, y)
-
-
-def _with_following(
-    shapes: StaticShapes, air: Column, x: np.ndarray, y: np.ndarray
-) -> StaticShapes:
-    """Add the damping, inertia and momentum of the air that follows the shapes. Collective."""
-    g, h = air.following(x), air.following(y, transposed=True)
-    drag, _ = air.duct.pencil(air.speed)
-    momentum = shapes.momentum.copy()
-    momentum[:3] += air.duct.momentum @ g
-    return replace(
-        shapes,
-        damping=shapes.damping + h.T @ drag @ g,
-        inertia=shapes.inertia + h.T @ g,
-        momentum=momentum,
-    )
 
 
 def compliance(

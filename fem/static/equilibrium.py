@@ -194,7 +194,7 @@ class SolutionHistory:
 
     def predicted(self) -> bool | None:
         """Whether the estimate before the next solution succeeded; None if it is to be made."""
-        if self._journal is None or self._journal.done == len(self._journal.found):
+        if self._journal is None or self._journal.done >= len(self._journal.found):
             return None
         known = self._journal.found[self._journal.done]["predicted"]
         return bool(known[len(self._predicted)])

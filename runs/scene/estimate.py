@@ -286,9 +286,9 @@ BASES = 3
 ANSWERS = 6 * 64
 """Columns held while solving for the flexibility of the patch (fem.matrices.compliance.solve_parts):
 loads, solutions, copies."""
-SHAPES = {"attachment": 3, "second-order": 5}
-"""By residual: full-length columns per force on the patch held at peak; other residuals hold only
-values at the patch."""
+SHAPES = 3
+"""Full-length columns per force on the patch held at peak, with attachment modes; other residuals
+hold only values at the patch."""
 DENSE = 1000
 """Number of contact points up to which a tread's matrix is stored (contact.model.DENSE_POINTS)."""
 BLOCK = 512
@@ -416,7 +416,7 @@ def _each_step(scene: Scene, points: int) -> int:
 def _contact_memory(scene: Scene, size: Sizes) -> dict[str, float]:
     directions = 3 if scene.contact.has_friction else 1
     loads = directions * size.nodes
-    shapes = SHAPES.get(scene.greens.residual, 0)
+    shapes = SHAPES if scene.greens.residual == "attachment" else 0
     parts = {
         "flexibility of the patch": 8.0 * size.free * (ANSWERS + shapes * loads),
         "contact": 16.0 * 4 * loads * 2 * size.coordinates

@@ -553,6 +553,11 @@ def _everywhere(of: type, path: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
     return found
 
 
+_DROPPED: dict[tuple[str, ...], str] = {
+    ("greens", "choice"): "greens.dynamic takes the states that participate most; remove it"
+}
+
+
 def _unknown(of: type, path: tuple[str, ...], name: str, values: dict, source: Source) -> None:
     """Note an unknown key: one of another kind, or the nearest known one, here or elsewhere."""
     other = owners(of, name)
@@ -566,6 +571,9 @@ def _unknown(of: type, path: tuple[str, ...], name: str, values: dict, source: S
     if not path and name in _OF_A_SWEEP:
         text = f"unknown key {name}: a sweep is a file of its own, with scene = and [[axis]], for ./tireroad sweep (docs/how-to/sweep.md)"
         source.add_as_is((name,), text)
+        return
+    if (*path, name) in _DROPPED:
+        source.add((*path, name), f"was dropped: {_DROPPED[(*path, name)]}")
         return
     known = list(every_field(of))
     near = difflib.get_close_matches(name, known, 1, 0.6)

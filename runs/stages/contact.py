@@ -425,6 +425,26 @@ class ContactStage(Stage[ContactHistory]):
     greens: Result[Responses]
     setup: Result[ContactSetup]
 
+    def solver(self) -> str:
+        """The solvers' settings, for the log."""
+        scene = self.job.scene
+        from tireroad.contact.solver.conditions import TOLERANCE
+
+        assert scene.contact is not None, "the stage runs with [contact] only"
+        parts = [f"{scene.contact.solver}, complementarity to {TOLERANCE:g} of the scale"]
+        if scene.contact.solver == "snes-vi":
+            from tireroad.contact.solver.snes_vi import MAX_ITERATIONS
+
+            parts.append(f"PETSc SNES vinewtonrsls, at most {MAX_ITERATIONS} iterations")
+        if scene.contact.has_friction:
+            from tireroad.contact.solver.stick_slip import TOLERANCE as change
+            from tireroad.contact.solver.stick_slip import TURNS
+
+            parts.append(
+                f"friction to {change:g} of the largest force in at most {TURNS} iterations"
+            )
+        return "; ".join([*parts, f"scheme {scene.time.scheme}"])
+
     def inputs(self) -> dict:
         """The Green's functions, the contact, the road (a file by its content) and the time."""
         scene = self.job.scene

@@ -22,7 +22,7 @@ from tireroad.runs.scene.tables.scene import PointForceTable, has_air
 from tireroad.runs.stages import cavity, corner, rotating
 from tireroad.runs.stages.modes import fill_projection, read_projection
 from tireroad.runs.stages.setup import components, leaning, leaning_loads, points_of, probes
-from tireroad.runs.stages.stage import Computed, Record, Result, turning_of
+from tireroad.runs.stages.stage import MUMPS, Computed, Record, Result, turning_of
 
 _UNITS = {
     "eigenvalue": "1/s",
@@ -106,6 +106,15 @@ class GreensStage(Computed[Responses]):
     rotating: Result[RollingModes]
     setup: Result[ContactSetup | None]
 
+    def solver(self) -> str:
+        """The solvers' settings, for the log."""
+        scene = self.job.scene
+        if scene.greens.residual == "none":
+            return "none: states alone"
+        from tireroad.fem.matrices.compliance import RESIDUAL_TOLERANCE
+
+        return f"static shapes by {MUMPS}; residual at most {RESIDUAL_TOLERANCE:g}"
+
     def inputs(self) -> dict:
         """The states and what is driven; the road enters only through the reach of the patch."""
         scene, setup = self.job.scene, self.setup.product
@@ -145,9 +154,7 @@ class GreensStage(Computed[Responses]):
     @property
     def _wanted(self) -> Wanted:
         given = self.job.scene.greens
-        return Wanted(
-            residual=given.residual, dynamic=given.dynamic, choice=given.choice, band=given.band
-        )
+        return Wanted(residual=given.residual, dynamic=given.dynamic, band=given.band)
 
     def compute(self, record: Record) -> Responses:
         """The responses between all probes. Collective."""

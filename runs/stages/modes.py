@@ -32,6 +32,7 @@ from tireroad.runs.process.surroundings import available_memory
 from tireroad.runs.scene.estimate import estimate
 from tireroad.runs.stages import cavity, corner
 from tireroad.runs.stages.stage import (
+    MUMPS,
     Computed,
     Job,
     Record,
@@ -205,6 +206,25 @@ class ModesStage(Computed[ModalBasis]):
     name: ClassVar[str] = "modes"
     static: Result[StaticState]
     motions: Result[SmallMotions]
+
+    def solver(self) -> str:
+        """The solvers' settings, for the log."""
+        scene = self.job.scene
+        from tireroad.modal.solver.slicing import AUTO, BLOCK, TOLERANCE
+        from tireroad.modal.solver.undamped import ORTHONORMALITY_TOLERANCE, RESIDUAL_TOLERANCE
+
+        solver = AUTO if scene.modes.solver == "auto" else scene.modes.solver
+        how = {
+            "lanczos": f"block Lanczos, {BLOCK} vectors a block, on (A - sigma I)^-1 of each slice",
+            "slepc": "SLEPc's spectrum slicing, Krylov-Schur, options -modes_…",
+        }[solver]
+        rotation = scene.rotation
+        shapes = f"; rotation shapes of {rotation.shape_tolerance:g} and more" if rotation else ""
+        return (
+            f"{how} to {TOLERANCE:g}; counted by "
+            f"the inertia of L D L^T, {MUMPS}; residual at most {RESIDUAL_TOLERANCE:g}, orthonormal to "
+            f"{ORTHONORMALITY_TOLERANCE:g}{shapes}"
+        )
 
     def inputs(self) -> dict:
         """The static state and the modal table; rotation matrices only if the wheel turns."""

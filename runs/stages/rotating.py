@@ -34,7 +34,7 @@ from tireroad.modal.rolling import RollingModes, full_states, rolling_modes
 from tireroad.modal.states import StateModes
 from tireroad.runs.files.store import put
 from tireroad.runs.stages import cavity, corner
-from tireroad.runs.stages.stage import Computed, Job, Record, Result, Shared, turning_of
+from tireroad.runs.stages.stage import MUMPS, Computed, Job, Record, Result, Shared, turning_of
 
 _STATES = {"eigenvalue": "1/s", "right": "-", "left": "s", "residual": "-", "left_residual": "-"}
 _BLOCK = {"block": "1/s", "block_right": "-", "block_left": "s"}
@@ -110,6 +110,20 @@ class RotatingStage(Computed[RollingModes]):
     static: Result[StaticState]
     modes: Result[ModalBasis]
     wheel: Result[Wheel]
+
+    def solver(self) -> str:
+        """The solvers' settings, for the log."""
+        scene = self.job.scene
+        if scene.rotation is None or scene.rotation.method == "projected":
+            from tireroad.modal.rotating import LIMITS
+
+            return f"LAPACK on the modal basis; residual at most {LIMITS[0]:g}, identities to {LIMITS[1]:g}"
+        from tireroad.modal.solver.quadratic import ITERATIONS, RESIDUAL_TOLERANCE, TOLERANCE
+
+        return (
+            f"SLEPc PEP nearest to 0 by shift-and-invert to {TOLERANCE:g}, at most {ITERATIONS} restarts, {MUMPS}, "
+            f"options -rotating_…; residual at most {RESIDUAL_TOLERANCE:g}"
+        )
 
     @classmethod
     def instead(cls, job: Job, done: Mapping[str, Result]) -> Result[RollingModes] | None:

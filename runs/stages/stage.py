@@ -60,6 +60,7 @@ if TYPE_CHECKING:
     from tireroad.runs.scene.tables.tire import TireTable
 
 T = TypeVar("T")
+MUMPS = "MUMPS through PETSc, ICNTL(14) = 100 %"
 
 MOST = 2  # per kind: those of a run and of its coarser companion
 _kept: dict[str, OrderedDict[Hashable, Any]] | None = None
@@ -307,6 +308,13 @@ class Stage(PipelinePart[P]):
         """The product from its file's content, by default that content. On every process."""
         return held
 
+    def solver(self) -> str:
+        """One line for the log about the solvers used; "" if there are none.
+
+        Options given after `--` are logged where they are taken and change those of their prefix.
+        """
+        return ""
+
     def stored(self) -> P:
         """The product as stored in its file. Collective."""
         return self.restored(self.job.read(self.job.path(self.name), self.read))
@@ -323,8 +331,8 @@ class Stage(PipelinePart[P]):
                 return Result(key, self.stored)
             if reason != "absent":
                 console.say(f"{name:9s} computed anew: {path.name} exists, but {reason}")
-            if settings := solver_settings(name, job.scene):
-                console.log(settings)
+            if solver := self.solver():
+                console.log(f"{name:9s} solver: {solver}")
             record = Record()
             with _remembering(self, key):
                 product = self.produce(key, record)
@@ -577,93 +585,6 @@ def check(stage: str, key: str) -> None:
 def _file(stage: str, key: str) -> Path | None:
     folder = os.environ.get(FAILURES)
     return Path(folder) / f"{stage}-{key}.txt" if folder else None
-
-
-_MUMPS = "MUMPS through PETSc, ICNTL(14) = 100 %"
-
-
-def solver_settings(stage: str, scene: Scene) -> str:
-    """One line about the solvers that a stage of the scene uses; "" if it has none.
-
-    Options given after `--` are logged where they are taken and change those of their prefix.
-    """
-    told = _TOLD.get(stage)
-    return f"{stage:9s} solver: {told(scene)}" if told else ""
-
-
-def _static(scene: Scene) -> str:
-    from tireroad.fem.static.equilibrium import MOST_STEPS, TOLERANCE
-    from tireroad.fem.static.load_steps import LOAD_TOLERANCE
-
-    return (
-        f"Newton's method, residual at most {TOLERANCE:g} of the force scale, at most {MOST_STEPS} "
-        f"tangents a load step; load to {LOAD_TOLERANCE:g}; tangents factorised by {_MUMPS}, options -static_…"
-    )
-
-
-def _modes(scene: Scene) -> str:
-    from tireroad.modal.solver.slicing import AUTO, BLOCK, TOLERANCE
-    from tireroad.modal.solver.undamped import ORTHONORMALITY_TOLERANCE, RESIDUAL_TOLERANCE
-
-    solver = AUTO if scene.modes.solver == "auto" else scene.modes.solver
-    how = {
-        "lanczos": f"block Lanczos, {BLOCK} vectors a block, on (A - sigma I)^-1 of each slice",
-        "slepc": "SLEPc's spectrum slicing, Krylov-Schur, options -modes_…",
-    }[solver]
-    rotation = scene.rotation
-    shapes = f"; rotation shapes of {rotation.shape_tolerance:g} and more" if rotation else ""
-    return (
-        f"{how} to {TOLERANCE:g}; counted by "
-        f"the inertia of L D L^T, {_MUMPS}; residual at most {RESIDUAL_TOLERANCE:g}, orthonormal to "
-        f"{ORTHONORMALITY_TOLERANCE:g}{shapes}"
-    )
-
-
-def _rotating(scene: Scene) -> str:
-    if scene.rotation is None or scene.rotation.method == "projected":
-        from tireroad.modal.rotating import LIMITS
-
-        return f"LAPACK on the modal basis; residual at most {LIMITS[0]:g}, identities to {LIMITS[1]:g}"
-    from tireroad.modal.solver.quadratic import ITERATIONS, RESIDUAL_TOLERANCE, TOLERANCE
-
-    return (
-        f"SLEPc PEP nearest to 0 by shift-and-invert to {TOLERANCE:g}, at most {ITERATIONS} restarts, {_MUMPS}, "
-        f"options -rotating_…; residual at most {RESIDUAL_TOLERANCE:g}"
-    )
-
-
-def _greens(scene: Scene) -> str:
-    if scene.greens.residual == "none":
-        return "none: states alone"
-    from tireroad.fem.matrices.compliance import RESIDUAL_TOLERANCE
-
-    return f"static shapes by {_MUMPS}; residual at most {RESIDUAL_TOLERANCE:g}"
-
-
-def _contact(scene: Scene) -> str:
-    from tireroad.contact.solver.conditions import TOLERANCE
-
-    assert scene.contact is not None, "the stage runs with [contact] only"
-    parts = [f"{scene.contact.solver}, complementarity to {TOLERANCE:g} of the scale"]
-    if scene.contact.solver == "snes-vi":
-        from tireroad.contact.solver.snes_vi import MAX_ITERATIONS
-
-        parts.append(f"PETSc SNES vinewtonrsls, at most {MAX_ITERATIONS} iterations")
-    if scene.contact.has_friction:
-        from tireroad.contact.solver.stick_slip import TOLERANCE as change
-        from tireroad.contact.solver.stick_slip import TURNS
-
-        parts.append(f"friction to {change:g} of the largest force in at most {TURNS} iterations")
-    return "; ".join([*parts, f"scheme {scene.time.scheme}"])
-
-
-_TOLD: dict[str, Callable[[Scene], str]] = {
-    "static": _static,
-    "modes": _modes,
-    "rotating": _rotating,
-    "greens": _greens,
-    "contact": _contact,
-}
 
 
 def _tell_reused(

@@ -23,6 +23,7 @@ from tireroad.runs.files.store import put
 from tireroad.runs.process import console
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.stages.stage import (
+    MUMPS,
     Computed,
     Job,
     Record,
@@ -177,6 +178,16 @@ class StaticStage(Computed[StaticState]):
     name: ClassVar[str] = "static"
     forgets: ClassVar[bool] = True
     """Whether matrices kept from a family's earlier run are discarded: they are another state's."""
+
+    def solver(self) -> str:
+        """The solvers' settings, for the log."""
+        from tireroad.fem.static.equilibrium import MOST_STEPS, TOLERANCE
+        from tireroad.fem.static.load_steps import LOAD_TOLERANCE
+
+        return (
+            f"Newton's method, residual at most {TOLERANCE:g} of the force scale, at most {MOST_STEPS} "
+            f"tangents a load step; load to {LOAD_TOLERANCE:g}; tangents factorised by {MUMPS}, options -static_…"
+        )
 
     def inputs(self) -> dict:
         """The tire without its air, the static loads, and the rolling terms if they act."""

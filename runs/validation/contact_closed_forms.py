@@ -45,15 +45,14 @@ from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.solver.stick_slip import BrushFriction, Carcass, SlidingStiffness, stick_slip
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import (
-    GridPlaces,
     Influence,
-    KernelTread,
     dense_compliance,
     half_space_compliance,
     half_space_influence,
     rectangle_potential,
     winkler_compliance,
 )
+from tireroad.contact.tread.kernel import GridPlaces, KernelTread
 from tireroad.contact.tread.memory import steady
 from tireroad.contact.tread.pattern import Pattern, pitch_starts
 from tireroad.contact.tread.shear import KernelShear, half_space_shear

@@ -60,7 +60,6 @@ CHOICES = (
     Choice(100, "none", 1e-4),
     Choice(100, "static", 1e-4),
     Choice(100, "attachment", 1e-4),
-    Choice(200, "second-order", 1e-4),
     Choice(200, "attachment", 2e-4),
     Choice(200, "attachment", 1e-4),
     Choice(200, "attachment", 5e-5),

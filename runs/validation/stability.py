@@ -26,12 +26,11 @@ from tireroad.contact.solver.projected_cg import ProjectedCG, SpreadCompliance
 from tireroad.contact.solver.stick_slip import BrushFriction
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import (
-    GridPlaces,
-    KernelTread,
     half_space_compliance,
     half_space_influence,
     winkler_compliance,
 )
+from tireroad.contact.tread.kernel import GridPlaces, KernelTread
 from tireroad.contact.tread.shear import MatrixShear, half_space_shear
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.matrices.operators import Operators

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tireroad.contact.grid_patch import ACROSS, MOST, ratio
-from tireroad.contact.tread.compliance import GridPlaces
+from tireroad.contact.tread.kernel import GridPlaces
 from tireroad.runs.validation.cases import oval_patch
 
 

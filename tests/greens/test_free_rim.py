@@ -101,7 +101,6 @@ def test_every_residual_on_the_free_rim() -> None:
     for option, allowed in {
         "dirac": 0.1,
         "static": 0.1,
-        "second-order": 0.01,
         "attachment": 0.01,
     }.items():
         found = made.respond(basis, modes, points, points, option)

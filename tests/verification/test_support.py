@@ -133,10 +133,10 @@ def run(launch, folder, command="run", speed=0.0, road="", modal="", residual="s
     ("speed", "road", "modal", "residual", "rigid"),
     [
         (0.0, "", 'rim = "free"', "static", 6),
-        (0.0, "", 'rim = "free"', "second-order", 6),
+        (0.0, "", 'rim = "free"', "attachment", 6),
         (40.0, "", 'rim = "free"', "attachment", 3),
         (0.0, "load = 500.0", 'road = "held"', "static", 0),
-        (40.0, "load = 500.0", 'road = "held"', "second-order", 0),
+        (40.0, "load = 500.0", 'road = "held"', "attachment", 0),
     ],
 )
 def test_scenes_with_every_support(launch, tmp_path, speed, road, modal, residual, rigid):

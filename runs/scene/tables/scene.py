@@ -300,11 +300,6 @@ def _check_company(scene: Scene, axle: Axle, error: Where) -> None:
             ("rotation", "inertia"),
             '= "doppler" pulls at a wheel that moves along with its tire: take "full"',
         )
-    if scene.greens.residual == "second-order":
-        raise error(
-            ("greens", "residual"),
-            '= "second-order" knows no [axle] that moves: take "static" or "attachment"',
-        )
     tilts = any(k > 2 for k in axle.moving)
     if tilts and turns and not scene.static.steady_rolling:
         raise error(
@@ -592,19 +587,16 @@ class RotationTable:
 class GreensTable:
     residual: str = choice(
         "static",
-        ("none", "dirac", "static", "second-order", "attachment"),
+        ("none", "dirac", "static", "attachment"),
         "residual flexibility, which represents the truncated modes",
+        dropped={"second-order": 'take "attachment", as accurate standing and more so rolling'},
     )
     dynamic: int | None = integer(
         None,
-        "number of states kept dynamic; the others respond statically; absent: all",
+        "number of states that stay dynamic, those that participate most in the band; the others respond statically; "
+        "absent: all",
         least=1,
         most=200000,
-    )
-    choice: str = choice(
-        "participation",
-        ("participation", "frequency"),
-        "selection of the dynamic states: by participation in the band, or lowest first",
     )
     band: float | None = number(
         None,

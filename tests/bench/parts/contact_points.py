@@ -13,7 +13,8 @@ from scipy import sparse
 from tireroad.contact.roads.kinds.texture import TextureRoad
 from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.solver.projected_cg import ProjectedCG, SpreadCompliance
-from tireroad.contact.tread.compliance import GridPlaces, KernelTread, half_space_influence
+from tireroad.contact.tread.compliance import half_space_influence
+from tireroad.contact.tread.kernel import GridPlaces, KernelTread
 from tireroad.runs.validation.tables import Table
 from tireroad.tests.bench.parts.floors import durations
 

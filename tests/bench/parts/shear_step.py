@@ -16,12 +16,8 @@ from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.solver.projected_cg import SpreadCompliance
 from tireroad.contact.solver.stick_slip import BrushFriction
 from tireroad.contact.tread.brush import Brush, BrushLaw
-from tireroad.contact.tread.compliance import (
-    GridPlaces,
-    KernelTread,
-    half_space_compliance,
-    half_space_influence,
-)
+from tireroad.contact.tread.compliance import half_space_compliance, half_space_influence
+from tireroad.contact.tread.kernel import GridPlaces, KernelTread
 from tireroad.contact.tread.shear import KernelShear, half_space_shear
 from tireroad.greens.recursion import Recursion
 from tireroad.runs.validation.cases import RollingStrip, oval_patch

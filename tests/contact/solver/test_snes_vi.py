@@ -13,7 +13,8 @@ from tireroad.contact.model import DENSE_POINTS
 from tireroad.contact.solver.active_set import ActiveSet, make_solver
 from tireroad.contact.solver.projected_cg import ProjectedCG, SpreadCompliance
 from tireroad.contact.solver.snes_vi import PREFIX, SnesVI
-from tireroad.contact.tread.compliance import GridPlaces, KernelTread, half_space_influence
+from tireroad.contact.tread.compliance import half_space_influence
+from tireroad.contact.tread.kernel import GridPlaces, KernelTread
 
 
 @pytest.fixture(params=["vinewtonrsls", "vinewtonssls"])

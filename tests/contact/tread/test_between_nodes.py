@@ -6,7 +6,8 @@ from scipy import sparse
 
 from tireroad.contact.patch import Patch
 from tireroad.contact.tread.between_nodes import Backed, on_nodes, over_rectangles, unsettled
-from tireroad.contact.tread.compliance import GridPlaces, KernelTread, half_space_influence
+from tireroad.contact.tread.compliance import half_space_influence
+from tireroad.contact.tread.kernel import GridPlaces, KernelTread
 from tireroad.contact.tread.laws.elastic import HalfSpace
 
 PITCH, SIZE = 0.008, 12  # m, points along and across

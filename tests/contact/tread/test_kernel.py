@@ -7,12 +7,8 @@ from scipy.interpolate import CubicSpline
 
 from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.solver.projected_cg import MatrixCompliance, ProjectedCG, SpreadCompliance
-from tireroad.contact.tread.compliance import (
-    GridPlaces,
-    KernelTread,
-    dense_compliance,
-    half_space_influence,
-)
+from tireroad.contact.tread.compliance import dense_compliance, half_space_influence
+from tireroad.contact.tread.kernel import GridPlaces, KernelTread
 from tireroad.contact.tread.layer import LayerInfluence, transform_ratio
 from tireroad.fem.errors import ConvergenceError, InputError
 

@@ -10,11 +10,8 @@ from tireroad.contact.loop import Drive, Loop, roll
 from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.solver.stick_slip import BrushFriction, gmres
 from tireroad.contact.tread.brush import Brush, BrushLaw
-from tireroad.contact.tread.compliance import (
-    GridPlaces,
-    half_space_compliance,
-    half_space_influence,
-)
+from tireroad.contact.tread.compliance import half_space_compliance, half_space_influence
+from tireroad.contact.tread.kernel import GridPlaces
 from tireroad.contact.tread.layer import LayerInfluence, LayerShear, transforms
 from tireroad.contact.tread.memory import TreadMemory
 from tireroad.contact.tread.shear import KernelShear, MatrixShear, half_space_shear

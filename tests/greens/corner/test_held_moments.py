@@ -119,7 +119,7 @@ def test_very_stiff_springs_carry_the_moments_of_the_held_axle(speed) -> None:
     )  # the states of so stiff a hub are known to 1e-5
 
 
-OPTIONS = ("dirac", "static", "second-order", "attachment")
+OPTIONS = ("dirac", "static", "attachment")
 
 
 def seen(speed: float) -> sparse.csr_matrix:
@@ -166,7 +166,7 @@ def test_moments_by_states_of_the_full_matrices() -> None:
     speed, probes = 60.0, seen(60.0)
     full, basis = turned(speed)
     assert errors(speed, basis.couple(probes, probes))[:3].max() < 0.02
-    for option in ("dirac", "static", "second-order"):
+    for option in ("dirac", "static"):
         error = errors(speed, full.respond(basis, None, probes, probes, option))
         assert error[0] < 1e-9, option
         assert error.max() < 5e-3 and error[2] < 5e-4, option

@@ -55,7 +55,7 @@ def search(file, monkeypatch):
 
     monkeypatch.setattr(Search, "_tried", attempt)
     monkeypatch.setattr(Search, "_final", lambda self, scene: final.append(scene))
-    monkeypatch.setattr(searching, "_tell", lambda scene, done: None)
+    monkeypatch.setattr(searching, "tell_error", lambda scene, done: None)
 
     def started(*sets: str):
         (file.parent / "out").mkdir(exist_ok=True)
@@ -134,7 +134,7 @@ def test_a_search_that_was_stopped_goes_on_and_a_looser_one_is_known(file, searc
 def test_limits_end_it_with_what_was_reached(file, search, monkeypatch, sets, why) -> None:
     started, tried, final = search
     # No advice to search after a search:
-    monkeypatch.setattr(searching, "_tell", lambda scene, done: pytest.fail("told"))
+    monkeypatch.setattr(searching, "tell_error", lambda scene, done: pytest.fail("told"))
     with pytest.raises(ConvergenceError, match=f"accuracy.{why}.*largest part: mesh"):
         started(sets)
     assert len(tried) == 1
@@ -157,7 +157,7 @@ def test_a_folder_has_the_scene_of_its_results_and_resume_that_of_the_search(
     check_kept_scene(to_resume(out))
     again = load(to_resume(out))
     assert again == load(file, ["accuracy.target=0.001", "accuracy.trials=2"])
-    for name in ("run_scene", "_tell"):
+    for name in ("run_scene", "tell_error"):
         monkeypatch.setattr(searching, name, lambda *given, **options: None)
     plain = load(file, ["accuracy.search=false"])
     searching.run(plain, out, MPI.COMM_SELF, until=None, fresh=False, petsc_options=[])

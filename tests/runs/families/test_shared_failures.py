@@ -10,13 +10,14 @@ from mpi4py import MPI
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.runs.files.cache import NO_CACHE
-from tireroad.runs.stages.stage import FAILURES
+from tireroad.runs.stages.stage import FAILURES, Stage
 
 
 class Folding:
     """A stage whose solver gives up; `tried` counts how often."""
 
     name = "static"
+    result, solver = Stage.result, Stage.solver
 
     def __init__(self, folder: Path, scene: str, load: float, tried: list[str]) -> None:
         given = {"comm": MPI.COMM_SELF, "fresh": False, "cache": NO_CACHE}
@@ -35,7 +36,6 @@ class Folding:
 
 def messages(folder: Path, monkeypatch) -> tuple[list[str], list[str]]:
     """What three members say, the last of another load, and which of them tried."""
-    monkeypatch.setattr("tireroad.runs.stages.stage.solver_settings", lambda name, scene: "")
     tried: list[str] = []
     said = []
     for scene, load in (("one", 6e4), ("two", 6e4), ("three", 7e4)):

@@ -38,7 +38,7 @@ def test_a_worker_takes_members_until_it_crashes(tmp_path, monkeypatch, at_a_tim
     names = "one", "fails", "crashes", "last"
     members = tuple(Member(name, {}) for name in names)
     sweep = SimpleNamespace(members=members, processes=1, scene=Path("base.toml"))
-    ended = command.run(sweep, tmp_path, at_a_time)
+    ended = command.run_members(sweep, tmp_path, at_a_time)
     assert [one.member.name for one in ended] == list(names)
     assert [one.status for one in ended] == [0, 3, -11, 0]
     assert ended[1].said == "this was fails" and "a bug" in ended[2].line

@@ -51,6 +51,13 @@ def test_all_that_is_wrong_is_said_at_once(scene_file) -> None:
     assert len(message.splitlines()) == 9
 
 
+def test_what_was_dropped_says_what_to_take(scene_file) -> None:
+    text = '[greens]\nresidual = "second-order"\nchoice = "frequency"\n'
+    message = refused(scene_file(text))
+    assert 'dropped: take "attachment"' in message
+    assert "greens.choice was dropped: greens.dynamic takes the states" in message
+
+
 def test_consequences_are_not_said(scene_file) -> None:
     """One mistake, one message: what other rules would say of a table that is wrong is left out."""
     broken = "[contact]\n[road]\nkind = 'wavy'\nseed = 3\n[static]\nload = 1\n[time]\n"

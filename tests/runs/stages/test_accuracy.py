@@ -11,7 +11,7 @@ from mpi4py import MPI
 from tires import soft_torus
 
 from tireroad.contact.results.error_bars import CAUSES, bars, measured
-from tireroad.contact.tread.compliance import KernelTread
+from tireroad.contact.tread.kernel import KernelTread
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.disk import Refused
 from tireroad.runs.process import console

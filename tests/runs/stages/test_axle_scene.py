@@ -127,7 +127,6 @@ def test_corner_free_wheel_and_the_fixed_axle_as_its_limit(run):
         ("stiffness = [0, 0, -1.0, 0, 0, 0]", "symmetric and positive semidefinite"),
         ('locked = ["w"]', "must be a list of x, y, z"),
         ('body_mass = 3.0\nlocked = ["x", "y", "z", "rx", "rz"]', "no part where z is locked"),
-        ('body_mass = 3.0\n[greens]\nresidual = "second-order"', "knows no [axle]"),
         ('body_mass = 3.0\n[modal]\nrim = "free"\n[damping]\nmass = 0.0', "massless|without mass"),
         (
             '[modal]\nroad = "held"',
@@ -193,7 +192,6 @@ def test_treads_and_brushes_that_cannot_be(tmp_path, contact, told):
         ("", True),
         ("output.axle_force=false", False),
         ("greens.residual=dirac", True),
-        ("greens.residual=second-order", True),
         ("rotation.method=full", True),
     ],
 )
@@ -235,7 +233,7 @@ def test_moments_with_every_residual_in_a_loop(run) -> None:
     """Beside those with attachment modes: as far off as sixty modes are, and none about x and z, which mirror symmetry forbids."""
     base, _, _ = run(SCENE, "--set=greens.residual=attachment", "--until", "contact")
     force, moment = (np.ptp(base[name], axis=0).max() for name in ("axle_force", "hub_moment"))
-    for change in ("greens.residual=dirac", "greens.residual=second-order", "rotation.method=full"):
+    for change in ("greens.residual=dirac", "rotation.method=full"):
         found, _, _ = run(SCENE, f"--set={change}", "--until", "contact")
         off = np.abs(found["hub_moment"] - base["hub_moment"]).max(axis=0) / moment
         assert 0 < off[1] < 0.12, change

@@ -16,7 +16,7 @@ SCENE = (
 [modal]
 count = 120
 [greens]
-residual = "second-order"
+residual = "attachment"
 [[force]]
 direction = [0.3, 0.0, 1.0]
 [output]

@@ -34,7 +34,7 @@ speed = 60.0
 [modal]
 count = 20
 [greens]
-residual = "second-order"
+residual = "attachment"
 [contact]
 tread = "none"
 [road]
