@@ -131,7 +131,7 @@ def _check_count(
         )
 
 
-def settle(
+def equilibrate(
     patch: Patch, solver: ContactSolver, flexibility: np.ndarray, nodal_force: np.ndarray
 ) -> tuple[Patch, float]:
     """The patch in its static state, and the rise delta (m) of the tire.

@@ -157,7 +157,7 @@ class LinearTire(Protocol):
 
     def snapshot(self) -> dict[str, np.ndarray]: ...
 
-    def restore(self, kept: dict[str, np.ndarray]) -> None: ...
+    def restore(self, state: dict[str, np.ndarray]) -> None: ...
 
 
 @runtime_checkable
@@ -243,9 +243,9 @@ class RoadNormal:
         """The state that a checkpoint keeps."""
         return {"normal_force_before": self._force, "normal_tangential": self._tangential}
 
-    def set_state(self, kept: dict[str, Array]) -> None:
+    def set_state(self, state: dict[str, Array]) -> None:
         """Continue from `state`."""
-        self._force, self._tangential = kept["normal_force_before"], kept["normal_tangential"]
+        self._force, self._tangential = state["normal_force_before"], state["normal_tangential"]
 
 
 @dataclass(frozen=True)
@@ -265,16 +265,16 @@ class Loop:
         normal = self.normal.state() if self.normal else {}
         return self.tire.snapshot() | self.solver.state() | friction | memory | normal
 
-    def restore(self, kept: dict[str, np.ndarray]) -> None:
+    def restore(self, state: dict[str, np.ndarray]) -> None:
         """Continue with the same bits as without interruption, on the same number of processes."""
-        self.tire.restore(kept)
-        self.solver.set_state(kept)
+        self.tire.restore(state)
+        self.solver.set_state(state)
         if self.friction:
-            self.friction.set_state(kept)
+            self.friction.set_state(state)
         if self.memory:
-            self.memory.set_state(kept)
+            self.memory.set_state(state)
         if self.normal:
-            self.normal.set_state(kept)
+            self.normal.set_state(state)
 
 
 def roll(
@@ -476,8 +476,11 @@ class DrivenTire:
         }
         return self._tire.snapshot() | {name: np.array(value) for name, value in own.items()}
 
-    def restore(self, kept: dict[str, np.ndarray]) -> None:
+    def restore(self, state: dict[str, np.ndarray]) -> None:
         """Continue from a snapshot."""
-        self._step, (self.work, self.lead) = int(kept["driven_step"]), kept["driven_work"].tolist()
-        self._along = kept["driven_along"]
-        self._tire.restore(kept)
+        self._step, (self.work, self.lead) = (
+            int(state["driven_step"]),
+            state["driven_work"].tolist(),
+        )
+        self._along = state["driven_along"]
+        self._tire.restore(state)

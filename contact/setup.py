@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from tireroad.contact.grid_patch import DeformedTread, make_grid_patch, settle, spread_pull
+from tireroad.contact.grid_patch import DeformedTread, equilibrate, make_grid_patch, spread_pull
 from tireroad.contact.loop import Drive
 from tireroad.contact.model import ContactSpec, static_solver
 from tireroad.contact.patch import LEAST_REACH, Patch, make_patch
@@ -163,7 +163,7 @@ class ContactSetup:
         road = _under(RoadUnderTire(Flat()), self.patch, still)
         return replace(self, road=road, rolled=still, pattern=None)
 
-    def settled(self, response: Response, nodal_force: np.ndarray, spec: ContactSpec) -> tuple:
+    def equilibrated(self, response: Response, nodal_force: np.ndarray, spec: ContactSpec) -> tuple:
         """(setup, rise in m): settle the points on the tread, which the elements lack.
 
         `nodal_force` (s,) N of the finite elements on the outer face. Nodes without a tread are
@@ -178,7 +178,7 @@ class ContactSetup:
         p = len(patch.index)
         flexibility = (response.static() + response.residual)[:p, :p]
         solver = static_solver(spec, patch, flexibility, self.rolled.speed)
-        settled, rise = settle(patch, solver, flexibility, force)
+        settled, rise = equilibrate(patch, solver, flexibility, force)
         if pull is not None:
             settled = replace(settled, pull=spread_pull(settled, pull, force))
         return replace(self, patch=settled), rise

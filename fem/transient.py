@@ -445,12 +445,12 @@ class FullTire:
             kept["air"] = self._air.shared(np.array([air for _, air in states.values()]))
         return kept
 
-    def restore(self, kept: dict[str, np.ndarray]) -> None:
+    def restore(self, state: dict[str, np.ndarray]) -> None:
         """Continue from a snapshot, before `predict`; written by any number of processes."""
         for k, name in enumerate(_STATE):
-            own = self._operators.restrict(kept[name][self._operators.body.ids])
+            own = self._operators.restrict(state[name][self._operators.body.ids])
             if self._air and self._air.mine:
-                own = np.concatenate([own, kept["air"][k]])
+                own = np.concatenate([own, state["air"][k]])
             setattr(self, name, own)
 
     def inertia_force(self) -> np.ndarray:
@@ -592,9 +592,9 @@ class NonlinearTire(FullTire):
     def _stored(self) -> float:
         return self.comm.allreduce(fem.assemble_scalar(self._potential_form))
 
-    def restore(self, kept: dict[str, np.ndarray]) -> None:
+    def restore(self, state: dict[str, np.ndarray]) -> None:
         """Continue from a snapshot, before `predict`; written by any number of processes."""
-        super().restore(kept)
+        super().restore(state)
         self._elastic = self._at(self.displacement, self._forces) - self._rest
 
     def energy(self) -> float:

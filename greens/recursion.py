@@ -97,9 +97,9 @@ class Block:
             "block_before": self._before,
         }
 
-    def restore(self, kept: dict[str, np.ndarray]) -> None:
-        self.state, self._force = kept["block_state"], kept["block_force"]
-        self._before = kept["block_before"]
+    def restore(self, state: dict[str, np.ndarray]) -> None:
+        self.state, self._force = state["block_state"], state["block_force"]
+        self._before = state["block_before"]
 
 
 def block_steps(
@@ -583,17 +583,17 @@ class Recursion:
         block = self._block.snapshot() if self._block else NO_BLOCK
         return kept | self.comm.bcast(block, root=self._idle)
 
-    def restore(self, kept: dict[str, np.ndarray]) -> None:
+    def restore(self, state: dict[str, np.ndarray]) -> None:
         """Continue from a snapshot, after `advance`. Collective when looking ahead."""
         self._state, self._push, self._before = (
-            self._spread.mine(kept[name]).copy() for name in ("state", "push", "push_before")
+            self._spread.mine(state[name]).copy() for name in ("state", "push", "push_before")
         )
-        self._force = self._unknown = kept["push_force"]
+        self._force = self._unknown = state["push_force"]
         self._moved, self._taken = False, True
         if self._block:
-            self._block.restore(kept)
-        if len(kept.get("known_ahead", ())):
-            self._known = kept["known_ahead"]
+            self._block.restore(state)
+        if len(state.get("known_ahead", ())):
+            self._known = state["known_ahead"]
         else:
             self._begin()
 
@@ -693,10 +693,10 @@ class Convolution:
         """The forces so far."""
         return {"history": self._history[: self._n + 1]}
 
-    def restore(self, kept: dict[str, np.ndarray]) -> None:
+    def restore(self, state: dict[str, np.ndarray]) -> None:
         """Continue from a snapshot."""
-        self._n = len(kept["history"]) - 1
-        self._history[: self._n + 1] = kept["history"]
+        self._n = len(state["history"]) - 1
+        self._history[: self._n + 1] = state["history"]
 
     def inertia_force(self) -> np.ndarray:
         """Rate of change of the tire's momentum (3,), N."""

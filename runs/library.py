@@ -459,7 +459,7 @@ def drive(
     )
     response = tire.respond(loads, loads, residual, sparse.vstack([along, across], "csr"))
     spec = NormalContact(law=law)
-    setup, _ = setup.settled(response, static.force, spec)
+    setup, _ = setup.equilibrated(response, static.force, spec)
     fastest = np.abs(response.eigenvalue).max(initial=1.0 / duration)
     largest = min(duration / _LEAST_STEPS, _TURN / fastest) if step is None else step
     chosen = equal_steps(duration, largest)

@@ -65,7 +65,7 @@ class Chosen:
     reason: str
     limit: float = math.inf
 
-    def instead(self, chatter: Chatter) -> Chosen:
+    def next_scheme(self, chatter: Chatter) -> Chosen:
         """The choice after this one exceeded its limit; raises the error if none is left.
 
         On a rough road points open and close, too, because it passes by a good part of their
@@ -236,7 +236,7 @@ class Alternation:
             "alternation_last": self._last,
         }
 
-    def set_state(self, kept: dict[str, np.ndarray]) -> None:
+    def set_state(self, state: dict[str, np.ndarray]) -> None:
         """Continue from `state`."""
-        self.worst = float(kept["alternation"])
-        self._window, self._last = kept["alternation_window"].copy(), kept["alternation_last"]
+        self.worst = float(state["alternation"])
+        self._window, self._last = state["alternation_window"].copy(), state["alternation_last"]

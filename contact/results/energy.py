@@ -57,10 +57,10 @@ class Work:
             "work_moved": self._moved,
         }
 
-    def set_state(self, kept: dict[str, np.ndarray]) -> None:
+    def set_state(self, state: dict[str, np.ndarray]) -> None:
         """Continue from `state`."""
-        self.total, self.lead = kept["work"].tolist()
-        self._forces, self._moved = kept["work_forces"], kept["work_moved"]
+        self.total, self.lead = state["work"].tolist()
+        self._forces, self._moved = state["work_forces"], state["work_moved"]
 
 
 class Dissipation:
@@ -109,10 +109,10 @@ class Dissipation:
         """The state that a checkpoint keeps."""
         return {"dissipation": np.array([self.lost, self.drive]), "dissipation_last": self._last}
 
-    def set_state(self, kept: dict[str, np.ndarray]) -> None:
+    def set_state(self, state: dict[str, np.ndarray]) -> None:
         """Continue from `state`."""
-        self.lost, self.drive = kept["dissipation"].tolist()
-        self._last = kept["dissipation_last"]
+        self.lost, self.drive = state["dissipation"].tolist()
+        self._last = state["dissipation_last"]
 
 
 def _power(rates: np.ndarray, forces: np.ndarray) -> np.ndarray:
@@ -157,10 +157,10 @@ class Circulation:
             "circulation_forces": self._forces,
         }
 
-    def set_state(self, kept: dict[str, np.ndarray]) -> None:
+    def set_state(self, state: dict[str, np.ndarray]) -> None:
         """Continue from `state`."""
-        self.work, self.lead = kept["circulation"].tolist()
-        self._forces = kept["circulation_forces"]
+        self.work, self.lead = state["circulation"].tolist()
+        self._forces = state["circulation_forces"]
 
 
 def stored(coordinates: np.ndarray, rates: np.ndarray, stiffness: np.ndarray) -> float:
@@ -349,8 +349,8 @@ class Totals:
             self.work.state() | self.alternation.state()
         )
 
-    def set_state(self, kept: dict[str, np.ndarray]) -> None:
+    def set_state(self, state: dict[str, np.ndarray]) -> None:
         """Continue from `state`."""
-        self.figures = StepScalars(**{name: kept[name].item() for name in vars(self.figures)})
-        self.work.set_state(kept)
-        self.alternation.set_state(kept)
+        self.figures = StepScalars(**{name: state[name].item() for name in vars(self.figures)})
+        self.work.set_state(state)
+        self.alternation.set_state(state)

@@ -234,12 +234,12 @@ class ActiveSet:
         signs = {"signs": self._signs, "signs_before": self._before}
         return {"active": self.active, "factorised": self.factorised} | signs
 
-    def set_state(self, kept: dict[str, Array | Mask]) -> None:
+    def set_state(self, state: dict[str, Array | Mask]) -> None:
         """Continue from `state`."""
-        self.active = np.asarray(kept["active"], dtype=bool)
-        self._signs = np.asarray(kept["signs"], dtype=float)
-        self._before = np.asarray(kept["signs_before"], dtype=float)
-        self.refactor(np.asarray(kept["factorised"], dtype=bool))
+        self.active = np.asarray(state["active"], dtype=bool)
+        self._signs = np.asarray(state["signs"], dtype=float)
+        self._before = np.asarray(state["signs_before"], dtype=float)
+        self.refactor(np.asarray(state["factorised"], dtype=bool))
 
     @property
     def factorised(self) -> Mask:
@@ -426,17 +426,17 @@ class UsualSet:
         kept |= {"taken": pivot.taken, "base": pivot.base, "pressed": self._pressed}
         return kept | {"exchanged": inner.factorised}
 
-    def set_state(self, kept: dict[str, Array | Mask]) -> None:
+    def set_state(self, state: dict[str, Array | Mask]) -> None:
         """Continue from `state`."""
-        if "taken" not in kept:
+        if "taken" not in state:
             return
         masks = ("active", "pressed", "taken", "base", "exchanged")
         self.active, self._pressed, taken, base, exchanged = (
-            np.array(kept[name], dtype=bool) for name in masks
+            np.array(state[name], dtype=bool) for name in masks
         )
         _, inner = self._take(taken, base)
         inner.refactor(exchanged)
-        self._share, self._lost = np.array(kept["share"], dtype=float), float(kept["lost"])
+        self._share, self._lost = np.array(state["share"], dtype=float), float(state["lost"])
 
     @property
     def factorisations(self) -> int:

@@ -275,11 +275,11 @@ class ProjectedCG:
         kept = {"last": self._last, "before": self._before, "box": np.array(self._box, dtype=float)}
         return {name: value for name, value in kept.items() if value is not None}
 
-    def set_state(self, kept: dict[str, Array]) -> None:
+    def set_state(self, state: dict[str, Array]) -> None:
         """Continue from `state`."""
-        self._last, self._before = kept.get("last"), kept.get("before")
-        if "box" in kept:
-            top, bottom, left, right = (int(value) for value in kept["box"])
+        self._last, self._before = state.get("last"), state.get("before")
+        if "box" in state:
+            top, bottom, left, right = (int(value) for value in state["box"])
             self._take_box((top, bottom, left, right))
 
     def block(self, index: NDArray[np.intp]) -> Array:

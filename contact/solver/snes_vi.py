@@ -216,9 +216,9 @@ class SnesVI:
         """The state from which the next solve starts."""
         return {"scaled": self._force.array_r.copy()}
 
-    def set_state(self, kept: dict[str, Array]) -> None:
+    def set_state(self, state: dict[str, Array]) -> None:
         """Continue from `state`."""
-        self._force.array[:] = kept["scaled"]
+        self._force.array[:] = state["scaled"]
 
     def block(self, index: NDArray[np.intp]) -> Array:
         """A between the points `index`, (a, a) m/N."""

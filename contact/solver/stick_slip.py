@@ -344,10 +344,10 @@ class BrushFriction:
         kept = {"horizontal": self.horizontal, "horizontal_before": self._before}
         return self._brush.state() | kept
 
-    def set_state(self, kept: dict[str, Array]) -> None:
+    def set_state(self, state: dict[str, Array]) -> None:
         """Continue from `state`."""
-        self.horizontal, self._before = kept["horizontal"], kept["horizontal_before"]
-        self._brush.set_state(kept)
+        self.horizontal, self._before = state["horizontal"], state["horizontal_before"]
+        self._brush.set_state(state)
 
     def solve(
         self, normal: ContactSolver, q: Array, guess: Mask | None, static: Array, free: Array

@@ -71,8 +71,8 @@ def on_nodes(patch: Patch, node_area: Array, wall: Influence) -> Array:
     return (found + found.T) / 2
 
 
-def unsettled(patch: Patch, known: Array, nodal_force: Array) -> Patch:
-    """The unsettled patch for nodes more rigid by `known` N (p, p), of the same unloaded shape.
+def before_equilibrium(patch: Patch, known: Array, nodal_force: Array) -> Patch:
+    """The patch before its equilibrium for nodes more rigid by `known` N (p, p), of the same unloaded shape.
 
     `nodal_force` (p,) N: the forces under which its gap was computed.
     """

@@ -122,10 +122,10 @@ class Brush:
         """The state that a checkpoint keeps."""
         return {"deflection": self.deflection, "moved": self._moved, "touched": self._touched}
 
-    def set_state(self, kept: dict[str, np.ndarray]) -> None:
+    def set_state(self, state: dict[str, np.ndarray]) -> None:
         """Continue from `state`."""
-        self.deflection, self._moved = kept["deflection"], kept["moved"]
-        self._touched = np.asarray(kept["touched"], dtype=bool)
+        self.deflection, self._moved = state["deflection"], state["moved"]
+        self._touched = np.asarray(state["touched"], dtype=bool)
 
 
 def next_ahead(x: Array, line: Array) -> tuple[NDArray[np.intp], Array]:

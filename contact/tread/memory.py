@@ -168,10 +168,10 @@ class TreadMemory:
             "creep_offset": np.array(self._offset),
         }
 
-    def set_state(self, kept: dict[str, Array]) -> None:
+    def set_state(self, state: dict[str, Array]) -> None:
         """Continue from `state`."""
-        self._kept, self._force = kept["creep"], kept["creep_force"]
-        self._offset = float(kept["creep_offset"])
+        self._kept, self._force = state["creep"], state["creep_force"]
+        self._offset = float(state["creep_offset"])
 
 
 def _each(factor: Array) -> Array:

@@ -244,7 +244,7 @@ def _read(entry: Entry) -> SolveOutcome:
     return SolveOutcome(bool(converged), int(iterations), float(residual), reason)
 
 
-class Drag:
+class RestoringSprings:
     """Springs of `stiffness` (owned unknowns,) N/m to the displacement at the last `here`."""
 
     def __init__(self, body: Body, stiffness: float) -> None:
@@ -284,13 +284,13 @@ class Forces:
     """All forces except those of the road. Forms and matrix are created once. Collective.
 
     `pressure` (Pa) may be changed, and `rolls`, the share of the inertial forces of rolling; `cost`:
-    seconds by part; `drag`: springs that slow the body during a snap.
+    seconds by part; `springs`: springs that slow the body during a snap.
     """
 
     def __init__(self, body: Body, rolling: Rolling) -> None:
         self.body, self.rolling = body, rolling
         self.cost = Timing()
-        self.drag: Drag | None = None
+        self.springs: RestoringSprings | None = None
         self.pressure = fem.Constant(body.mesh, 0.0)
         self.rolls = fem.Constant(body.mesh, 1.0)
         self._before = fem.Function(body.space)
@@ -336,8 +336,8 @@ class Forces:
             local.set(0.0)
         fem.petsc.assemble_vector(self._work, self._residual)
         self._work.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-        if self.drag:
-            self.drag.add_to(self._work.array)
+        if self.springs:
+            self.springs.add_to(self._work.array)
         self._work.array[self._rim] = 0.0
         return self._work.array_r
 
@@ -345,8 +345,8 @@ class Forces:
         self._local_tangent.zeroEntries()
         fem.petsc.assemble_matrix(self._local_tangent, self._tangent, bcs=self._clamp)
         self._local_tangent.assemble()
-        if self.drag:
-            self.drag.stiffen(self._local_tangent)
+        if self.springs:
+            self.springs.stiffen(self._local_tangent)
         if self._damping:
             self.matrix = self._damping.completed(self._local_tangent)
 

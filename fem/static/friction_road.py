@@ -373,9 +373,9 @@ class RubbingRoad(RoadContact):
     def kept(self) -> tuple[Any, ...]:
         return *super().kept(), self.sticks.copy(), self.pull.copy(), self._slips, self._way
 
-    def put_back(self, kept: tuple[Any, ...]) -> None:
-        super().put_back(kept[:3])
-        self.sticks, self.pull, self._slips, self._way = kept[3:]
+    def put_back(self, state: tuple[Any, ...]) -> None:
+        super().put_back(state[:3])
+        self.sticks, self.pull, self._slips, self._way = state[3:]
 
     @property
     def travel(self) -> float | None:

@@ -1,4 +1,4 @@
-"""Load steps to a state: step control, secants for a load, springs and drag where a tire snaps.
+"""Load steps to a state: step control, secants for a load, and a rescue where a tire snaps.
 
 Equilibrium from a state of another mesh whose displacement is close but whose forces are not.
 
@@ -44,7 +44,7 @@ from mpi4py import MPI
 
 from tireroad.fem.errors import ConvergenceError, InputError, LoadingStopped
 from tireroad.fem.parallel import on_root
-from tireroad.fem.static.equilibrium import Drag, Equilibrium, SolveOutcome
+from tireroad.fem.static.equilibrium import Equilibrium, RestoringSprings, SolveOutcome
 from tireroad.fem.static.footprint import TreadSurface
 from tireroad.fem.static.symmetric import (
     AxisymmetricEquilibrium,
@@ -83,21 +83,21 @@ def balance_near(
         step = equilibrium.solve(road_height, allowed=allowed)
         if step.converged:
             return step
-    return _dragged(equilibrium, road_height, load, allowed)
+    return _balance_with_springs(equilibrium, road_height, load, allowed)
 
 
-def _dragged(
+def _balance_with_springs(
     equilibrium: Equilibrium, road_height: float, load: float, allowed: float
 ) -> SolveOutcome:
     body, road, field = equilibrium.body, equilibrium.road, equilibrium.body.u.x
     kept = field.array.copy(), road.kept(), equilibrium.road_height
     typical = equilibrium.force_scale / body.ring.thickness
-    drag, tangents = Drag(body, _FIRST * typical), 0
+    springs, tangents = RestoringSprings(body, _FIRST * typical), 0
     share = _FIRST
     for _ in range(_MOST):
-        equilibrium.drag = drag
+        equilibrium.springs = springs
         step = equilibrium.solve(road_height, allowed=_DRAGGED * load)
-        equilibrium.drag = None
+        equilibrium.springs = None
         tangents += step.iterations
         if step.converged and share <= _FIRST:
             step = equilibrium.solve(road_height, allowed=allowed)
@@ -107,9 +107,9 @@ def _dragged(
             factor = _EASED
         else:
             factor = _EASED if step.converged else _RAISED
-        drag.here()
+        springs.here()
         share *= factor
-        drag.stiffness *= factor
+        springs.stiffness *= factor
     field.array[:], equilibrium.road_height = kept[0], kept[2]
     road.put_back(kept[1])
     return replace(step, iterations=tangents)
@@ -121,7 +121,9 @@ _MOST_FALLS = 80  # steps; a section that folds at a tenth of a metre takes 20 t
 _DRAG_EASED, _DRAG_RAISED = 0.25, 8.0
 
 
-def fall(equilibrium: Equilibrium, road_height: float, allowed: float = 0.0) -> SolveOutcome:
+def pseudo_transient(
+    equilibrium: Equilibrium, road_height: float, allowed: float = 0.0
+) -> SolveOutcome:
     """The stable state reached from the present one, on a road at `road_height` (m). Collective.
 
     As `Equilibrium.solve`; on failure body and road are restored.
@@ -129,19 +131,19 @@ def fall(equilibrium: Equilibrium, road_height: float, allowed: float = 0.0) -> 
     field, road = equilibrium.body.u.x, equilibrium.road
     kept = field.array.copy(), road.kept(), equilibrium.road_height
     typical = equilibrium.force_scale / equilibrium.body.ring.thickness
-    equilibrium.drag = drag = Drag(equilibrium.body, _FIRST_DRAG * typical)
+    equilibrium.springs = springs = RestoringSprings(equilibrium.body, _FIRST_DRAG * typical)
     share, tangents = 1.0, 0
     for _ in range(_MOST_FALLS):
         step = equilibrium.solve(road_height, allowed=allowed)
         tangents += step.iterations
-        if step.converged and equilibrium.drag is None:
+        if step.converged and equilibrium.springs is None:
             return replace(step, iterations=tangents, reason="snapped through")
         factor = _DRAG_EASED if step.converged else _DRAG_RAISED
-        drag.here()
+        springs.here()
         share *= factor
-        drag.stiffness *= factor
-        equilibrium.drag = drag if share > _LAST else None
-    equilibrium.drag = None
+        springs.stiffness *= factor
+        equilibrium.springs = springs if share > _LAST else None
+    equilibrium.springs = None
     field.array[:], equilibrium.road_height = kept[0], kept[2]
     road.put_back(kept[1])
     return SolveOutcome(
@@ -175,14 +177,14 @@ def march(
     first: float,
     show: Show,
     start: float = 0.0,
-    fall: Attempt | None = None,
+    rescue: Attempt | None = None,
     enough: Callable[[], bool] = lambda: False,
     seen: Callable[[SolveOutcome, float, Show], None] = lambda step, target, show: None,
     smallest: float = _SMALLEST,
 ) -> None:
     """From a converged `start` to `end` in steps, the first of size `first`. Collective.
 
-    If steps keep failing, `fall` searches for a state not near the last one. Ends before `end`
+    If steps keep failing, `rescue` searches for a state not near the last one. Ends before `end`
     after a converged step that is `enough`. `seen` is told of each step. Raises LoadingStopped if
     steps of the share `smallest` of the first do not converge either.
     """
@@ -193,8 +195,8 @@ def march(
         step = attempt(target)
         seen(step, target, show)
         failures = 0 if step.converged else failures + 1
-        if fall is not None and failures == _STUCK:
-            step = fall(target)
+        if rescue is not None and failures == _STUCK:
+            step = rescue(target)
             seen(step, target, show)
         if step.converged:
             done, failures = target, 0
@@ -393,7 +395,7 @@ class LoadPath:
 
         def let_go(deflection: float) -> SolveOutcome:
             height = self._loader.touch + deflection
-            return self._learnt(fall(self._equilibrium, height, allowed), deflection)
+            return self._learnt(pseudo_transient(self._equilibrium, height, allowed), deflection)
 
         largest = 0.25 * self._body.ring.thickness
         show = Show("deflection", 1.0, "m")

@@ -49,7 +49,7 @@ def press(
 
 
 @dataclass(frozen=True)
-class Near:
+class InitialState:
     """A state on the road to start from, of the same body under almost the same loads.
 
     `inflated` and `pressed`: `u` of the body; `force` (nodes,) N of the road on own nodes, at
@@ -62,7 +62,7 @@ class Near:
     height: float | None
 
     @classmethod
-    def of(cls, loader: LoadStepper, pressed: LoadStepper) -> Near:
+    def of(cls, loader: LoadStepper, pressed: LoadStepper) -> InitialState:
         """The present state of the body that `loader` inflated and `place` pressed."""
         equilibrium = pressed.equilibrium
         field = loader.body.u.x.array.copy()
@@ -92,7 +92,7 @@ def place(
     deflection: float | None,
     road_height: float | None,
     friction: Friction | None = None,
-    near: Near | None = None,
+    initial: InitialState | None = None,
 ) -> LoadStepper:
     """Press the inflated tire on the road as in `press`; load and deflection along its normal.
 
@@ -114,7 +114,7 @@ def place(
     elif road_height is not None:
         rise = road_height - loader.touch
     carried = None if load is None else load * upright
-    if near is None or not near.reaches(loader, carried, rise):
+    if initial is None or not initial.reaches(loader, carried, rise):
         _raise_road(loader, carried, rise)
     if friction is None or not loader.load():
         return loader

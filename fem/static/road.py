@@ -212,9 +212,9 @@ class RoadContact:
         """The state for `put_back`."""
         return self.active.copy(), self.force.copy(), self.height
 
-    def put_back(self, kept: tuple[Any, ...]) -> None:
-        """Restore a state from `kept`."""
-        self.active, self.force, self.height = kept
+    def put_back(self, state: tuple[Any, ...]) -> None:
+        """Restore a state from `state`."""
+        self.active, self.force, self.height = state
 
     def choose(self) -> bool:
         """Update the active set; True if it changed on any process. Collective."""

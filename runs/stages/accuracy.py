@@ -27,7 +27,12 @@ from tireroad.contact.results.error_bars import (
 )
 from tireroad.contact.results.spectra import Limit, limits, lowest, pitch
 from tireroad.contact.setup import ContactSetup, on_shape
-from tireroad.contact.tread.between_nodes import Backed, on_nodes, over_rectangles, unsettled
+from tireroad.contact.tread.between_nodes import (
+    Backed,
+    before_equilibrium,
+    on_nodes,
+    over_rectangles,
+)
 from tireroad.contact.tread.compliance import Influence
 from tireroad.contact.tread.laws.elastic import ElasticLayer, HalfSpace
 from tireroad.fem.errors import ConvergenceError, InputError
@@ -93,7 +98,7 @@ def backed(job: Job, static: StaticState, setup: ContactSetup, response: Respons
     count = len(patch.index)
     residual = response.residual.copy()
     residual[:count, :count] -= known
-    patch = unsettled(patch, known, static.normal_force[patch.index])
+    patch = before_equilibrium(patch, known, static.normal_force[patch.index])
     spec = NormalContact(law=Backed(law=contact.law, wall=wall), solver=contact.solver)
     return Backing(spec, replace(setup, patch=patch), replace(response, residual=residual))
 
@@ -141,17 +146,17 @@ class Given:
     @property
     def points_ratio(self) -> float:
         """Spacing of the points of their companion over the run's."""
-        return ratio(self.settled.patch, self.most)
+        return ratio(self.equilibrated.patch, self.most)
 
     @cached_property
-    def settled(self) -> ContactSetup:
+    def equilibrated(self) -> ContactSetup:
         """The setup with its patch in the static state."""
-        return settled(self.job, self.setup, self.response, self.static.product.normal_force)
+        return equilibrated(self.job, self.setup, self.response, self.static.product.normal_force)
 
     @cached_property
     def longer(self) -> ContactForces:
         """The run repeated with twice its time step. Collective."""
-        return self.repeated(self.settled, self.response, coarser=2)
+        return self.repeated(self.equilibrated, self.response, coarser=2)
 
     @cached_property
     def base(self) -> ContactForces | None:
@@ -165,7 +170,7 @@ class Given:
         kept = self.response.resolved(step)
         if len(kept.every) < len(self.response.resolved(self.step).every):
             return None
-        patch = self.settled.patch
+        patch = self.equilibrated.patch
         steps = oscillation(spec, patch, kept, step, bristles(spec, patch))
         if self.scheme == "linear" and choose(steps).scheme != "linear":
             return None
@@ -204,9 +209,11 @@ class Given:
         return forces(self.job, setup, response, step, steps, self.scheme, contact)
 
 
-def settled(job: Job, setup: ContactSetup, response: Response, force: np.ndarray) -> ContactSetup:
+def equilibrated(
+    job: Job, setup: ContactSetup, response: Response, force: np.ndarray
+) -> ContactSetup:
     """The setup with its patch in the static state under the nodal forces (s,) N."""
-    return setup.settled(response, force, job.scene.contact)[0]
+    return setup.equilibrated(response, force, job.scene.contact)[0]
 
 
 STATIC_TO_GREENS: tuple[type[PipelinePart], ...] = (
@@ -262,7 +269,7 @@ def coarser(run: Job, static: Result[StaticState]) -> tuple[Job, dict[str, Resul
         part = (
             CoarserStatic(job=job, run=run, near=static)
             if kind is StaticStage
-            else kind.taken(job, done)
+            else kind.with_inputs(job, done)
         )
         if (found := _made(job, kind, part, done)) is not None:
             done[kind.name] = found
@@ -301,7 +308,7 @@ def _made(
 ) -> Result | None:
     """The result of one part of the chain; None if it has none. Collective."""
     if kind is RotatingStage and not job.speed:
-        return RotatingStage.instead(job, done)
+        return RotatingStage.if_skipped(job, done)
     return part.result() if part else None
 
 
@@ -353,7 +360,7 @@ class Budget:
         """Last step of companion runs: `least`, more as far as the budget goes; even."""
         spacing = given.points_ratio
         each = _LOOPS[spacing] * self.loop
-        if spacing < 1 and (finer := finer_touching(given.settled.patch)) > MOST:
+        if spacing < 1 and (finer := finer_touching(given.equilibrated.patch)) > MOST:
             each += _TOUCHING * finer / 2
         count = round((self._whole - _COARSE * self.before) / each)
         count = int(np.clip(count, min(least, self.steps), self.steps))
@@ -389,7 +396,7 @@ def other_points(given: Given) -> ContactForces:
         patch = halved(patch, surface, height, given.setup.reach)
         patch = on_shape(patch, given.static.product.road)
     setup = replace(given.setup, patch=patch)
-    setup = settled(job, setup, given.response, given.static.product.normal_force)
+    setup = equilibrated(job, setup, given.response, given.static.product.normal_force)
     return given.of(job).repeated(setup, given.response)
 
 
@@ -407,7 +414,7 @@ def fewer_modes(given: Given) -> ContactForces:
     )
     if len(kept.every) == len(given.response.every):
         raise InputError("all states lie far below the highest mode: none can be left out")
-    return given.repeated(given.settled, kept)
+    return given.repeated(given.equilibrated, kept)
 
 
 def coarser_mesh(given: Given) -> ContactForces:
@@ -415,7 +422,7 @@ def coarser_mesh(given: Given) -> ContactForces:
     job, done = coarser(given.job, given.static)
     response, state = done["greens"].product.contact, done["static"].product
     setup = done["setup"].product.with_slip(given.free_slip)
-    setup = settled(job, setup, response, state.normal_force)
+    setup = equilibrated(job, setup, response, state.normal_force)
     return given.of(job).repeated(setup, response)
 
 
@@ -427,7 +434,7 @@ def finer_wall(given: Given) -> ContactForces:
     """
     force = given.static.product.normal_force
     made = backed(given.job, given.static.product, given.setup, given.response)
-    setup = made.setup.settled(made.response, force, made.contact)[0]
+    setup = made.setup.equilibrated(made.response, force, made.contact)[0]
     return given.repeated(setup, made.response, contact=made.contact)
 
 

@@ -306,14 +306,14 @@ class Losses:
         aside = {f"leaning_{name}": value for name, value in self._aside.state().items()}
         return self._motion.losses.state() | self._circulation.state() | aside
 
-    def set_state(self, kept: dict[str, np.ndarray]) -> None:
+    def set_state(self, state: dict[str, np.ndarray]) -> None:
         """Continue from a `state`."""
         if self._motion is not None:
-            self._motion.losses.set_state(kept)
-            self._circulation.set_state(kept)
+            self._motion.losses.set_state(state)
+            self._circulation.set_state(state)
             mark = "leaning_"
             self._aside.set_state(
-                {name.removeprefix(mark): kept[name] for name in kept if name.startswith(mark)}
+                {name.removeprefix(mark): state[name] for name in state if name.startswith(mark)}
             )
 
 
@@ -475,7 +475,7 @@ class ContactStage(Stage[ContactHistory]):
         response, setup = self.greens.product.contact, self.setup.product
         plan = planned(self.job, record, response, self._shortest_period())
         with record.timing("tread and solver"):
-            setup, rise = setup.settled(
+            setup, rise = setup.equilibrated(
                 response, self.static.product.normal_force, self.job.scene.contact
             )
             if rise:
@@ -494,7 +494,7 @@ class ContactStage(Stage[ContactHistory]):
             try:
                 return self._attempt(key, record, setup, slip, plan, chosen)
             except Chatter as chatter:
-                chosen = reported(record, chosen.instead(chatter))
+                chosen = reported(record, chosen.next_scheme(chatter))
                 forget_checkpoint(self.job)
 
     def _rolling_freely(self, record: Record, setup: ContactSetup, plan: Planned, scheme: str):

@@ -51,7 +51,7 @@ from tireroad.runs.stages.stage import (
     PipelinePart,
     Result,
     Stage,
-    entered,
+    failure_recorded,
     largest_memory,
 )
 from tireroad.runs.stages.static import StaticStage
@@ -182,11 +182,11 @@ def run_scene(
     done: dict[str, Result] = {}
     with _factors(on_disk, directory, comm):
         for kind in PARTS:
-            with entered(kind.name, summary, comm):
+            with failure_recorded(kind.name, summary, comm):
                 if issubclass(kind, Stage) and kind.name in reasons:
                     found = _skipped(kind, job, done, reasons[kind.name], summary)
                 else:
-                    part = kind.taken(job, done)
+                    part = kind.with_inputs(job, done)
                     found = part.result(summary) if part else None
                 if found is not None:
                     done[kind.name] = found
@@ -228,7 +228,7 @@ def _skipped(kind: type[Stage], job: Job, done, reason: str, summary: Summary) -
     """What later parts receive instead of a stage that is skipped for a `reason`. Collective."""
     console.say(f"{kind.name:9s} skipped: {reason}")
     on_root(job.comm, lambda: summary.record(kind.name, "skipped", reason=reason))
-    return kind.instead(job, done)
+    return kind.if_skipped(job, done)
 
 
 @contextmanager

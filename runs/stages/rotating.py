@@ -126,7 +126,7 @@ class RotatingStage(Computed[RollingModes]):
         )
 
     @classmethod
-    def instead(cls, job: Job, done: Mapping[str, Result]) -> Result[RollingModes] | None:
+    def if_skipped(cls, job: Job, done: Mapping[str, Result]) -> Result[RollingModes] | None:
         """For a wheel at rest, the states follow from the modes in closed form."""
         if "modes" not in done or job.speed:
             return None

@@ -593,7 +593,7 @@ def listen(
     job = Job(replace(scene, sound=table), results.directory, MPI.COMM_SELF)
     done: dict[str, Result] = {}
     for kind in PARTS:
-        part = kind.taken(job, done)
+        part = kind.with_inputs(job, done)
         if isinstance(part, RadiationStage | SoundStage):
             done[kind.name] = Result("", partial(part.compute, Record()))
         elif isinstance(part, Shared):

@@ -264,7 +264,7 @@ class PipelinePart(ABC, Generic[P]):
         """The part's product and its key; with a `summary`, its cost is reported. Collective."""
 
     @classmethod
-    def taken(cls, job: Job, done: Mapping[str, Result]) -> PipelinePart | None:
+    def with_inputs(cls, job: Job, done: Mapping[str, Result]) -> PipelinePart | None:
         """The part with its inputs from `done`; None if a required input is missing."""
         given: dict[str, Any] = {}
         for item in fields(cls):
@@ -344,7 +344,7 @@ class Stage(PipelinePart[P]):
         return Result(key, lambda: product)
 
     @classmethod
-    def instead(cls, job: Job, done: Mapping[str, Result]) -> Result[P] | None:
+    def if_skipped(cls, job: Job, done: Mapping[str, Result]) -> Result[P] | None:
         """What later parts receive if this stage is skipped; None: nothing."""
         return None
 
@@ -555,7 +555,7 @@ FAILURES = "TIREROAD_FAILURES"
 
 
 @contextmanager
-def entered(stage: str, summary: Summary, comm: MPI.Comm) -> Iterator[None]:
+def failure_recorded(stage: str, summary: Summary, comm: MPI.Comm) -> Iterator[None]:
     """Within the context, an error or a stop is entered in the summary by the root process."""
     try:
         yield
@@ -568,7 +568,7 @@ def entered(stage: str, summary: Summary, comm: MPI.Comm) -> Iterator[None]:
         raise
 
 
-def remember(stage: str, key: str, run: str, error: ConvergenceError) -> None:
+def record_failure(stage: str, key: str, run: str, error: ConvergenceError) -> None:
     """Keep why the stage of a `run` failed, if failures are kept. Root process only."""
     if (file := _file(stage, key)) and not file.exists():
         with suppress(OSError):
@@ -621,7 +621,7 @@ def _remembering(stage: Stage, key: str) -> Iterator[None]:
         yield
     except ConvergenceError as error:
         if stage.job.comm.rank == 0:  # not on_root: other processes need not have failed
-            remember(stage.name, key, stage.job.scene.name, error)
+            record_failure(stage.name, key, stage.job.scene.name, error)
         raise
 
 

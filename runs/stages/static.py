@@ -15,7 +15,7 @@ from tireroad.fem.static.equilibrium import Equilibrium, SolutionHistory
 from tireroad.fem.static.footprint import Footprint
 from tireroad.fem.static.load_error import UNKNOWN, load_error
 from tireroad.fem.static.load_steps import LoadStepper, with_cause
-from tireroad.fem.static.press import Near, place
+from tireroad.fem.static.press import InitialState, place
 from tireroad.fem.static.state import CordForce, StaticState, static_state
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.timing import Timing
@@ -207,12 +207,12 @@ class StaticStage(Computed[StaticState]):
 
         At a travel speed it is solved again until the wheel's speed matches its rolling radius.
         """
-        speed, near, steps, turns = self.job.speed, None, 0, 0
+        speed, initial, steps, turns = self.job.speed, None, 0, 0
         with checkpointed(self, "solution(s)") as journal:
             journal.agreed(self.job.comm)
             history = SolutionHistory(journal)
             while True:
-                state, loader, near = self._solved(record, speed, history, near)
+                state, loader, initial = self._solved(record, speed, history, initial)
                 steps, turns = steps + loader.newton_steps, turns + 1
                 before, speed = speed, self.job.free_speed(state)
                 same = abs(speed - before) <= _SAME_SPEED * speed or not state.rolling.speed
@@ -237,8 +237,8 @@ class StaticStage(Computed[StaticState]):
         return state
 
     def _solved(
-        self, record: Record, speed: float, history: SolutionHistory, near: Near | None
-    ) -> tuple[StaticState, LoadStepper, Near]:
+        self, record: Record, speed: float, history: SolutionHistory, initial: InitialState | None
+    ) -> tuple[StaticState, LoadStepper, InitialState]:
         """Solve up to the state at `speed` rad/s: in load steps, or from a state `near`, that of
         another speed. Collective."""
         rolling = steady_rolling(self.job, speed)
@@ -248,7 +248,7 @@ class StaticStage(Computed[StaticState]):
         loader = LoadStepper(equilibrium, _show)
         began = Timing.clock()
         try:
-            pressed = self._press(loader, rolling, near)
+            pressed = self._press(loader, rolling, initial)
         except ConvergenceError as error:
             kept = self._keep_last(loader)
             cause = with_cause(error, loader, rolling, lambda other: self._press(other, rolling))
@@ -260,16 +260,16 @@ class StaticStage(Computed[StaticState]):
         spent["other"] = Timing.clock() - began - sum(spent.values())
         record.cost.take(spent)  # at a travel speed that of each solution
         state = static_state(pressed.equilibrium, loader.touch)
-        return state, loader, Near.of(loader, pressed)
+        return state, loader, InitialState.of(loader, pressed)
 
     def _press(
-        self, loader: LoadStepper, rolling: Rolling, near: Near | None = None
+        self, loader: LoadStepper, rolling: Rolling, initial: InitialState | None = None
     ) -> LoadStepper:
         """Inflate the tire and press it on the road; returns the final loader. Collective."""
         wanted = self.job.scene.static
-        loader.inflate(wanted.inflation, None if near is None else near.inflated)
+        loader.inflate(wanted.inflation, None if initial is None else initial.inflated)
         placed = wanted.load, wanted.deflection, wanted.road_height
-        return place(loader, *placed, friction_of(self.job.scene, rolling), near)
+        return place(loader, *placed, friction_of(self.job.scene, rolling), initial)
 
     def _keep_last(self, loader: LoadStepper) -> str:
         """Write the last converged state, if any; returns a sentence saying where. Collective."""

@@ -450,7 +450,7 @@ class Rigid:
     def snapshot(self) -> dict[str, np.ndarray]:
         return {}
 
-    def restore(self, kept: dict[str, np.ndarray]) -> None: ...
+    def restore(self, state: dict[str, np.ndarray]) -> None: ...
 
 
 def grooved_rows() -> Iterator[tuple]:

@@ -84,7 +84,7 @@ def _law(name: str, given: Prepared, tread: str, **keys: float) -> Outcome:
     """The time loop with that tread law."""
     run = given.run
     spec = replace(given.run.job.scene.contact, tread=tread, law=TREADS.make(tread, **keys))
-    setup, _ = run.setup.settled(run.greens.contact, run.static.normal_force, spec)
+    setup, _ = run.setup.equilibrated(run.greens.contact, run.static.normal_force, spec)
     trial = Conditions(spec, setup, DURATION)
     history = modal(Prepared(run, trial), run.greens.contact, STEP)
     return Outcome(name, history.values["contact force"][:, 2], history.seconds)

@@ -9,9 +9,9 @@ from mpi4py import MPI
 from tireroad.contact import grid_patch, model
 from tireroad.contact.grid_patch import (
     PointTire,
+    equilibrate,
     halved,
     make_grid_patch,
-    settle,
     spread_pull,
     thinned,
 )
@@ -105,7 +105,7 @@ def test_settled_state_keeps_the_load(tread, pitch: float) -> None:
     p = len(patch.index)
     flexibility = 1e-5 * (np.eye(p) + 0.5)
     spec = ContactTable(law=HalfSpace(youngs_modulus=5e6), points=Pitch(pitch, pitch))
-    settled, rise = settle(patch, step_solver(spec, patch, flexibility), flexibility, nodal)
+    settled, rise = equilibrate(patch, step_solver(spec, patch, flexibility), flexibility, nodal)
     assert settled.force.sum() == pytest.approx(500.0, rel=1e-7)
     assert settled.force.min() >= 0 and settled.gap.min() >= 0
     assert not (settled.force * settled.gap).any()
@@ -123,7 +123,7 @@ def test_a_patch_clear_of_the_road_settles_without_force(tread) -> None:
     spec = ContactTable(law=HalfSpace(youngs_modulus=5e6), points=Pitch(0.004, 0.004))
     patch = replace(patch, gap=patch.gap - 1e-5)
     free = np.zeros_like(force[patch.index])
-    settled, rise = settle(patch, step_solver(spec, patch, flexibility), flexibility, free)
+    settled, rise = equilibrate(patch, step_solver(spec, patch, flexibility), flexibility, free)
     assert not settled.force.any() and settled.gap.min() == 0.0
     assert rise == pytest.approx(-patch.gap.min())
     pull = spread_pull(settled, np.zeros((len(free), 2)), free)
@@ -151,7 +151,7 @@ def test_nodes_and_points_exchange_the_same_work(tread, most, monkeypatch) -> No
         def snapshot(self):
             return {}
 
-        def restore(self, kept):
+        def restore(self, state):
             pass
 
     tire = Tire()

@@ -101,7 +101,7 @@ def test_nodes_settle_on_their_tread(wheel) -> None:
     """f >= 0, g = g_0 + A (f - f_0) + C~ f + rise >= 0, f g = 0, the load kept: the static state had no tread."""
     setup, response, face = wheel
     patch, spec = setup.patch, ContactTable(law=HalfSpace(youngs_modulus=1e7))
-    settled, rise = setup.settled(response, face, spec)
+    settled, rise = setup.equilibrated(response, face, spec)
     found = settled.patch
     assert found.force.sum() == pytest.approx(LOAD, rel=1e-7) and found.force.min() >= 0
     assert rise < -1e-4  # a tread that gives way lets the tire sink
@@ -110,13 +110,15 @@ def test_nodes_settle_on_their_tread(wheel) -> None:
     assert gap.min() > -1e-9 and found.gap == pytest.approx(np.maximum(gap, 0.0), abs=1e-9)
     assert not (found.force * found.gap).any()
     assert np.count_nonzero(found.force) > np.count_nonzero(patch.force)
-    stiff, rise = setup.settled(response, face, ContactTable(law=HalfSpace(youngs_modulus=1e13)))
+    stiff, rise = setup.equilibrated(
+        response, face, ContactTable(law=HalfSpace(youngs_modulus=1e13))
+    )
     assert abs(rise) < 1e-4 and np.count_nonzero(stiff.patch.force) < np.count_nonzero(found.force)
 
 
 def test_nodes_without_a_tread_have_their_static_state(wheel) -> None:
     setup, response, face = wheel
-    settled, rise = setup.settled(response, face, ContactTable(tread="none"))
+    settled, rise = setup.equilibrated(response, face, ContactTable(tread="none"))
     assert rise == 0.0 and all(map(is_, vars(settled.patch).values(), vars(setup.patch).values()))
 
 

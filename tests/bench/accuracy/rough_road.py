@@ -108,7 +108,7 @@ def prepared(folder: Path, mesh: Mesh, *sets: str, **keys: object) -> Prepared:
         run = run_scene(
             scene, folder, MPI.COMM_WORLD, until="greens", fresh=False, petsc_options=[]
         )
-    setup, _ = run.setup.settled(run.greens.contact, run.static.force, scene.contact)
+    setup, _ = run.setup.equilibrated(run.greens.contact, run.static.force, scene.contact)
     return Prepared(run, Conditions(scene.contact, setup, scene.time.duration))
 
 

@@ -204,18 +204,18 @@ def test_damped_forces_stay_however_many_points_come_and_go() -> None:
     """On a rough road points open and close by what passes under them, which no other scheme changes."""
     linear = choose(3.17)
     assert (linear.scheme, linear.limit) == ("linear", LIMIT)
-    damped = linear.instead(Chatter(""))
+    damped = linear.next_scheme(Chatter(""))
     assert damped.scheme == "damped" and 1.0 < damped.limit < np.inf
 
 
 def test_constant_forces_are_taken_where_the_motion_grows_with_damped_ones() -> None:
     """Whether these were the first choice or the second; with constant ones nothing is left to try."""
     grows = Chatter("grows without bound")
-    for damped in (choose(2.0), choose(3.17).instead(grows)):
+    for damped in (choose(2.0), choose(3.17).next_scheme(grows)):
         assert damped.scheme == "damped" and 1.0 < damped.limit < np.inf
-        constant = damped.instead(grows)
+        constant = damped.next_scheme(grows)
         assert (constant.scheme, constant.limit) == ("constant", np.inf)
         with pytest.raises(Chatter):
-            constant.instead(grows)
+            constant.next_scheme(grows)
     with pytest.raises(Chatter):
-        Chosen("damped", "as the scene says").instead(grows)
+        Chosen("damped", "as the scene says").next_scheme(grows)

@@ -5,7 +5,12 @@ import pytest
 from scipy import sparse
 
 from tireroad.contact.patch import Patch
-from tireroad.contact.tread.between_nodes import Backed, on_nodes, over_rectangles, unsettled
+from tireroad.contact.tread.between_nodes import (
+    Backed,
+    before_equilibrium,
+    on_nodes,
+    over_rectangles,
+)
 from tireroad.contact.tread.compliance import half_space_influence
 from tireroad.contact.tread.kernel import GridPlaces, KernelTread
 from tireroad.contact.tread.laws.elastic import HalfSpace
@@ -79,5 +84,5 @@ def test_the_unloaded_shape_stays():
     force[10:13] = 100.0
     own = 1e-6 * np.eye(len(area))  # m/N, of the nodes
     flat = made.gap - made.weights @ (own @ force)
-    other = unsettled(made, known, force)
+    other = before_equilibrium(made, known, force)
     assert other.gap - other.weights @ ((own - known) @ force) == pytest.approx(flat, abs=1e-15)

@@ -7,7 +7,7 @@ import pytest
 
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.load_steps import LoadStepper
-from tireroad.fem.static.press import Near, place
+from tireroad.fem.static.press import InitialState, place
 from tireroad.fem.static.road import FLAT, RoadShape
 from tireroad.fem.static.state import static_state
 from tireroad.fem.static.virtual_work import Rolling
@@ -21,9 +21,9 @@ def pressed(body, speed, road, near=None, **given):
     told = []
     loader = LoadStepper(Equilibrium(body, Rolling(speed=speed, damping=200.0), road), told.append)
     loader.inflate(2e5, near and near.inflated)
-    place(loader, **WANTED | given, near=near)
+    place(loader, **WANTED | given, initial=near)
     state = static_state(loader.equilibrium, loader.touch)
-    return state, Near.of(loader, loader), told
+    return state, InitialState.of(loader, loader), told
 
 
 @pytest.mark.parametrize(

@@ -26,8 +26,8 @@ def loader(make_body):
 def test_falls_to_the_state_that_small_steps_find(loader):
     """One shape carries this load, and no drag is left in it."""
     problem, start = loader.equilibrium, loader.body.u.x.array.copy()
-    fallen = load_steps.fall(problem, loader.touch + DEEP)
-    assert fallen.converged and problem.drag is None
+    fallen = load_steps.pseudo_transient(problem, loader.touch + DEEP)
+    assert fallen.converged and problem.springs is None
     found, force = loader.body.u.x.array.copy(), problem.load()
     loader.body.u.x.array[:] = start
     problem.road.active[:], problem.road.force[:] = False, 0.0
@@ -44,9 +44,9 @@ def test_what_does_not_come_to_rest_is_put_back(loader, monkeypatch):
     loader.deflect(0.005)
     before, force, height = loader.body.u.x.array.copy(), problem.load(), problem.road_height
     monkeypatch.setattr(load_steps, "_MOST_FALLS", 3)
-    fallen = load_steps.fall(problem, loader.touch + DEEP)
+    fallen = load_steps.pseudo_transient(problem, loader.touch + DEEP)
     assert not fallen.converged and "pseudo-transient continuation" in fallen.reason
-    assert problem.drag is None and problem.road_height == problem.road.height == height
+    assert problem.springs is None and problem.road_height == problem.road.height == height
     assert problem.load() == force
     np.testing.assert_array_equal(loader.body.u.x.array, before)
     assert problem.solve(height).iterations == 0
@@ -65,7 +65,7 @@ def test_a_march_falls_where_small_steps_fail_and_goes_on_by_steps():
         fallen.append(target)
         return SolveOutcome(True, 20, 0.0, "snapped through")
 
-    march(attempt, 1.0, 0.3, Show("deflection", 1.0, "m"), fall=fall)
+    march(attempt, 1.0, 0.3, Show("deflection", 1.0, "m"), rescue=fall)
     assert len(fallen) == 1 and 0.4 <= fallen[0] < 0.5
     assert asked[-1] == 1.0 and max(asked[: asked.index(fallen[0])]) >= 0.4
 

@@ -16,6 +16,7 @@ from tireroad.runs.process.signals import Stopped
 from tireroad.runs.scene.estimate import estimate
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.sections import torus
+from tireroad.runs.search import journal
 from tireroad.runs.search import search as searching
 from tireroad.runs.search.journal import ErrorsByCause, SearchJournal, Trial, to_resume, worst
 from tireroad.runs.search.search import Search
@@ -157,10 +158,8 @@ def test_a_folder_has_the_scene_of_its_results_and_resume_that_of_the_search(
     check_kept_scene(to_resume(out))
     again = load(to_resume(out))
     assert again == load(file, ["accuracy.target=0.001", "accuracy.trials=2"])
-    for name in ("run_scene", "tell_error"):
-        monkeypatch.setattr(searching, name, lambda *given, **options: None)
-    plain = load(file, ["accuracy.search=false"])
-    searching.run(plain, out, MPI.COMM_SELF, until=None, fresh=False, petsc_options=[])
+    assert not searching.searches(load(file, ["accuracy.search=false"]), None)
+    journal.leave(out)
     assert to_resume(out) == out / "scene.toml"
 
 
@@ -207,7 +206,7 @@ def test_a_tiny_tire_from_its_scene_to_its_results(file, monkeypatch) -> None:
     def started(*sets: str) -> None:
         scene = load(file, [*smooth, *sets])
         with console.quiet():
-            searching.run(scene, out, MPI.COMM_SELF, until=None, fresh=False, petsc_options=[])
+            searching.search(scene, out, MPI.COMM_SELF, fresh=False, petsc_options=[])
 
     with pytest.raises(ConvergenceError, match="accuracy.trials = 1 are done. Reached"):
         started("accuracy.target=0.001", "accuracy.trials=1")

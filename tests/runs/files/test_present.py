@@ -20,7 +20,7 @@ from tireroad.runs.files.export import export
 from tireroad.runs.files.folder import Summary, left_out, remarks
 from tireroad.runs.report.compare import compare
 from tireroad.runs.report.page import render
-from tireroad.runs.stages.stage import entered
+from tireroad.runs.stages.stage import failure_recorded
 
 NAME = "synthetic-torus"
 OTHER = SCENE + "# another scene\n"
@@ -171,7 +171,7 @@ def test_how_a_run_ended_is_told_by_all_that_show_its_results(folder: Path, tmp_
     whole = tmp_path / "whole"
     shutil.copytree(folder, whole)
     summary = begun(folder, SCENE)
-    with pytest.raises(ConvergenceError), entered("modes", summary, MPI.COMM_SELF):
+    with pytest.raises(ConvergenceError), failure_recorded("modes", summary, MPI.COMM_SELF):
         raise ConvergenceError("13 negative eigenvalues")
     told = "the run ended in stage modes, 13 negative eigenvalues"
     assert remarks(folder)[0].endswith(told) and tireroad.load(folder).ending == told

@@ -110,7 +110,9 @@ def test_the_step_is_told_by_the_order_of_the_scheme(whole, scheme):
     fine = replace(given, scheme="linear", step=step / 8, steps=8 * 70)
     own, exact = (
         measured(found.contact, found.step, limit)
-        for found in (one.repeated(one.settled, one.response, coarser=1) for one in (given, fine))
+        for found in (
+            one.repeated(one.equilibrated, one.response, coarser=1) for one in (given, fine)
+        )
     )
     (told,) = companions("step", given)
     estimated = told.bars({"contact_force": own}, 0.0, limit, limit)["contact_force"].history[2]
