@@ -1,30 +1,4 @@
-"""Tread models of the literature, for comparison: shifted springs, asperities, wedges.
-
-Winkler stiffness from the indentation of another tread law (Kropp fits his to measurements).
-
-Asperities by mean road parameters and Hertz springs (Fujikawa et al. 1994, 2005; thesis 3.1).
-
-A profile is cut at its median height by the line H-H, above which half of the road lies. The parts
-above are asperities; each has the height of its apex over the line, and the radius of the circle
-through the apex and both crossings. Those narrower than a quarter of the mean width are left out,
-since the arcs of the others contain them. The road then becomes rows of equal spheres, alternately
-higher and lower; the tire is a surface of constant shape over which they pass:
-
-    F(t) = sum_k F_Hertz(d0 + h_k - g(k x_A - v t)),   F_Hertz = 4/3 E* sqrt(r_A) d^1.5,
-
-where g is its static gap along the middle and d0 follows from the mean load. The response of the
-tire is neglected, and so are all waves but those of the mean spacing: only the vibratory part of F
-is meaningful.
-
-Wedges of the tire and the road volume in them (Mancosu and Minen 1998, 2nd model; thesis 3.1).
-
-The tire is cut into wedges around the axle. The volume in which a wedge of the unloaded tire
-intersects the road gives its force by a look-up table, here from the finite elements pressed on a
-plane at several heights. Per metre of circumference, the area A of a wedge's cross-section inside
-the road and the force F that it carries form pairs, over all wedges and heights; the table is their
-mean in classes of A, made monotone. Wedges are independent of each other, and the tire has no
-response in time.
-"""
+"""Tread models of the literature, for comparison: shifted springs, asperities, wedges."""
 
 from __future__ import annotations
 
@@ -67,7 +41,21 @@ _PHASES = 64  # over one period, for the mean load
 
 @dataclass(frozen=True)
 class Asperities:
-    """Means of a profile, m: `height` over H-H, `unevenness` of neighbours, `spacing`, `radius`."""
+    """Means of a profile, m: `height` over H-H, `unevenness` of neighbours, `spacing`, `radius`.
+
+    A profile is cut at its median height by the line H-H, above which half of the road lies. The
+    parts above are asperities; each has the height of its apex over the line, and the radius of the
+    circle through the apex and both crossings. Those narrower than a quarter of the mean width are
+    left out, since the arcs of the others contain them. The road then becomes rows of equal
+    spheres, alternately higher and lower; the tire is a surface of constant shape over which they
+    pass:
+
+        F(t) = sum_k F_Hertz(d0 + h_k - g(k x_A - v t)),   F_Hertz = 4/3 E* sqrt(r_A) d^1.5,
+
+    where g is its static gap along the middle and d0 follows from the mean load. The response of
+    the tire is neglected, and so are all waves but those of the mean spacing: only the vibratory
+    part of F is meaningful.
+    """
 
     height: float
     unevenness: float
@@ -217,6 +205,13 @@ class Wedges:
 
     `x` (a,) m of the wedges, `length` (a,) m of each around the tire, `y` (a, b) and `height`
     (a, b) m over the plane of the road, `width` (a, b) m that each point represents.
+
+    The tire is cut into wedges around the axle. The volume in which a wedge of the unloaded tire
+    intersects the road gives its force by a look-up table, here from the finite elements pressed on
+    a plane at several heights. Per metre of circumference, the area A of a wedge's cross-section
+    inside the road and the force F that it carries form pairs, over all wedges and heights; the
+    table is their mean in classes of A, made monotone. Wedges are independent of each other, and
+    the tire has no response in time.
     """
 
     x: Array

@@ -16,23 +16,6 @@ are coupled in the stiffness only, and only the drive of a rotating wheel can su
 Neglected: changes of density and pressure by the flow (Mach number squared, 0.5 %), the pressure
 difference across a section due to the Coriolis force of the moving air, and the flow around the
 whole ring, whose circulation is conserved.
-
-The geometry of the cavity, and the volume displaced by motions of the tire's wall:
-
-    int chi dV = closed int chi rho/2 e_rho . n dS,
-    int chi dA dtheta = closed int chi e_rho . n dS,
-    flux_f(u) = closed int chi_f u . n dS = d/de int chi_f dV of the shape x + e u,
-
-over the deformed inner face and the cone between its two bead ends, which belongs to the rim; n
-points out of the air, rho is the distance from the axle, chi_f = 1, cos n theta, sin n theta with
-theta of the deformed position.
-
-The air is coupled to the full matrices of one body as a low-rank term: a motion u of the tire
-drives the air by e u, e (1 + a, n) being rows over the unknowns; the air adds e^T W(s) e to the
-full matrices (fem.cavity.Duct.dynamic_stiffness). Responses of the tire without air are corrected
-for it (Woodbury):
-
-    X <- X - V W (1 + e V W)^-1 e X,   X = A^-1 B,  V = A^-1 e^T.
 """
 
 from __future__ import annotations
@@ -306,7 +289,18 @@ _LEAST = 1e-12  # of a column's largest entry; smaller ones are rounding
 
 class CavityTrace:
     """The inner face of a body at its present displacement, with `count` waves, by default as many
-    as its mesh resolves. Collective."""
+    as its mesh resolves. Collective.
+
+    The geometry of the cavity, and the volume displaced by motions of the tire's wall:
+
+        int chi dV = closed int chi rho/2 e_rho . n dS,
+        int chi dA dtheta = closed int chi e_rho . n dS,
+        flux_f(u) = closed int chi_f u . n dS = d/de int chi_f dV of the shape x + e u,
+
+    over the deformed inner face and the cone between its two bead ends, which belongs to the rim; n
+    points out of the air, rho is the distance from the axle, chi_f = 1, cos n theta, sin n theta
+    with theta of the deformed position.
+    """
 
     def __init__(self, body: Body, count: int | None = None) -> None:
         # Wave numbers above a quarter of the nodes around show only ripples of the mesh.
@@ -408,7 +402,15 @@ def _bead_ends(body: Body) -> tuple[tuple[float, float], tuple[float, float]]:
 
 @dataclass(frozen=True, kw_only=True)
 class Column:
-    """`duct` on every process; `pushed`: own rows (n, 1 + a) of e^T; `speed` in rad/s."""
+    """`duct` on every process; `pushed`: own rows (n, 1 + a) of e^T; `speed` in rad/s.
+
+    The air is coupled to the full matrices of one body as a low-rank term: a motion u of the tire
+    drives the air by e u, e (1 + a, n) being rows over the unknowns; the air adds e^T W(s) e to the
+    full matrices (fem.cavity.Duct.dynamic_stiffness). Responses of the tire without air are
+    corrected for it (Woodbury):
+
+        X <- X - V W (1 + e V W)^-1 e X,   X = A^-1 B,  V = A^-1 e^T.
+    """
 
     comm: MPI.Comm
     duct: Duct

@@ -1,45 +1,4 @@
-"""What a response yields besides displacements: axle force and moment, hub force, vibration.
-
-Force and moment on a held axle per force on the tread: by momentum, and by free-rim modes.
-
-The tire transmits the forces on it less the rate of change of its momentum,
-
-    f_axle = sum f_c - d/dt int rho Du/Dt = sum f_c + omega^2 int rho u,
-
-since the convective part of the momentum cancels around the ring. The doppler inertia has the body
-rate in place of D/Dt, and with it (d/dt - Omega e_y x)^2 in place of d^2/dt^2. The other way is the
-thesis's (7.1)-(7.4), corrected. With the six motions r of the rigid rim and the loads c, the rim
-stays at rest under the forces
-
-    f_r = -H_rr^-1 H_rc f_c     on the tire,
-
-the opposite of which acts on the axle. Mass-proportional damping acts against the wheel and not
-against the ground, so the axle also carries  gamma1 (s R^T M + Omega R^T B) u, with u the motion of
-the tire while the rim is held. R^T B = -(B R)^T; for the force it is  gamma1 (s - Omega e_y x) int
-rho u.
-
-Both ways also yield the moments about the axle's centre, with the rotations R = e_k x of the
-rim, x the position in the loaded tire. By momentum they are
-
-    m_axle = R^T f - [s^2 R^T M + 2 s Omega R^T G + R^T (K + Omega^2 S)] u,
-
-whose convective terms do not cancel (modal.corner.Corner.moments).
-
-The force on a compliant hub from the force on a rigid one: substructuring by the blocked force.
-
-    f = (Y_T + Y_S)^-1 Y_T f_blocked = Z_S (Z_T + Z_S)^-1 f_blocked,
-
-where f_blocked is the force of the tire on a held rim, and Y = 1/Z the mobility (here: the
-receptance) of the tire at its free rim (T) and of its support (S): wheel, springs and body. The
-coupled states yield the same force under the same loads without these matrices, so the comparison
-checks them entirely.
-
-Vibration of the whole tire in the frequency domain: u(w) = Phi a(w) of its coordinates a.
-
-The mean square of the velocity normal to the surface, over its area S, is  w^2 a^H N a / (2 S)
-with  N = sum_n (n A)_n Phi^T n_n n_n^T Phi:  one small matrix for all frequencies. A plate that
-radiated all of it would have the equivalent radiated power  rho c S <v^2>, an upper bound.
-"""
+"""What a response yields besides displacements: axle force and moment, hub force, vibration."""
 
 from __future__ import annotations
 
@@ -70,6 +29,29 @@ def axle_transfer(
     `receptance` (f, 18, 6 + k) per force and moment on the rim and per load: translation (m) and
     rotation (rad) of the free rim, followed by R^T M u and R^T B u of the tire, at `frequency` (f,)
     Hz above 0; `speed` rad/s, `damping` gamma1 1/s.
+
+    The tire transmits the forces on it less the rate of change of its momentum,
+
+        f_axle = sum f_c - d/dt int rho Du/Dt = sum f_c + omega^2 int rho u,
+
+    since the convective part of the momentum cancels around the ring. The doppler inertia has the
+    body rate in place of D/Dt, and with it (d/dt - Omega e_y x)^2 in place of d^2/dt^2. The other
+    way is the thesis's (7.1)-(7.4), corrected. With the six motions r of the rigid rim and the
+    loads c, the rim stays at rest under the forces
+
+        f_r = -H_rr^-1 H_rc f_c     on the tire,
+
+    the opposite of which acts on the axle. Mass-proportional damping acts against the wheel and not
+    against the ground, so the axle also carries gamma1 (s R^T M + Omega R^T B) u, with u the motion
+    of the tire while the rim is held. R^T B = -(B R)^T; for the force it is gamma1 (s - Omega e_y
+    x) int rho u.
+
+    Both ways also yield the moments about the axle's centre, with the rotations R = e_k x of the
+    rim, x the position in the loaded tire. By momentum they are
+
+        m_axle = R^T f - [s^2 R^T M + 2 s Omega R^T G + R^T (K + Omega^2 S)] u,
+
+    whose convective terms do not cancel (modal.corner.Corner.moments).
     """
     rim, rest = receptance[:, :6], receptance[:, 6:]
     held = -np.linalg.solve(rim[:, :, :6], rim[:, :, 6:])
@@ -152,6 +134,13 @@ def substituted(
 
     In directions in which the wheel moves it is that of springs and dampers, in locked ones that on
     the held rim.
+
+        f = (Y_T + Y_S)^-1 Y_T f_blocked = Z_S (Z_T + Z_S)^-1 f_blocked,
+
+    where f_blocked is the force of the tire on a held rim, and Y = 1/Z the mobility (here: the
+    receptance) of the tire at its free rim (T) and of its support (S): wheel, springs and body. The
+    coupled states yield the same force under the same loads without these matrices, so the
+    comparison checks them entirely.
     """
     corner, held = basis.projection.wheel, basis.held
     drag, stiffness = held_matrices(
@@ -238,7 +227,12 @@ IMPEDANCE = 413.3  # N s/m3, rho c of air at 20 deg C and 1013 hPa
 
 @dataclass(frozen=True)
 class Surface:
-    """The outer face in the static state: `normal` (s, 3), m2, times the area of each node."""
+    """The outer face in the static state: `normal` (s, 3), m2, times the area of each node.
+
+    The mean square of the velocity normal to the surface, over its area S, is w^2 a^H N a / (2 S)
+    with N = sum_n (n A)_n Phi^T n_n n_n^T Phi: one small matrix for all frequencies. A plate that
+    radiated all of it would have the equivalent radiated power rho c S <v^2>, an upper bound.
+    """
 
     normal: np.ndarray
 

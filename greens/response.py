@@ -1,41 +1,4 @@
-"""The response between forces and displacements by states, which of them are dynamic, hub moments.
-
-Semi-analytical response of the tire between chosen forces and displacements.
-
-    u(t) = Re[C z(t)] + C_b y(t) + G_res f(t),   z' = s z + P f,   y' = T y + P_b f
-    g(t) = Re[C e^{st} P] + C_b e^{Tt} P_b  (+ G_res delta(t)),   g(0) = 0 without truncation
-
-thesis (4.14), whose sum over eigenpairs is kept as a product, C = Phi_out R and P = L Phi_in^T.
-
-Hub moments as outputs of a response: those of the loads less those of the tire's motion,
-
-    m = R^T f - (A_2 u'' + A_1 u' + A_0 u),
-
-with A as in modal.corner.Corner.moments, and u the motion of the states and of what follows a force
-statically. States z' = s z + P f with coordinates q = C z (real part) have the rates
-q' = C s z + C P f  and  q'' = C s^2 z + C s P f + C P f'.  C P vanishes for a complete set of states; what it
-is where some are made static is the response's slope (static condensation).
-
-States that follow statically, and what hub moments and the axle force lose by it.
-
-A state z' = s z + P f, seen by C, answers a slow force by
-
-    C P / (D - s) f = -C P / s f - C P / s^2 f' - ...,   D = d/dt.
-
-The first term joins the residual. The second is small in a displacement, and would feed a rate of
-the force back into a contact. But the rate of momentum and hub moments weight a state with s^2
-(greens.response), so that however fast it is it answers a rate of force with C P / s^2: by as much as
-the states that stay now lack of completeness, Re(C P / s^2) = 0 over all of them. That part is the
-response's `slope`.
-
-Selection of dynamic states: those that respond within the band, not just the slowest.
-
-A state A = C P that is made static loses  (A e(s) + A* e(s*)) / 2,  e(s) = i w / (s (i w - s)). Its
-participation is the largest magnitude of that over the band. Fast modes lose (w/s)^2, since the two
-halves of a pair almost cancel. For the axle force, the contact forces less the rate of momentum, C
-is replaced by s^2 times the state's momentum: the few modes with a net momentum matter there long
-after the displacements no longer need them.
-"""
+"""The response between forces and displacements by states, which of them are dynamic, hub moments."""
 
 from __future__ import annotations
 
@@ -107,7 +70,13 @@ class Response:
     omitted from static results. In the first `pulse` outputs the residual responds not at once but
     with a pulse 1/step high and one step long, in place of its delta(t) (thesis (C.4)). `left_out`
     (3 or 9, k) kg m/N, where known: the same rows of all motions outside the states, which follow
-    statically; their rates are what the axle force lacks."""
+    statically; their rates are what the axle force lacks.
+
+        u(t) = Re[C z(t)] + C_b y(t) + G_res f(t),   z' = s z + P f,   y' = T y + P_b f
+        g(t) = Re[C e^{st} P] + C_b e^{Tt} P_b  (+ G_res delta(t)),   g(0) = 0 without truncation
+
+    thesis (4.14), whose sum over eigenpairs is kept as a product, C = Phi_out R and P = L Phi_in^T.
+    """
 
     eigenvalue: np.ndarray
     output: np.ndarray
@@ -349,6 +318,13 @@ def reading(
 
     `wanted` (r, 3): the weights of the moments in the outputs; `rows` (9, m): A_0, A_1 and A_2 on
     the m coordinates.
+
+        m = R^T f - (A_2 u'' + A_1 u' + A_0 u),
+
+    with A as in modal.corner.Corner.moments, and u the motion of the states and of what follows a
+    force statically. States z' = s z + P f with coordinates q = C z (real part) have the rates q' =
+    C s z + C P f and q'' = C s^2 z + C s P f + C P f'. C P vanishes for a complete set of states;
+    what it is where some are made static is the response's slope (static condensation).
     """
     if not wanted.nnz:
         return response
@@ -369,7 +345,18 @@ def reading(
 
 
 def poles_made_static(response: Response, keep: np.ndarray) -> Response:
-    """The poles where `keep` (q,) is true stay dynamic; the others follow statically."""
+    """The poles where `keep` (q,) is true stay dynamic; the others follow statically.
+
+    A state z' = s z + P f, seen by C, answers a slow force by
+
+        C P / (D - s) f = -C P / s f - C P / s^2 f' - ...,   D = d/dt.
+
+    The first term joins the residual. The second is small in a displacement, and would feed a rate
+    of the force back into a contact. But the rate of momentum and hub moments weight a state with
+    s^2 (greens.response), so that however fast it is it answers a rate of force with C P / s^2: by
+    as much as the states that stay now lack of completeness, Re(C P / s^2) = 0 over all of them.
+    That part is the response's `slope`.
+    """
     s = response.eigenvalue[~keep, None]
     following = response.input[~keep] / s
     gone, left_out = response.output[:, ~keep] @ following, response.left_out
@@ -429,6 +416,12 @@ def participation(response: Response, band: float) -> np.ndarray:
 
     The larger of its shares in the static displacements and in the axle force, in Frobenius norms
     over all outputs and forces.
+
+    A state A = C P that is made static loses (A e(s) + A* e(s*)) / 2, e(s) = i w / (s (i w - s)).
+    Its participation is the largest magnitude of that over the band. Fast modes lose (w/s)^2, since
+    the two halves of a pair almost cancel. For the axle force, the contact forces less the rate of
+    momentum, C is replaced by s^2 times the state's momentum: the few modes with a net momentum
+    matter there long after the displacements no longer need them.
     """
     still = np.linalg.norm(response.static() + response.residual)
     displacement = _lost(response, response.output, band) / still

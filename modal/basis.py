@@ -1,19 +1,4 @@
-"""Standing modes with the matrices projected on them; joined by other shapes and by air.
-
-The air in the tire on a modal basis: the terms that it adds to the projected problem.
-
-With coordinates eta of the tire and g of the air's own modes, both of unit mass, the pencil is that
-of `fem.cavity.Duct.joined`. The shapes on the outer face have no component along g.
-
-Additions to the modes of a basis: static shapes with their inertia, the air, the wheel.
-
-    R <- R - Phi (Phi^T M R),  Psi = R V with Psi^T M Psi = I, Psi^T K Psi diagonal
-
-The pseudo-modes Psi are M-orthonormal to the modes and to each other, so all later steps treat them
-as modes; G, S and B couple them to the modes. Eigenvectors are K-orthogonal to all that they are
-M-orthogonal to, but static shapes are not: shapes that joined earlier and those that join now form
-one space, on all of which K is made diagonal.
-"""
+"""Standing modes with the matrices projected on them; joined by other shapes and by air."""
 
 from __future__ import annotations
 
@@ -40,7 +25,11 @@ from tireroad.modal.waves import Labels
 
 @dataclass(frozen=True)
 class Air:
-    """The air of the `duct`, and its `coupling` e (1 + a, m) 1/s with m coordinates of the tire."""
+    """The air of the `duct`, and its `coupling` e (1 + a, m) 1/s with m coordinates of the tire.
+
+    With coordinates eta of the tire and g of the air's own modes, both of unit mass, the pencil is
+    that of `fem.cavity.Duct.joined`. The shapes on the outer face have no component along g.
+    """
 
     duct: Duct
     coupling: np.ndarray
@@ -78,6 +67,13 @@ def extended(modes: Modes, columns: Array, operators: Operators) -> Modes:
 
     `columns`, own rows (n, p) of R, are overwritten: with a thousand loads on a fine mesh a copy
     takes a gigabyte.
+
+        R <- R - Phi (Phi^T M R),  Psi = R V with Psi^T M Psi = I, Psi^T K Psi diagonal
+
+    The pseudo-modes Psi are M-orthonormal to the modes and to each other, so all later steps treat
+    them as modes; G, S and B couple them to the modes. Eigenvectors are K-orthogonal to all that
+    they are M-orthogonal to, but static shapes are not: shapes that joined earlier and those that
+    join now form one space, on all of which K is made diagonal.
     """
     comm, root = operators.body.comm, np.sqrt(operators.mass)[:, None]
     basis, extra = root * modes.vectors, columns

@@ -1,18 +1,5 @@
 """States of the rotating tire on its modes: eigenproblem, refinement, unrestrained motions.
 
-Refinement of inaccurate states of the companion matrix on the quadratic problem itself.
-
-The companion matrix of a wide spectrum determines its slow states only to rounding of the fast
-ones; the states of a free rim, close to rest, suffer most. Such a state gets one step of inverse
-iteration on the quadratic problem,
-
-    Q(s) u+ = u,   Q(s)^T w+ = w,   Q(s) = s^2 + s D + K,
-
-is normalised again, w^T (2 s + D) u = 1, and its eigenvalue follows from Lancaster's two-sided
-quotient,  s+ = s - w^T Q(s) u,  whose error is of second order in those of the vectors.
-
-The second eigenproblem on the modal basis: the rotating tire in the non-rotating frame.
-
     s^2 I + s (D_mod + 2 Omega G) + (Lambda + Omega^2 S + Omega D_mod B),  D_mod as in modal.damping
 
 (thesis (2.1)-(2.5), corrected; the doppler form takes B for G and S_B for S). Its response to modal
@@ -73,6 +60,15 @@ def refined(
     """Values (q,), right (m, q) and left vectors (q, m), w^T (2 s + D) u = 1, the worst refined.
 
     A state too close to another for one step to separate them is left unchanged.
+
+    The companion matrix of a wide spectrum determines its slow states only to rounding of the fast
+    ones; the states of a free rim, close to rest, suffer most. Such a state gets one step of
+    inverse iteration on the quadratic problem,
+
+        Q(s) u+ = u,   Q(s)^T w+ = w,   Q(s) = s^2 + s D + K,
+
+    is normalised again, w^T (2 s + D) u = 1, and its eigenvalue follows from Lancaster's two-sided
+    quotient, s+ = s - w^T Q(s) u, whose error is of second order in those of the vectors.
     """
     rough = np.maximum(
         residual(drag, stiffness, values, right), residual(drag.T, stiffness.T, values, left.T)

@@ -1,34 +1,4 @@
-"""Isotropic random surfaces from levels of the texture, in tiles that repeat, in layers.
-
-The isotropic surface whose profiles have a given spectrum.
-
-C(q) (m^4) is the two-sided density of the surface's heights over wave vectors of length q (1/m,
-waves per metre). A profile along any line has the one-sided density
-
-    G(n) = 4 int_n^inf C(q) q dq / sqrt(q^2 - n^2)       (m^3),
-
-so long waves of a profile are partly short ones cut obliquely. With C constant in each of k bands
-the power of a profile in each band is a triangular matrix times C, which is solved for nonnegative
-C.
-
-Cleaning of a measured profile: outliers are removed, gaps bridged, and both are counted.
-
-An outlier is farther from the median of 11 neighbours than `limit` times 1.4826 times the median
-such distance of all points, and farther than 50 um. For Gaussian noise the factor yields the
-standard deviation, and the laser's own noise and the crests of fine waves remain. Gaps, outliers
-included, are bridged by straight lines up to a length; longer ones are refused, since their heights
-would be invented.
-
-A surface around a measured profile: isotropic, with the profile itself along its middle.
-
-The spectrum of the profile is taken as that of an isotropic Gaussian surface of density C(q). A
-wave of the profile with wave number k along then decays across as
-
-    rho_k(y) = int C(sqrt(k^2 + l^2)) cos(2 pi l y) dl / int C dl,
-
-and the addition of u(k, y) - u(k, 0) rho_k(y), with an independent surface u, makes the whole
-equally rough everywhere (simple kriging of the line: Chiles and Delfiner, Geostatistics, 7.3.1).
-"""
+"""Isotropic random surfaces from levels of the texture, in tiles that repeat, in layers."""
 
 from __future__ import annotations
 
@@ -73,6 +43,15 @@ def surface_density(edges: Array, power: Array) -> Array:
 
     The least-squares nearest, since not every spectrum belongs to a surface (none that falls too
     fast towards long waves).
+
+    C(q) (m^4) is the two-sided density of the surface's heights over wave vectors of length q (1/m,
+    waves per metre). A profile along any line has the one-sided density
+
+        G(n) = 4 int_n^inf C(q) q dq / sqrt(q^2 - n^2)       (m^3),
+
+    so long waves of a profile are partly short ones cut obliquely. With C constant in each of k
+    bands the power of a profile in each band is a triangular matrix times C, which is solved for
+    nonnegative C.
     """
     from scipy.optimize import nnls  # not needed to read a scene
 
@@ -401,6 +380,12 @@ def cleaned(profile: Array, pitch: float, limit: float, longest: float, source: 
 
     InputError if there is no valid height, if a gap is longer, or if more than a tenth would be
     bridged.
+
+    An outlier is farther from the median of 11 neighbours than `limit` times 1.4826 times the
+    median such distance of all points, and farther than 50 um. For Gaussian noise the factor yields
+    the standard deviation, and the laser's own noise and the crests of fine waves remain. Gaps,
+    outliers included, are bridged by straight lines up to a length; longer ones are refused, since
+    their heights would be invented.
     """
     missing = np.isnan(profile)
     if missing.all():
@@ -453,6 +438,15 @@ def widened(profile: Array, pitch: float, width: float, seed: int) -> tuple[Arra
     """y (m,) m, symmetric about 0, and z (n, m) m of a surface with the profile (n,) m at y = 0.
 
     Waves too long for either length are those of the profile, constant across.
+
+    The spectrum of the profile is taken as that of an isotropic Gaussian surface of density C(q). A
+    wave of the profile with wave number k along then decays across as
+
+        rho_k(y) = int C(sqrt(k^2 + l^2)) cos(2 pi l y) dl / int C dl,
+
+    and the addition of u(k, y) - u(k, 0) rho_k(y), with an independent surface u, makes the whole
+    equally rough everywhere (simple kriging of the line: Chiles and Delfiner, Geostatistics,
+    7.3.1).
     """
     from scipy import fft  # not needed to read a scene
 

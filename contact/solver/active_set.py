@@ -1,44 +1,4 @@
-"""Unilateral contact by active sets: factors that follow the set, pivoting, usual sets, the choice.
-
-The factor of the touching points' compliance, kept while points come and go.
-
-With the set B factorised, A_BB = L U, and the touching set N = B - R + S, the k = |R| + |S| changes
-border the system,
-
-    [A_BB A_BS E_R] [x_B]   [r_B]
-    [A_SB A_SS  0 ] [x_S] = [r_S],
-    [E_R^T 0    0 ] [ l ]   [ 0 ]
-
-whose Schur complement is of size k: k more right-hand sides instead of a new factor. Source: Gill,
-Murray, Saunders and Wright, SIAM J. Matrix Anal. Appl. 5 (1984) 562.
-
-The contact problem of one time step: f >= 0, g = A (f - f_ref) + q >= 0, f . g = 0.
-
-A (n, n) m/N is the same-step compliance, possibly slightly unsymmetric (rolling); f (n,) N are the
-total contact forces, g (n,) m the gaps, q (n,) m the gaps at f = f_ref. With a positive definite
-symmetric part A is a P-matrix and the solution unique (Cottle, Pang and Stone, The Linear
-Complementarity Problem, 3.1.6 and 3.3.7). Serial: every process that calls solves the same small
-problem for itself.
-
-The contact problem relative to a set of points that usually touch: a principal pivot transform.
-
-Of the points considered, B usually touch and N do not. With forces in metres, a = diag(A) f, the
-unknowns z = (g_B, a_N) and their partners w = (a_B, g_N) solve a problem of the same kind,
-
-    w = M z + h >= 0, z >= 0, w . z = 0,
-    M = [ P, -P A_BN; A_NB P, A_NN - A_NB P A_BN ],  P = A_BB^-1,
-
-in which few z are nonzero if the contact is near B. M is a P-matrix if A is one. Source: Cottle,
-Pang and Stone, The Linear Complementarity Problem, 2.3 and 4.1.
-
-The active set on a rough road with hundreds of points, relative to the set that usually touches.
-
-On a road whose texture makes points touch and lift off, a step of a few millimetres exchanges a
-hundred points, so a factor of the touching set serves only one step. The set of points that touch
-more often than not remains the same. Relative to it the problem has as many
-nonzero unknowns as points differ: a third of those that touch, on a passenger tire, so a factor
-costs a thirtieth.
-"""
+"""Unilateral contact by active sets: factors that follow the set, pivoting, usual sets, the choice."""
 
 from __future__ import annotations
 
@@ -70,6 +30,16 @@ class ActiveFactor:
 
     The result depends only on N and on the factorised set, not on the changes in between: `base`
     (n,) bool is all that a checkpoint needs. `factorisations` counts them.
+
+    With the set B factorised, A_BB = L U, and the touching set N = B - R + S, the k = |R| + |S|
+    changes border the system,
+
+        [A_BB A_BS E_R] [x_B]   [r_B]
+        [A_SB A_SS  0 ] [x_S] = [r_S],
+        [E_R^T 0    0 ] [ l ]   [ 0 ]
+
+    whose Schur complement is of size k: k more right-hand sides instead of a new factor. Source:
+    Gill, Murray, Saunders and Wright, SIAM J. Matrix Anal. Appl. 5 (1984) 562.
     """
 
     def __init__(self, compliance: Compliance) -> None:
@@ -171,6 +141,14 @@ class ActiveSet:
 
     The factor is kept and bordered as points come and go: a step that ends
     in the set it began with needs no factorisation.
+
+    The contact problem of one time step: f >= 0, g = A (f - f_ref) + q >= 0, f . g = 0.
+
+    A (n, n) m/N is the same-step compliance, possibly slightly unsymmetric (rolling); f (n,) N are
+    the total contact forces, g (n,) m the gaps, q (n,) m the gaps at f = f_ref. With a positive
+    definite symmetric part A is a P-matrix and the solution unique (Cottle, Pang and Stone, The
+    Linear Complementarity Problem, 3.1.6 and 3.3.7). Serial: every process that calls solves the
+    same small problem for itself.
     """
 
     def __init__(self, matrix: Array | Compliance) -> None:
@@ -306,6 +284,15 @@ class Pivot:
     """M (c, c) of the `taken` points (n,) bool, of which `base` (n,) are B; 20 c^3 bytes of work.
 
     `places` (c,): the points in the order of M, B first. InputError if A is not positive definite.
+
+    Of the points considered, B usually touch and N do not. With forces in metres, a = diag(A) f,
+    the unknowns z = (g_B, a_N) and their partners w = (a_B, g_N) solve a problem of the same kind,
+
+        w = M z + h >= 0, z >= 0, w . z = 0,
+        M = [ P, -P A_BN; A_NB P, A_NN - A_NB P A_BN ],  P = A_BB^-1,
+
+    in which few z are nonzero if the contact is near B. M is a P-matrix if A is one. Source:
+    Cottle, Pang and Stone, The Linear Complementarity Problem, 2.3 and 4.1.
     """
 
     def __init__(self, compliance: Compliance, taken: Mask, base: Mask) -> None:
@@ -380,6 +367,12 @@ class UsualSet:
     and points that no longer touch are dropped, as soon as the savings would have paid for it. A
     step begins with the set of the previous step, whose factor exists: on a rough road that takes
     15 % less than an extrapolation of the signs (three Newton steps at 2.4 mm of road).
+
+    On a road whose texture makes points touch and lift off, a step of a few millimetres exchanges a
+    hundred points, so a factor of the touching set serves only one step. The set of points that
+    touch more often than not remains the same. Relative to it the problem has as many nonzero
+    unknowns as points differ: a third of those that touch, on a passenger tire, so a factor costs a
+    thirtieth.
     """
 
     def __init__(self, compliance: Compliance) -> None:

@@ -1,22 +1,4 @@
-"""Contact with friction: normal and tangential forces in turn, sticking and sliding points.
-
-Stick and slip under given normal forces: minimise t.B t/2 + c.t with |t_i| <= b_i at each point.
-
-t_i lies in the plane of the road. Where |t_i| < b_i, (B t + c)_i = 0 and the point sticks; where
-|t_i| = b_i, (B t + c)_i = -lambda_i t_i, lambda_i >= 0, and it slips against its force. The
-solution is unique if the symmetric part of B is positive definite.
-
-One step with horizontal forces: the normal and the tangential problem in turn, until both hold.
-
-Normal: f >= 0, g = A_zz (f - f_static) + A_zh t + q >= 0, f . g = 0. Tangential, at the touching
-points: t = -K_b (share u + past) limited to |t| <= mu f, u = u_free + A_hz (f - f_static) + A_hh t.
-With a tread that shears (contact.tread.shear), A includes its part; its rubber is then in series
-with the bristles or, with K_b infinite, alone. While the same points touch and stick this is block
-Gauss-Seidel on a positive definite problem and converges; with slip convergence is certain for
-mu ||A_zz^-1 A_zh|| < 1, where the solution is unique too. Without a friction coefficient there may
-be no solution: a point at the edge may bear a force that lifts it off the road, where it bears
-none. In such a step its bristle bears none.
-"""
+"""Contact with friction: normal and tangential forces in turn, sticking and sliding points."""
 
 from __future__ import annotations
 
@@ -172,6 +154,13 @@ class StickSlip:
     Newton on t = P_b(t - r (B t + c)), P_b the projection on the discs (Alart and Curnier, Comput.
     Methods Appl. Mech. Eng. 92 (1991) 353), r the inverse of B's diagonal. Its linear problems are
     solved by GMRES, preconditioned where the tread knows its inverse.
+
+    Stick and slip under given normal forces: minimise t.B t/2 + c.t with |t_i| <= b_i at each
+    point.
+
+    t_i lies in the plane of the road. Where |t_i| < b_i, (B t + c)_i = 0 and the point sticks;
+    where |t_i| = b_i, (B t + c)_i = -lambda_i t_i, lambda_i >= 0, and it slips against its force.
+    The solution is unique if the symmetric part of B is positive definite.
     """
 
     def __init__(self, stiffness: SlidingStiffness, constant: Array, bound: Array) -> None:
@@ -304,6 +293,15 @@ class BrushFriction:
     it, None: the static ones. `tolerance`: residual of stick and slip relative to the largest
     bound, or to the largest force where nothing is bounded. `horizontal` (c, 2) N is the last
     solution, `turns` its number of iterations.
+
+    Normal: f >= 0, g = A_zz (f - f_static) + A_zh t + q >= 0, f . g = 0. Tangential, at the
+    touching points: t = -K_b (share u + past) limited to |t| <= mu f, u = u_free + A_hz (f -
+    f_static) + A_hh t. With a tread that shears (contact.tread.shear), A includes its part; its
+    rubber is then in series with the bristles or, with K_b infinite, alone. While the same points
+    touch and stick this is block Gauss-Seidel on a positive definite problem and converges; with
+    slip convergence is certain for mu ||A_zz^-1 A_zh|| < 1, where the solution is unique too.
+    Without a friction coefficient there may be no solution: a point at the edge may bear a force
+    that lifts it off the road, where it bears none. In such a step its bristle bears none.
     """
 
     def __init__(

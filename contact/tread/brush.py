@@ -22,17 +22,6 @@ a travel of w pitches per step, w <= 1, therefore
 
 The force of a rolling, sticking body then has errors of 2.7, 1.6 and 0.6 % with 6, 12 and 24 points
 along its contact (Kalker's C11); with bristles entering at a point it had 18, 8 and 4 %.
-
-The slip at which a tire rolls freely: no drag on a smooth road.
-
-Bristles are sensitive to the local speed of the surface. For a wheel at speed Omega with
-r_e Omega = v, the road's speed, the surface at (x, y) moves at -Omega d(x, y)/dtheta in the
-static shape, and so slips by
-
-    s_x = (dx/dtheta) / r_e - 1,     s_y = -(dy/dtheta) / r_e
-
-in addition to the slip of the whole wheel (signs of contact.tread.brush). The resultant of these
-forces need not vanish: the wheel rotates slightly faster or slower until it does.
 """
 
 from __future__ import annotations
@@ -185,6 +174,15 @@ def free_slip(drag: Callable[[float], float], load: float) -> float:
 
     Regula falsi (Illinois) in a bracket sought outwards from 0: 1e-3, then four times as far up to
     0.2. ConvergenceError if there is none.
+
+    Bristles are sensitive to the local speed of the surface. For a wheel at speed Omega with r_e
+    Omega = v, the road's speed, the surface at (x, y) moves at -Omega d(x, y)/dtheta in the static
+    shape, and so slips by
+
+        s_x = (dx/dtheta) / r_e - 1,     s_y = -(dy/dtheta) / r_e
+
+    in addition to the slip of the whole wheel (signs of contact.tread.brush). The resultant of
+    these forces need not vanish: the wheel rotates slightly faster or slower until it does.
     """
     small = TOLERANCE * load
     low, at_low = 0.0, drag(0.0)

@@ -1,20 +1,4 @@
-"""A tread layer bonded to a rigid base, its belt: influence of pressure and of horizontal forces.
-
-An elastic layer bonded to a rigid base under horizontal forces, coupled with pressure.
-
-Forces in waves of wave number k = m/h along a direction of the surface, h the thickness and G the
-shear modulus, move it by 1/(G k) times
-
-    T = (1 - nu) [(3 - 4 nu) sinh 2m + 2m] / D      along, under forces along,
-    S = tanh m                                      across, under forces across,
-    C = [(3 - 4 nu)(1 - 2 nu)/2 (cosh 2m - 1) - m^2] / D
-                                                    upwards, under forces along, in quadrature,
-    D = (3 - 4 nu) cosh 2m + 2 m^2 + 5 - 4 nu (3 - 2 nu)
-
-(tests/contact/tread/test_shear.py solves the layer's equations for them). The limit m to infinity
-is the half-space: T = 1 - nu, S = 1, C = (1 - 2 nu)/2. Unlike a half-space, a thin incompressible
-layer is squeezed out sideways by pressure.
-"""
+"""A tread layer bonded to a rigid base, its belt: influence of pressure and of horizontal forces."""
 
 from __future__ import annotations
 
@@ -136,6 +120,19 @@ class LayerShear:
 
     t being the direction of the offset r, p0 = 1/h int (T + S - 2 + nu)/2 J0(m r/h) dm, q2 with
     (T - S + nu)/2 J2, c1 with (C - (1 - 2 nu)/2) J1.
+
+    Forces in waves of wave number k = m/h along a direction of the surface, h the thickness and G
+    the shear modulus, move it by 1/(G k) times
+
+        T = (1 - nu) [(3 - 4 nu) sinh 2m + 2m] / D      along, under forces along,
+        S = tanh m                                      across, under forces across,
+        C = [(3 - 4 nu)(1 - 2 nu)/2 (cosh 2m - 1) - m^2] / D
+                                                        upwards, under forces along, in quadrature,
+        D = (3 - 4 nu) cosh 2m + 2 m^2 + 5 - 4 nu (3 - 2 nu)
+
+    (tests/contact/tread/test_shear.py solves the layer's equations for them). The limit m to
+    infinity is the half-space: T = 1 - nu, S = 1, C = (1 - 2 nu)/2. Unlike a half-space, a thin
+    incompressible layer is squeezed out sideways by pressure.
     """
 
     def __init__(self, youngs_modulus: float, poisson_ratio: float, thickness: float) -> None:

@@ -1,21 +1,5 @@
 """Matrices of small motions about a static state, on the unknowns that its support leaves free.
 
-Support of the tire in small motions: rim fixed or free, road absent or holding its nodes.
-
-A free rim is an unsupported rigid body without mass of its own. On its nodes
-
-    u_i = a + theta x x_i,   six unknowns R eta with R^T M R = 1,
-
-so that the diagonal mass stays diagonal. The static state is that of the clamped rim. The wheel
-still carries the rim's static forces r, which rotate with it, and a constant force at the axle's
-centre. The second-order work of rotating forces adds to K, on the rotations,
-
-    W_ab = sum_i (r_a x_b + r_b x_a) / 2 - delta_ab r . x.
-
-A free tire without a road then has its six rigid modes at any inflation (a uniform pressure on the
-two equal bead circles of a rigid rim has no resultant), and K is symmetric. Mass-proportional
-damping then acts against the ground, as there is no wheel on an axle.
-
 For basis functions phi on the undeformed mesh and w = e_y x X (Omega factored out). K is the
 tangent stiffness with its geometric and follower-pressure parts, the rubber's material part with
 dynamic moduli at DYNAMIC_FREQUENCY:
@@ -169,6 +153,20 @@ class Rim:
 
     Own `dofs` (d,); `shape` (d, 6): their motion per unknown; `coordinates` (6, 6): translation and
     rotation per unknown; `mine`: whether this process owns the unknowns.
+
+    A free rim is an unsupported rigid body without mass of its own. On its nodes
+
+        u_i = a + theta x x_i,   six unknowns R eta with R^T M R = 1,
+
+    so that the diagonal mass stays diagonal. The static state is that of the clamped rim. The wheel
+    still carries the rim's static forces r, which rotate with it, and a constant force at the
+    axle's centre. The second-order work of rotating forces adds to K, on the rotations,
+
+        W_ab = sum_i (r_a x_b + r_b x_a) / 2 - delta_ab r . x.
+
+    A free tire without a road then has its six rigid modes at any inflation (a uniform pressure on
+    the two equal bead circles of a rigid rim has no resultant), and K is symmetric.
+    Mass-proportional damping then acts against the ground, as there is no wheel on an axle.
     """
 
     def __init__(self, body: Body, nodes: np.ndarray, mass: np.ndarray) -> None:

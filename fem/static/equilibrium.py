@@ -3,21 +3,6 @@
 F_int(u) + p F_pressure(u) + Omega^2 S (X + u) + gamma1 Omega B u + gamma2 Omega K M^-1 B u = f,
 with f >= 0 and z + u_z >= z_road at the tread dofs, one of the two an equality. On roads other than
 a level plane they move in road coordinates (fem.static.road). Friction: fem.static.friction_road.
-
-An interrupted load path is retraced without solving (`History`): it is a function of the outcomes
-and states of its solutions. From its start, each recorded solution is put in place. The solution
-after the last recorded one may use its tangent, which is not stored; the last solution of each
-problem is therefore solved again, from where it began.
-
-Stiffness-proportional damping in the steady shape is f = gamma2 Omega K(u) r, r = M^-1 B u: r is
-the body rate of the displacement per unit speed, projected on the finite-element space: its
-gradient exists, unlike that of grad(u) w across elements. For small motions f becomes the term
-gamma2 Omega K M^-1 B of the rotating pencil.
-
-That product couples each node with the neighbours of its neighbours: with it in the tangent a
-factorisation takes three to six times as long. Newton's method without it leaves K^-1 (gamma2 Omega
-K M^-1 B) = gamma2 Omega M^-1 B of an error in each step, so it converges if the spectral radius of
-this is well below 1, to the same state, as the force is complete.
 """
 
 from __future__ import annotations
@@ -69,6 +54,16 @@ class ShapeDamping:
 
     `lag`: most of an error that a Newton step leaves because its tangent lacks that part; 0 if it
     has it. Call `update` before assembling `work`. All methods are collective.
+
+    Stiffness-proportional damping in the steady shape is f = gamma2 Omega K(u) r, r = M^-1 B u: r
+    is the body rate of the displacement per unit speed, projected on the finite-element space: its
+    gradient exists, unlike that of grad(u) w across elements. For small motions f becomes the term
+    gamma2 Omega K M^-1 B of the rotating pencil.
+
+    That product couples each node with the neighbours of its neighbours: with it in the tangent a
+    factorisation takes three to six times as long. Newton's method without it leaves K^-1 (gamma2
+    Omega K M^-1 B) = gamma2 Omega M^-1 B of an error in each step, so it converges if the spectral
+    radius of this is well below 1, to the same state, as the force is complete.
     """
 
     def __init__(self, body: Body, pressure: Expr, rolling: Rolling) -> None:
@@ -156,7 +151,13 @@ _ROAD = "active", "force", "height"
 
 
 class SolutionHistory:
-    """Solutions of the equilibrium problems of one stage, in order; none without a `journal`."""
+    """Solutions of the equilibrium problems of one stage, in order; none without a `journal`.
+
+    An interrupted load path is retraced without solving (`History`): it is a function of the
+    outcomes and states of its solutions. From its start, each recorded solution is put in place.
+    The solution after the last recorded one may use its tangent, which is not stored; the last
+    solution of each problem is therefore solved again, from where it began.
+    """
 
     def __init__(self, journal: Journal | None) -> None:
         self._journal = journal

@@ -1,29 +1,4 @@
-"""Pressing a tire on a road with friction, and sliding it there.
-
-The linearised equilibrium of a tire with stick and slip: the counterpart of `ConstrainedSystem`.
-
-    (L K + S) P dv = L (- out) - springs,     du = P dv:
-
-L adds to the horizontal rows of slipping nodes -mu n times the part of their rows that is the
-normal force; S are the springs across their path; P moves sticking nodes with the free node ahead
-of them on their streamline. None of these is symmetric.
-
-Equilibrium on a smooth road with Coulomb friction: contact, stick, slip in one Newton loop.
-
-Force versus sliding distance of the road under a tire with friction, up to full sliding.
-
-Under a standing tire the road moves along or across by d at constant load; each step starts from
-the stick and slip of the last. A rolling wheel is given slip instead, s_x = s (driving) or s_y = -s
-(drifting to the right), at constant travel per radian; each state is steady. The force is that of
-the road on the tire in the direction of motion; its limit is mu times the normal force.
-
-Friction added to a frictionless static state: along the load path, or in steady rolling.
-
-Stick and slip under a standing tire depend on the load path: the inflated tire is pressed on the
-road again in equal steps. Under a steadily rolling tire they do not: Newton's method starts from
-the frictionless state, and the travel per radian at which a free-rolling wheel has no horizontal
-force is found by the secant method.
-"""
+"""Pressing a tire on a road with friction, and sliding it there."""
 
 from __future__ import annotations
 
@@ -51,7 +26,14 @@ Array = np.ndarray
 
 
 class RubbingSystem:
-    """Uses the `road`'s sets at the time of each `take`. All methods are collective."""
+    """Uses the `road`'s sets at the time of each `take`. All methods are collective.
+
+        (L K + S) P dv = L (- out) - springs,     du = P dv:
+
+    L adds to the horizontal rows of slipping nodes -mu n times the part of their rows that is the
+    normal force; S are the springs across their path; P moves sticking nodes with the free node
+    ahead of them on their streamline. None of these is symmetric.
+    """
 
     def __init__(self, comm: MPI.Comm, matrix: PETSc.Mat, timing: Timing, road: RubbingRoad):
         self._comm, self._timing, self._road = comm, timing, road
@@ -213,7 +195,14 @@ class Slid:
 
 class Slide:
     """Sliding from a `state` with friction, to which the body is set; `axis` 0 along the road, 1
-    across it. All methods are collective."""
+    across it. All methods are collective.
+
+    Under a standing tire the road moves along or across by d at constant load; each step starts
+    from the stick and slip of the last. A rolling wheel is given slip instead, s_x = s (driving) or
+    s_y = -s (drifting to the right), at constant travel per radian; each state is steady. The force
+    is that of the road on the tire in the direction of motion; its limit is mu times the normal
+    force.
+    """
 
     def __init__(self, body: Body, state: StaticState, friction: float, axis: int) -> None:
         if state.pull is None or state.road_height is None:
@@ -349,6 +338,11 @@ def with_friction(
 
     `inflated`: `u` of the body before it met the road; `load` (N) of the road along its normal
     under the axle, None: its height is kept.
+
+    Stick and slip under a standing tire depend on the load path: the inflated tire is pressed on
+    the road again in equal steps. Under a steadily rolling tire they do not: Newton's method starts
+    from the frictionless state, and the travel per radian at which a free-rolling wheel has no
+    horizontal force is found by the secant method.
     """
     equilibrium = loader.equilibrium
     if load is not None:

@@ -1,45 +1,4 @@
-"""A road with Coulomb friction: sliding and sticking nodes.
-
-Slip of each tread node on the road: since the last load step, or since the node ahead of it.
-
-A standing tire slips by g = (x - d) - (x - d)_before between load steps, x being the node's
-position and d the road's. For a steadily rolling tire the nodes are fixed in space: material at the
-angle theta comes from the node ahead, at theta + D, while the road passes by r D, r being the
-wheel's travel per radian. Meanwhile it slips by
-
-    g = x(theta) - x(theta + D) + D r (1 - s_x, s_y),
-
-s_x > 0 for a driven wheel, s_y > 0 for one drifting towards +y (contact.tread.brush). Where it
-sticks, g = 0: the steps along a streamline add up to the convective rate of the stuck displacement
-for any step length. On an inclined road and on a drum x is the developed position on the road, xi
-and eta (fem.static.road).
-
-The smooth road under the tread nodes of one body, with Coulomb friction.
-
-For a node in contact with normal force f, horizontal road force t, slip distance g and stiffness c,
-
-    t = P(t - c g),   P the projection on |t| <= mu f:
-
-it sticks, g = 0, or it slips, |t| = mu f against g (Alart and Curnier, Comput. Methods Appl. Mech.
-Eng. 92 (1991) 353). Newton's method node by node, with n along t - c g, m normal to n and
-b = mu f / |t - c g| < 1:
-
-    t+ = mu f+ n - k m (m . g+),   k = b c / (1 - b),
-
-f+ and g+ being those of the linearised problem: t has no step of its own. Once a node slips, k is
-|t| / |g|: friction is a spring across its path, and along it only mu times the normal force.
-
-Unless the road is a level plane, t and g are along and across it (fem.static.road). With
-l = -e_xi . cos gamma n_0 the force conjugate to the road's height is v = p - l t_xi, p being the z
-component of the normal force f = s p, s the stretch. At slipping nodes v and t_xi give p.
-
-Force versus sliding distance of the road under a tire with friction, up to full sliding.
-
-Under a standing tire the road moves along or across by d at constant load; each step starts from
-the stick and slip of the last. A rolling wheel is given slip instead, s_x = s (driving) or s_y = -s
-(drifting to the right), at constant travel per radian; each state is steady. The force is that of
-the road on the tire in the direction of motion; its limit is mu times the normal force.
-"""
+"""A road with Coulomb friction: sliding and sticking nodes."""
 
 from __future__ import annotations
 
@@ -109,7 +68,20 @@ class StandingFriction:
 
 
 class Passing:
-    """Slip in steady rolling: travel per radian `radius` m, and `slip` (s_x, s_y)."""
+    """Slip in steady rolling: travel per radian `radius` m, and `slip` (s_x, s_y).
+
+    A standing tire slips by g = (x - d) - (x - d)_before between load steps, x being the node's
+    position and d the road's. For a steadily rolling tire the nodes are fixed in space: material at
+    the angle theta comes from the node ahead, at theta + D, while the road passes by r D, r being
+    the wheel's travel per radian. Meanwhile it slips by
+
+        g = x(theta) - x(theta + D) + D r (1 - s_x, s_y),
+
+    s_x > 0 for a driven wheel, s_y > 0 for one drifting towards +y (contact.tread.brush). Where it
+    sticks, g = 0: the steps along a streamline add up to the convective rate of the stuck
+    displacement for any step length. On an inclined road and on a drum x is the developed position
+    on the road, xi and eta (fem.static.road).
+    """
 
     def __init__(
         self,
@@ -191,7 +163,26 @@ _STIFFEST = 1e3
 
 
 class RubbingRoad(RoadContact):
-    """`RoadContact` with friction: `pull` (n, 2) N along and across the road; `sticks` (n,) bool."""
+    """`RoadContact` with friction: `pull` (n, 2) N along and across the road; `sticks` (n,) bool.
+
+    For a node in contact with normal force f, horizontal road force t, slip distance g and
+    stiffness c,
+
+        t = P(t - c g),   P the projection on |t| <= mu f:
+
+    it sticks, g = 0, or it slips, |t| = mu f against g (Alart and Curnier, Comput. Methods Appl.
+    Mech. Eng. 92 (1991) 353). Newton's method node by node, with n along t - c g, m normal to n and
+    b = mu f / |t - c g| < 1:
+
+        t+ = mu f+ n - k m (m . g+),   k = b c / (1 - b),
+
+    f+ and g+ being those of the linearised problem: t has no step of its own. Once a node slips, k
+    is |t| / |g|: friction is a spring across its path, and along it only mu times the normal force.
+
+    Unless the road is a level plane, t and g are along and across it (fem.static.road). With l =
+    -e_xi . cos gamma n_0 the force conjugate to the road's height is v = p - l t_xi, p being the z
+    component of the normal force f = s p, s the stretch. At slipping nodes v and t_xi give p.
+    """
 
     def __init__(self, body: Body, friction: float, sliding: Sliding) -> None:
         super().__init__(body, sliding.shape)

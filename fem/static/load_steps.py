@@ -1,35 +1,4 @@
-"""Load steps to a state: step control, secants for a load, and a rescue where a tire snaps.
-
-Equilibrium from a state of another mesh whose displacement is close but whose forces are not.
-
-Elements control cord strain only at their integration points; in between, the displacement of long
-elements stretches a belt that it bends. On another mesh this appears as stress (radial tire, 16 x
-12 elements, 4000 N, elements half as long: 9 kN per node at the shoulder, all around), which makes
-the first tangent useless: its step moves a sidewall by 35 mm, and Newton's method does not recover.
-Springs to the current position (as in path.snap) hold the body while the cords relax by some 0.1
-mm,
-
-    k (u - u_0) + F(u) = f,  k in proportion to the nodes' mass,
-
-and the problem itself is solved from there.
-
-Through a snap: where equilibrium jumps, the tire moves against springs until it comes to rest.
-
-Where a wall folds, or a node that leaves the road takes others with it, no equilibrium is near the
-last one, however small the load step: Newton's method cycles between contact sets or diverges.
-Pseudo-transient continuation (Kelley and Keyes 1998, doi 10.1137/S0036142996304796) moves from the
-last state to the next stable one,
-
-    k (u - u_n) + F(u) = f,  u_n the state before,  k in proportion to the nodes' mass,
-
-with the road's conditions satisfied in every step. k is reduced to a quarter after a step that
-converges and raised eightfold after one that does not. Once it is negligible, the state is solved
-for without it.
-
-Adaptive load steps: halved when Newton's method fails, enlarged when it converges easily.
-
-If the steps become too small, an error names the last converged state.
-"""
+"""Load steps to a state: step control, secants for a load, and a rescue where a tire snaps."""
 
 from __future__ import annotations
 
@@ -78,6 +47,17 @@ def balance_near(
 
     The road is at `road_height` (m) and carries about `load` N. As `Equilibrium.solve`; on failure
     body and road are restored.
+
+    Elements control cord strain only at their integration points; in between, the displacement of
+    long elements stretches a belt that it bends. On another mesh this appears as stress (radial
+    tire, 16 x 12 elements, 4000 N, elements half as long: 9 kN per node at the shoulder, all
+    around), which makes the first tangent useless: its step moves a sidewall by 35 mm, and Newton's
+    method does not recover. Springs to the current position (as in path.snap) hold the body while
+    the cords relax by some 0.1 mm,
+
+        k (u - u_0) + F(u) = f,  k in proportion to the nodes' mass,
+
+    and the problem itself is solved from there.
     """
     if not cords_strained(equilibrium, load):
         step = equilibrium.solve(road_height, allowed=allowed)
@@ -127,6 +107,17 @@ def pseudo_transient(
     """The stable state reached from the present one, on a road at `road_height` (m). Collective.
 
     As `Equilibrium.solve`; on failure body and road are restored.
+
+    Where a wall folds, or a node that leaves the road takes others with it, no equilibrium is near
+    the last one, however small the load step: Newton's method cycles between contact sets or
+    diverges. Pseudo-transient continuation (Kelley and Keyes 1998, doi 10.1137/S0036142996304796)
+    moves from the last state to the next stable one,
+
+        k (u - u_n) + F(u) = f,  u_n the state before,  k in proportion to the nodes' mass,
+
+    with the road's conditions satisfied in every step. k is reduced to a quarter after a step that
+    converges and raised eightfold after one that does not. Once it is negligible, the state is
+    solved for without it.
     """
     field, road = equilibrium.body.u.x, equilibrium.road
     kept = field.array.copy(), road.kept(), equilibrium.road_height

@@ -1,34 +1,4 @@
-"""The road in the static state: contact, the shape of a drum or a cambered plane, its coordinates.
-
-Shape of the road under the tire: a plane, inclined by the wheel's camber, or a drum.
-
-In the wheel's axes the surface is z = h + s(x, y), h being its height under the axle. The wheel is
-tilted by gamma about x (its top to the right, -y, for gamma > 0), so the road's normal is (0, sin
-gamma, cos gamma) there, and
-
-    s = -y tan gamma + d(x) / cos gamma,
-    d = sqrt(R^2 - x^2) - R on a drum, R - sqrt(R^2 - x^2) inside one,
-
-for a drum with a horizontal axis. Beyond 0.9 R a drum is continued by its tangent; there is no
-contact there.
-
-All of these surfaces are developable. A point on the road has the coordinates xi = R asin(x/R) (x
-on a plane) along it and eta = y cos gamma - z sin gamma across it. A body on the road that moves up
-with it keeps both.
-
-Tread nodes in the coordinates of a road that is not a level plane.
-
-X = X(xi, eta, w): the point of the surface at xi, eta along and across it
-(`RoadShape`), displaced by w along the direction in which the road is raised, cos gamma
-n_0 per metre of height, n_0 being its normal under the axle. With B = dX/d(xi, eta, w), whose
-columns are e_xi, e_eta and cos gamma n_0, residual forces and tangent become
-
-    B^T out,    B^T K B + out . d2X,    d2X/dxi2 = -n/R  on a drum, n/R inside one, all others 0,
-
-so that a node is held in w alone, or in all three coordinates if it sticks, as on a level road. A
-frictionless road exerts f = N n_z along the wheel's z, N being the normal force; f is the reaction
-at w.
-"""
+"""The road in the static state: contact, the shape of a drum or a cambered plane, its coordinates."""
 
 from __future__ import annotations
 
@@ -50,7 +20,22 @@ _REACH = 0.9  # of the drum's radius
 
 @dataclass(frozen=True, kw_only=True)
 class RoadShape:
-    """`camber` rad; `drum_radius` m, None: flat road; `inside`: the tire runs inside the drum."""
+    """`camber` rad; `drum_radius` m, None: flat road; `inside`: the tire runs inside the drum.
+
+    In the wheel's axes the surface is z = h + s(x, y), h being its height under the axle. The wheel
+    is tilted by gamma about x (its top to the right, -y, for gamma > 0), so the road's normal is
+    (0, sin gamma, cos gamma) there, and
+
+        s = -y tan gamma + d(x) / cos gamma,
+        d = sqrt(R^2 - x^2) - R on a drum, R - sqrt(R^2 - x^2) inside one,
+
+    for a drum with a horizontal axis. Beyond 0.9 R a drum is continued by its tangent; there is no
+    contact there.
+
+    All of these surfaces are developable. A point on the road has the coordinates xi = R asin(x/R)
+    (x on a plane) along it and eta = y cos gamma - z sin gamma across it. A body on the road that
+    moves up with it keeps both.
+    """
 
     camber: float = 0.0
     drum_radius: float | None = None
@@ -264,7 +249,19 @@ class RoadContact:
 
 class RoadCoordinates:
     """Road coordinates of the owned nodes that can touch a `road`, at their present positions. All
-    methods except `turn` and `spread` are collective."""
+    methods except `turn` and `spread` are collective.
+
+    X = X(xi, eta, w): the point of the surface at xi, eta along and across it (`RoadShape`),
+    displaced by w along the direction in which the road is raised, cos gamma n_0 per metre of
+    height, n_0 being its normal under the axle. With B = dX/d(xi, eta, w), whose columns are e_xi,
+    e_eta and cos gamma n_0, residual forces and tangent become
+
+        B^T out,    B^T K B + out . d2X,    d2X/dxi2 = -n/R  on a drum, n/R inside one, all others 0,
+
+    so that a node is held in w alone, or in all three coordinates if it sticks, as on a level road.
+    A frictionless road exerts f = N n_z along the wheel's z, N being the normal force; f is the
+    reaction at w.
+    """
 
     def __init__(self, body: Body, road: RoadContact) -> None:
         self._body, self._road = body, road

@@ -1,26 +1,4 @@
-"""Symmetries of the static state: one section if inflated, half a ring if pressed on the road at rest.
-
-Axisymmetric state of the inflated tire without a road, from one section.
-
-With P from the motion of the section's nodes, in circumferential, axial and radial directions, to
-all nodes of a sector of one element around,
-
-    P^T (F_int(P v) + p F_pressure(P v) + Omega^2 S (X + P v)) = 0.
-
-The boundary terms of the two cut faces cancel in an axisymmetric motion. Angled belts may rotate
-the crown relative to the beads; that is axisymmetric too. Damping by mass or stiffness has no
-effect in an axisymmetric shape.
-
-Symmetry of the standing tire under a half turn about the vertical: half of the ring suffices.
-
-With P from the motion of the half ring's free nodes to all its nodes,
-
-    P^T (F_int(P v) + p F_pressure(P v) + Omega^2 S (X + P v)) = P^T f.
-
-On the two cut faces, at the lowest and the highest point, the node at (r, -y) moves as that at (r,
-y), rotated: (-u_x, -u_y, u_z). The boundary terms of the cut faces cancel between the halves.
-Angled belts keep this symmetry, although they break both mirror symmetries. Damping breaks it.
-"""
+"""Symmetries of the static state: one section if inflated, half a ring if pressed on the road at rest."""
 
 from __future__ import annotations
 
@@ -46,6 +24,15 @@ class AxisymmetricEquilibrium(Equilibrium):
     """Equilibrium of a ring's axisymmetric shape, on the shortest of its elements around.
 
     On the calling process only. The state is `body.u` of its own `body`, a sector.
+
+    With P from the motion of the section's nodes, in circumferential, axial and radial directions,
+    to all nodes of a sector of one element around,
+
+        P^T (F_int(P v) + p F_pressure(P v) + Omega^2 S (X + P v)) = 0.
+
+    The boundary terms of the two cut faces cancel in an axisymmetric motion. Angled belts may
+    rotate the crown relative to the beads; that is axisymmetric too. Damping by mass or stiffness
+    has no effect in an axisymmetric shape.
     """
 
     def __init__(self, whole: Body, rolling: Rolling) -> None:
@@ -338,6 +325,15 @@ class HalfModelEquilibrium(Equilibrium):
 
     The state is `body.u` of its own `body`; loads passed and returned are those of the whole
     tire.
+
+    With P from the motion of the half ring's free nodes to all its nodes,
+
+        P^T (F_int(P v) + p F_pressure(P v) + Omega^2 S (X + P v)) = P^T f.
+
+    On the two cut faces, at the lowest and the highest point, the node at (r, -y) moves as that at
+    (r, y), rotated: (-u_x, -u_y, u_z). The boundary terms of the cut faces cancel between the
+    halves. Angled belts keep this symmetry, although they break both mirror symmetries. Damping
+    breaks it.
     """
 
     def __init__(self, whole: Body, rolling: Rolling, ring: Ring | None = None) -> None:

@@ -1,32 +1,4 @@
-"""All lowest eigenpairs of K x = w^2 M x: slices of the spectrum, block Lanczos, inertia counts.
-
-Eigenpairs nearest to a shift by block Lanczos, which reads the factor once for many solves.
-
-    W = (A - sigma I)^-1 V_j = V_1..j H_j + V_j+1 R_j,   H s = theta s,   lambda = sigma + 1 / theta
-
-Every new block is orthogonalised twice against all earlier ones. The residual of a Ritz pair is
-|R_j s_j|, with s_j the last block of s. A triangular solve with one right-hand side is
-memory-bound: eight at once cost less than two one by one, and a third more of them are needed
-(radial tire, 14,919 unknowns, 76 eigenvalues: 248 solves, 1.1 s; SLEPc's Krylov-Schur with one
-vector: 2.8 s). Blocks of 4 and of 16 take 1.3 and 1.4 s. Sources: Golub and Underwood (1977);
-Grimes, Lewis and Simon, SIAM J. Matrix Anal. Appl. 15 (1994) 228.
-
-All eigenpairs of a symmetric matrix in one interval, by block Lanczos about a shift inside it.
-
-    (A - sigma I)^-1 v = theta v,   lambda = sigma + 1 / theta
-
-The largest |theta| belong to the eigenvalues nearest to the shift. The
-number of eigenvalues in the interval is known beforehand from inertia. A block finds as many
-directions of a repeated eigenvalue as it has vectors, so the search continues with the found ones
-deflated until the count is met, and never ends earlier.
-
-The lowest eigenvalues of independent symmetric matrices: spectrum slicing by teams of processes.
-
-Every team has all the matrices and solves slices by itself: no communication between teams inside a
-solve, results independent of their number, cost proportional to the number of slices. Memory of a
-team, distributed over its processes by rows: the matrices (together as many entries as the whole
-one), one factor and one Krylov basis at a time, and the vectors of the slices that it has solved.
-"""
+"""All lowest eigenpairs of K x = w^2 M x: slices of the spectrum, block Lanczos, inertia counts."""
 
 from __future__ import annotations
 
@@ -335,6 +307,15 @@ def nearest(
 
     The search ends when `wanted` have converged, to a residual below the tolerance relative to
     theta, or when the basis is full. Each process has its rows. Collective in the team.
+
+        W = (A - sigma I)^-1 V_j = V_1..j H_j + V_j+1 R_j,   H s = theta s,   lambda = sigma + 1 / theta
+
+    Every new block is orthogonalised twice against all earlier ones. The residual of a Ritz pair is
+    |R_j s_j|, with s_j the last block of s. A triangular solve with one right-hand side is
+    memory-bound: eight at once cost less than two one by one, and a third more of them are needed
+    (radial tire, 14,919 unknowns, 76 eigenvalues: 248 solves, 1.1 s; SLEPc's Krylov-Schur with one
+    vector: 2.8 s). Blocks of 4 and of 16 take 1.3 and 1.4 s. Sources: Golub and Underwood (1977);
+    Grimes, Lewis and Simon, SIAM J. Matrix Anal. Appl. 15 (1994) 228.
     """
     basis = KrylovBasis(shifted, known, _LENGTH * wanted + _MORE * BLOCK, 7 + known.shape[1])
     blocks = 0
@@ -406,6 +387,13 @@ def eigenpairs(
     Of the matrix and of the vectors, each process of the `team` has its rows. Small matrices, and
     those of which most eigenvalues are wanted, are solved densely. Raises ConvergenceError if the
     number found differs from the inertia count. Collective in the team.
+
+        (A - sigma I)^-1 v = theta v,   lambda = sigma + 1 / theta
+
+    The largest |theta| belong to the eigenvalues nearest to the shift. The number of eigenvalues in
+    the interval is known beforehand from inertia. A block finds as many directions of a repeated
+    eigenvalue as it has vectors, so the search continues with the found ones deflated until the
+    count is met, and never ends earlier.
     """
     rows, size = matrix.shape
     if interval.count == 0:
@@ -622,6 +610,12 @@ class LowestEigenvalues:
 class SymmetricProblem:
     """Independent parts of a symmetric problem, the same in all teams of the processes of `comm`;
     no eigenvalue is larger than `norm`. The `journal` holds earlier results; `solver`, of `SOLVERS`.
+
+    Every team has all the matrices and solves slices by itself: no communication between teams
+    inside a solve, results independent of their number, cost proportional to the number of slices.
+    Memory of a team, distributed over its processes by rows: the matrices (together as many entries
+    as the whole one), one factor and one Krylov basis at a time, and the vectors of the slices that
+    it has solved.
     """
 
     def __init__(

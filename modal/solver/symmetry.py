@@ -8,20 +8,6 @@ the half turn about the vertical.
 The parts are Q^T A Q. What couples them is rounding of A, whose entries are symmetric to about
 1e-13 of the largest. It changes an eigenvalue by at most |R A R - A| / 2. The residual on A itself,
 a bound on twice the relative error of a frequency, is measured.
-
-A ring of equal segments is split by wave number. With tangential, axial and radial components at
-each node, the matrix of an axisymmetric state repeats from segment to segment: blocks A_j couple a
-segment with the j-th after it. The fields
-
-    u_s = Re[e^{i n s alpha} v],  alpha = 2 pi / N,
-    H_n v = lambda v,   H_n = sum_j e^{i n j alpha} A_j
-
-are decoupled for n = 0 ... N / 2; all but the first and, for even N, the last come in pairs
-(Thomas, Int. J. Numer. Meth. Eng. 14 (1979) 81). A symmetry that reverses the sense around the
-ring, a mirror or, with belts at an angle, the half turn, maps v to P conj(v), with P a signed
-permutation once each node's phase e^{i n delta} is taken out. On the fields that it keeps, H_n is
-real and symmetric. Without one, H_n = A + i B is solved as [[A, -B], [B, A]], which has each
-eigenvalue twice.
 """
 
 from __future__ import annotations
@@ -252,6 +238,20 @@ class RepeatingMatrix:
     j -> A_j (d, d) sparse; `angle` (d,) within the segment, rad; `kept` (d, d) complex unitary: the
     columns that a symmetry keeps, None without one; `defect`: the norm of the change of the matrix
     in a rotation by one segment, in the units of its eigenvalues.
+
+    A ring of equal segments is split by wave number. With tangential, axial and radial components
+    at each node, the matrix of an axisymmetric state repeats from segment to segment: blocks A_j
+    couple a segment with the j-th after it. The fields
+
+        u_s = Re[e^{i n s alpha} v],  alpha = 2 pi / N,
+        H_n v = lambda v,   H_n = sum_j e^{i n j alpha} A_j
+
+    are decoupled for n = 0 ... N / 2; all but the first and, for even N, the last come in pairs
+    (Thomas, Int. J. Numer. Meth. Eng. 14 (1979) 81). A symmetry that reverses the sense around the
+    ring, a mirror or, with belts at an angle, the half turn, maps v to P conj(v), with P a signed
+    permutation once each node's phase e^{i n delta} is taken out. On the fields that it keeps, H_n
+    is real and symmetric. Without one, H_n = A + i B is solved as [[A, -B], [B, A]], which has each
+    eigenvalue twice.
     """
 
     segments: int

@@ -1,26 +1,4 @@
-"""Contact on a half-space and under a brush against closed forms: (case, unit, computed, exact).
-
-A half-space sheared, against closed forms and Kalker: (case, unit, computed, exact).
-
-For a disc of radius 1 m in cells, `n` across it; forces are scaled by the cells' total area. A body
-on a rigid road behaves like two equal ones with twice the shear modulus.
-
-Rolling cylinders of creeping rubber, published pressures: (case, unit, computed, exact).
-
-Two cylinders of polyamide: G, nu, common radius, load of 1 m, speed. Wang and Knothe, J. Appl.
-Mech. 60 (1993) 310.
-
-Pitch orders of a tread pattern on a rigid wheel: (case, unit, computed, exact).
-
-For grooves that never touch, on a bed of springs, F(t) is the sum of the slick's forces over the
-land. Its order n is the groove's Fourier coefficient sin(n pi w/l)/(n pi), with groove width w and
-pitch l, times the transform of the slick's force along x.
-
-A rubber roller in plane strain: the finite-element tire as a cylinder with closed forms.
-
-A torus with such a large section circle that the strip in use is flat; its inner face is held, and
-nothing moves along the axle. Elements are small at the road and grow from there around and inwards.
-"""
+"""Contact on a half-space and under a brush against closed forms: (case, unit, computed, exact)."""
 
 from __future__ import annotations
 
@@ -248,7 +226,11 @@ SETTLED = 1e-5  # relative change of the force in a step
 
 
 def shear_rows() -> Iterator[tuple]:
-    """All cases."""
+    """All cases.
+
+    For a disc of radius 1 m in cells, `n` across it; forces are scaled by the cells' total area. A
+    body on a rigid road behaves like two equal ones with twice the shear modulus.
+    """
     for nu in (0.25, 0.5):
         yield from pushed(nu, 24)
     for cells in (12, 24):
@@ -372,7 +354,11 @@ INFLUENCE = partial(half_space_influence, youngs_modulus=(1 + NU) * SHEAR, poiss
 
 
 def creep_rows() -> Iterator[tuple]:
-    """The largest pressure at each relaxation time."""
+    """The largest pressure at each relaxation time.
+
+    Two cylinders of polyamide: G, nu, common radius, load of 1 m, speed. Wang and Knothe, J. Appl.
+    Mech. 60 (1993) 310.
+    """
     for time, published in PUBLISHED.items():
         name = f"rolling cylinder that creeps, relaxation in {time:g} s, largest pressure (Wang, Knothe)"
         yield name, "MPa", rolled_strip(time).max(), published
@@ -454,7 +440,12 @@ class Rigid:
 
 
 def grooved_rows() -> Iterator[tuple]:
-    """Mean and the first three orders."""
+    """Mean and the first three orders.
+
+    For grooves that never touch, on a bed of springs, F(t) is the sum of the slick's forces over
+    the land. Its order n is the groove's Fourier coefficient sin(n pi w/l)/(n pi), with groove
+    width w and pitch l, times the transform of the slick's force along x.
+    """
     force, _ = rolled(
         grooves(width=WIDTH, depth=0.05, flank=1e-4), round(TIMES * AROUND / PITCHES / SPEED / STEP)
     )
@@ -521,6 +512,10 @@ class Roller:
 
     `outer` radius; `thickness` of the rubber; `width`; elements of `size` up to a distance `reach`
     from the lowest point.
+
+    A torus with such a large section circle that the strip in use is flat; its inner face is held,
+    and nothing moves along the axle. Elements are small at the road and grow from there around and
+    inwards.
     """
 
     outer: float = 0.3
