@@ -247,7 +247,8 @@ def choice(
 
     def read(value: Any) -> str:
         if not isinstance(value, str) or value not in choices:
-            advice = f"; dropped: {dropped[value]}" if value in dropped else ""
+            known = isinstance(value, str) and value in dropped
+            advice = f"; dropped: {dropped[value]}" if known else ""
             raise ValueError(f"must be one of {words}, not {described(value)}{advice}")
         return value
 

@@ -26,6 +26,9 @@ def _modules() -> dict[str, Path]:
 MODULES = _modules()
 
 
+FOLDERS = {name.rpartition(".")[0] for name in MODULES}
+
+
 def _for_types_only(node: ast.AST) -> bool:
     return isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
 
@@ -127,6 +130,23 @@ def test_functions_stay_short() -> None:
         if isinstance(node, ast.FunctionDef) and node.end_lineno
     ]
     assert sum(length <= FUNCTION for length in lengths) >= 0.95 * len(lengths)
+
+
+def test_modules_that_texts_name_exist() -> None:
+    """Docstrings and pages refer to a module by its dotted name, or to its file."""
+    places = sorted({".".join(name.split(".")[1:3]) for name in MODULES if name.count(".") > 2})
+    names = re.compile(rf"(?<![\w./])(?:{'|'.join(map(re.escape, places))})\.([a-z]\w*)")
+    files = re.compile(rf"(?<![\w./])(?:{'|'.join(ROOMS)}|tests)/[\w/]+\.py\b")
+    wrong = []
+    for file in [*ROOT.glob("docs/**/*.md"), ROOT / "README.md", *MODULES.values()]:
+        text = file.read_text()
+        known = (f"tireroad.{found[0]}" for found in names.finditer(text))
+        wrong += [
+            f"{file.name}: {one}" for one in known if one not in MODULES and one not in FOLDERS
+        ]
+        paths = (found[0] for found in files.finditer(text))
+        wrong += [f"{file.name}: {one}" for one in paths if not (ROOT / one).exists()]
+    assert wrong == []
 
 
 def _journeys() -> list[tuple[str, list[str]]]:

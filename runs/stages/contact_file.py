@@ -219,7 +219,7 @@ class ContactHistory:
     """The contact over n steps of `step` s ending at `time` (n,) s: `total_force` (n, 3) N;
     `axle_force` (n, 3) N if stored; `driven` (n, k, 3) m: displacement at driven points, if any;
     `wheel`: hub moments, and motions of a moving wheel, by the names of
-    runs.stages.coupled; `free_slip`: slip added so that the wheel rolls freely."""
+    runs.stages.corner; `free_slip`: slip added so that the wheel rolls freely."""
 
     step: float
     scheme: str

@@ -199,7 +199,7 @@ class Spectra:
     its low bands, empty if it has them; `level_error` and `contact_level_error` (b, 3) dB:
     estimated errors of the third octaves of axle and contact force, NaN where unknown, None if not
     requested; `wheel`: hub moments and motions of a moving wheel, (f, 3) or (f, 1), by the names of
-    runs.stages.coupled.
+    runs.stages.corner.
     """
 
     frequency: np.ndarray = dataset("Hz")

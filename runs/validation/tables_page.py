@@ -26,7 +26,7 @@ SIZES = (4.0, 9.0)  # points: sizes of the marks for the smallest and the larges
 
 
 def drawn(table: Any) -> str | None:
-    """The figure that `plot` of a runs.measure.tabulate.Table asks for, as a data URI, or None.
+    """The figure that `plot` of a runs.validation.tables.Table asks for, as a data URI, or None.
 
     kind "lines" (default): `y` columns over column `x`, one curve per value of column `by`, axes in
     `log` logarithmic; "front": `points` (rows like the table's), coloured by column `by`, with
@@ -265,7 +265,7 @@ summary{cursor:pointer;color:#2f6db5;font-size:.92rem}
 
 
 def page(results: dict[str, list], about: dict[str, str]) -> str:
-    """HTML of tables (runs.measure.tabulate.Table) by module name, with their ABOUT lines."""
+    """HTML of tables (runs.validation.tables.Table) by module name, with their ABOUT lines."""
     import jinja2
 
     counted = {"tables": 0, "figures": 0}
