@@ -181,7 +181,7 @@ class Given:
 
     def first(self, steps: int) -> Given:
         """The same for fewer steps."""
-        return self._keeping("settled", steps=steps)
+        return self._keeping("equilibrated", steps=steps)
 
     def of(self, job: Job) -> Given:
         """The same with another job; `base` stays that of the run."""
