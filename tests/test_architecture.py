@@ -24,6 +24,7 @@ def _modules() -> dict[str, Path]:
 
 
 MODULES = _modules()
+TREES = {name: ast.parse(file.read_text()) for name, file in MODULES.items()}
 
 
 FOLDERS = {name.rpartition(".")[0] for name in MODULES}
@@ -48,9 +49,8 @@ def _imports(nodes: list[ast.stmt], types: bool = True) -> set[str]:
     return found & MODULES.keys()
 
 
-def _every_import(file: Path) -> set[str]:
+def _every_import(tree: ast.Module) -> set[str]:
     """Late ones as well."""
-    tree = ast.parse(file.read_text())
     found: set[str] = set()
     for node in ast.walk(tree):
         if isinstance(node, ast.Import | ast.ImportFrom):
@@ -58,7 +58,7 @@ def _every_import(file: Path) -> set[str]:
     return found
 
 
-EVERY_IMPORT = {name: _every_import(file) for name, file in MODULES.items()}
+EVERY_IMPORT = {name: _every_import(tree) for name, tree in TREES.items()}
 
 
 @pytest.mark.parametrize("room", ROOMS)
@@ -72,8 +72,8 @@ def test_imports_run_one_way(room: str) -> None:
 
 def _circle(types: bool, rooms: tuple[str, ...]) -> str:
     graph = {
-        name: _imports(ast.parse(file.read_text()).body, types)
-        for name, file in MODULES.items()
+        name: _imports(tree.body, types)
+        for name, tree in TREES.items()
         if name.split(".")[1] in rooms
     }
     try:
@@ -125,8 +125,8 @@ def test_no_module_is_a_page_of_its_only_reader() -> None:
 def test_functions_stay_short() -> None:
     lengths = [
         node.end_lineno - node.body[0].lineno + 1
-        for file in MODULES.values()
-        for node in ast.walk(ast.parse(file.read_text()))
+        for tree in TREES.values()
+        for node in ast.walk(tree)
         if isinstance(node, ast.FunctionDef) and node.end_lineno
     ]
     assert sum(length <= FUNCTION for length in lengths) >= 0.95 * len(lengths)

@@ -64,6 +64,7 @@ def test_air() -> None:
     assert elements_for(1000.0, AIR) == pytest.approx(0.0429, abs=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("camber", [0.0, 0.05])
 @pytest.mark.parametrize("size", [0.06, 0.04])
 def test_the_body_is_closed_and_has_the_areas_of_the_face(size: float, camber: float) -> None:
@@ -130,6 +131,7 @@ def test_an_open_wheel_is_a_barrel_between_the_beads() -> None:
     assert np.abs(moved.sum()) < 1e-9, "a barrel that moves as a whole displaces nothing"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("leak", "wheel"), [(0.0, "disc"), (0.002, "disc"), (0.0, "open")])
 def test_sources_inside(leak: float, wheel: str) -> None:
     """Their fields are known: within 0.1 dB to 400 Hz and 0.4 dB at 1 kHz; larger elements do worse."""

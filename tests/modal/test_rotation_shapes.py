@@ -140,6 +140,7 @@ def test_speeds_of_a_family_share_them() -> None:
     assert up_to(0.0) == 0.0
 
 
+@pytest.mark.slow
 def test_a_wheel_that_stands_has_none() -> None:
     made = motions()
     basis = standing_modes(made, count=8, turning=Turning())

@@ -102,6 +102,7 @@ def csr(matrix) -> sparse.csr_matrix:
     return sparse.csr_matrix(matrix.getValuesCSR()[::-1], shape=matrix.getSize())
 
 
+@pytest.mark.slow
 def test_modes_against_the_nonlinear_eigenproblem():
     """K*(omega) phi = lambda M phi at omega itself, iterated mode by mode: two compounds with strong power laws,
     cords and pressure. Frequencies within 0.2 %, loss factors within 5 %, and the shift is far larger."""

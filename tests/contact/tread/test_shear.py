@@ -216,6 +216,7 @@ def test_layer_of_both_directions_is_positive_definite() -> None:
     assert np.linalg.eigvalsh(whole)[0] > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("beside", [0.0, 2e-6])
 @pytest.mark.parametrize("shape", [(1, 9), (3, 4), (14, 11)])
 def test_a_preconditioner_spares_most_products(shape, beside) -> None:

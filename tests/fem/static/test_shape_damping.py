@@ -71,6 +71,7 @@ def test_the_state_is_that_of_the_complete_tangent(make_body, monkeypatch, road)
     assert stiffness == pytest.approx(complete, rel=1e-7)
 
 
+@pytest.mark.slow
 def test_what_a_step_with_friction_gains_is_that_of_the_complete_tangent(
     make_body, monkeypatch
 ) -> None:

@@ -46,6 +46,7 @@ def test_a_refused_scene_writes_nothing_over(
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
 
 
+@pytest.mark.slow
 def test_a_road_narrower_than_the_footprint_is_refused_before_the_modes(tmp_path: Path) -> None:
     x, y = np.linspace(-1.0, 3.0, 81), np.linspace(-0.01, 0.01, 3)
     np.savez(tmp_path / "road.npz", x=x, y=y, z=np.zeros((len(x), len(y))))

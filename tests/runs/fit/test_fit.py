@@ -59,6 +59,7 @@ def figures_of(factors: dict[str, float]) -> FitFigures:
     return FitFigures(size="205/60 R15", inflation=2.2e5, load=4000.0, values=values)
 
 
+@pytest.mark.slow
 def test_a_changed_tire_is_found_again(coarse: None) -> None:
     """Five figures of a tire 10 % lighter and softer are met within 1 %, of the size alone off by 7 to 20 %."""
     figures = figures_of(FACTORS)
@@ -77,6 +78,7 @@ def test_a_changed_tire_is_found_again(coarse: None) -> None:
     assert "all figures are reached" in report(found)
 
 
+@pytest.mark.slow
 def test_damping_ratios(coarse: None) -> None:
     """Linear in the loss factors: those of the tread half, the others doubled, come back."""
     figures = figures_of({"tread loss": 0.5, "other loss": 2.0})
@@ -87,6 +89,7 @@ def test_damping_ratios(coarse: None) -> None:
         assert found.reached[name] == pytest.approx(value, rel=0.05)
 
 
+@pytest.mark.slow
 def test_what_cannot_be_reached_is_said(coarse: None) -> None:
     values = {"mass": 9.3, "windup_frequency": 200.0}
     found = fit(FitFigures(size="205/60 R15", inflation=2.2e5, load=4000.0, values=values))
@@ -200,6 +203,7 @@ def test_tir_files_that_are_refused(tmp_path: Path, old: str, new: str, words: s
         read(tmp_path / "f.tir")
 
 
+@pytest.mark.slow
 def test_the_command(tmp_path: Path, coarse: None, capsys: pytest.CaptureFixture) -> None:
     (tmp_path / "mine.toml").write_text('size = "205/60 R15"\ninflation = 2.2e5\nmass = 8.5\n')
     assert main(["fit", str(tmp_path / "mine.toml"), "--out", str(tmp_path / "out")]) == 0

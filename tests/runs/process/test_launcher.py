@@ -56,6 +56,7 @@ def test_start_up_is_quick(launcher) -> None:
     assert min(spent) < 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("where", [["-n", "2", "x.toml"], ["x.toml", "-n2"], ["x.toml", "-n", "2"]])
 def test_processes_are_taken_out(launcher, where: list[str]) -> None:
     done = launcher("run", *where)

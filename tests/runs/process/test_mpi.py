@@ -62,6 +62,7 @@ def test_endings(launch, case: str, status: int, message: str, processes: int) -
     assert done.stderr.count("Traceback") == (1 if status == 1 else 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("case", "status", "message"),
     [("most", 3, "error: no luck\n"), ("bug", 1, "KeyError: 'odd'")],

@@ -225,6 +225,7 @@ def test_measured_road_scene_takes_a_road(root: Path, roads: Path) -> None:
     assert scene.road.file == str(road.resolve()) and scene.contact is not None
 
 
+@pytest.mark.slow
 def test_a_road_that_the_run_does_not_meet_may_be_missing_or_short(
     tmp_path: Path, launch, root: Path
 ) -> None:
