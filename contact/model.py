@@ -6,6 +6,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from tireroad.contact.choices import DENSE_POINTS, MOST_TOUCHING
 from tireroad.contact.patch import Patch
 from tireroad.contact.solver.active_set import make_solver
 from tireroad.contact.solver.conditions import ContactSolver
@@ -18,13 +19,6 @@ from tireroad.fem.errors import InputError, UnsuitedSettings
 
 Array = NDArray[np.float64]
 
-# Up to here the matrix is stored (8 MB); beyond, the tread is a convolution.
-DENSE_POINTS = 1000
-# Points touching at rest above which conjugate gradients take over. The active set costs the cube
-# of the points that come and go: with 580 touching and 180 away from the usual set a fifth of
-# conjugate gradients, with 770 and 550 (a road as rough as the points are apart, a whole point per
-# step) twice as much.
-MOST_TOUCHING = 1000
 MOST_DENSE = 6000  # 0.3 GB a matrix
 # Height over half the width of a patch above which it extends up the flanks of a torus.
 STEEPEST = 0.25

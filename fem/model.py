@@ -12,8 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from tireroad.fem.errors import InputError
-from tireroad.fem.matrices.operators import Operators, Rotation, Support
-from tireroad.fem.matrices.rim_motion import RimMotion, rim_motion
+from tireroad.fem.matrices.operators import Operators, RimMotion, Rotation, Support, rim_motion
 from tireroad.fem.sections.mesh2d import Ring
 from tireroad.fem.static.state import StaticState
 from tireroad.fem.tire.body import Body

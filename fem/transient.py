@@ -33,8 +33,7 @@ from tireroad.fem.matrices.compliance import (
     rotating_stiffness,
     solve_columns,
 )
-from tireroad.fem.matrices.operators import Operators, Rotation
-from tireroad.fem.matrices.rim_motion import RimMotion, carried_pencil
+from tireroad.fem.matrices.operators import Operators, RimMotion, Rotation, carried_pencil
 from tireroad.fem.static.virtual_work import (
     AT_REST,
     Rolling,

@@ -36,8 +36,7 @@ from tireroad.fem.matrices.compliance import (
     rotating_stiffness,
     statics,
 )
-from tireroad.fem.matrices.operators import Compound, Operators, Rotation
-from tireroad.fem.matrices.rim_motion import RimMotion
+from tireroad.fem.matrices.operators import Compound, Operators, RimMotion, Rotation
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.wheel import Axle, Turning
 from tireroad.greens.basis import (

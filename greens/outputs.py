@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from tireroad.fem.collective import summed
-from tireroad.fem.matrices.rim_motion import RimMotion
+from tireroad.fem.matrices.operators import RimMotion
 from tireroad.fem.wheel import Axle, Turning
 from tireroad.greens.basis import Basis, Probes
 from tireroad.greens.response import Response, couple

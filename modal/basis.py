@@ -13,8 +13,7 @@ from scipy import sparse
 from tireroad.fem.cavity import Column, Duct
 from tireroad.fem.collective import summed
 from tireroad.fem.errors import InputError
-from tireroad.fem.matrices.operators import Compound, Operators, Rotation
-from tireroad.fem.matrices.rim_motion import RimMotion
+from tireroad.fem.matrices.operators import Compound, Operators, RimMotion, Rotation
 from tireroad.fem.tire.material import CONSTANT, own_moduli
 from tireroad.fem.wheel import Axle
 from tireroad.modal.corner import Corner, meeting

@@ -25,7 +25,7 @@ from scipy import linalg, sparse
 
 from tireroad.fem.collective import summed
 from tireroad.fem.errors import InputError
-from tireroad.fem.matrices.rim_motion import FELT, RimMotion, carried_pencil
+from tireroad.fem.matrices.operators import FELT, RimMotion, carried_pencil
 from tireroad.fem.wheel import DIRECTIONS, Axle
 
 BODY = 6  # index of the body's height, after the six motions of the rim

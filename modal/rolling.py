@@ -16,8 +16,7 @@ from scipy import optimize
 
 from tireroad.fem.collective import summed
 from tireroad.fem.errors import ConvergenceError, InputError
-from tireroad.fem.matrices.operators import Operators
-from tireroad.fem.matrices.rim_motion import RimMotion
+from tireroad.fem.matrices.operators import Operators, RimMotion
 from tireroad.fem.parallel import on_root
 from tireroad.fem.wheel import Axle, Turning
 from tireroad.modal.basis import ModalBasis, Projection

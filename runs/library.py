@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from tireroad.contact import loop as contact_loop
+from tireroad.contact.choices import LEAST_STEPS, TURN
 from tireroad.contact.loop import Instant, Steps, check_times, equal_steps
 from tireroad.contact.model import ContactSpec, NormalContact
 from tireroad.contact.patch import Patch
@@ -360,10 +361,6 @@ def roll(standing: Standing, turning: Turning) -> RollingTire:
     return RollingTire(standing=standing, states=rolling_modes(standing.basis, turning, comm))
 
 
-_TURN = 0.3  # rad: default turn of the fastest mode per step; its phase error is below 1 %
-_LEAST_STEPS = 200
-
-
 @dataclass(frozen=True, kw_only=True)
 class History:
     """Histories of a run over n instants and c contact points.
@@ -461,7 +458,7 @@ def drive(
     spec = NormalContact(law=law)
     setup, _ = setup.equilibrated(response, static.force, spec)
     fastest = np.abs(response.eigenvalue).max(initial=1.0 / duration)
-    largest = min(duration / _LEAST_STEPS, _TURN / fastest) if step is None else step
+    largest = min(duration / LEAST_STEPS, TURN / fastest) if step is None else step
     chosen = equal_steps(duration, largest)
     instants = _instants(spec, setup, response, chosen, motions.body.comm)
     highest = tire.states.highest / (2 * np.pi)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tireroad.contact.choices import USABLE
 from tireroad.contact.patch import Patch
-from tireroad.contact.results.band import USABLE
 
 _PREFERRED = np.array((1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0))
 FEWEST = 3  # lines across a band; with fewer it has no level

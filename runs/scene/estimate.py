@@ -4,7 +4,7 @@ import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from tireroad.contact.results.band import USABLE
+from tireroad.contact.choices import DENSE_POINTS, MOST_TOUCHING, USABLE
 from tireroad.fem.errors import InputError
 from tireroad.runs.process.surroundings import available_memory
 from tireroad.runs.scene.plan import meets_road, skipped
@@ -289,14 +289,10 @@ loads, solutions, copies."""
 SHAPES = 3
 """Full-length columns per force on the patch held at peak, with attachment modes; other residuals
 hold only values at the patch."""
-DENSE = 1000
-"""Number of contact points up to which a tread's matrix is stored (contact.model.DENSE_POINTS)."""
 BLOCK = 512
-"""Steps of contact results held between two writes (stages.stored.contact_file)."""
+"""Steps of contact results held between two writes (runs.stages.contact_file)."""
 PIECE = 64
 """Steps of which the work is computed at a time (contact.results.energy)."""
-MOST = 1000
-"""Touching points up to which "auto" takes the active set (contact.model.MOST_TOUCHING)."""
 PIVOT, PIVOTED, USUAL = 5, 2, 3
 """Copies of the matrix of the usual set during pivoting and afterwards (contact.solver.active_set), and its
 size over the number of points that touch at rest: 3,094 of 958 (2026-11-25)."""
@@ -447,11 +443,11 @@ def _in_the_loop(scene: Scene, size: Sizes, directions: int) -> float:
 
 def _matrices_of_points(scene: Scene, size: Sizes) -> int:
     """Numbers in the matrices of the contact points held at once."""
-    if scene.contact.on_nodes or size.points <= DENSE:
+    if scene.contact.on_nodes or size.points <= DENSE_POINTS:
         return 3 * size.points**2
     by_product = scene.contact.solver == "projected-cg"
     if scene.contact.solver == "auto":
-        by_product = size.touching > 1.5 * MOST  # the estimate may be half too high
+        by_product = size.touching > 1.5 * MOST_TOUCHING  # the estimate may be half too high
     usual = min(size.points, USUAL * size.touching)
     return 0 if by_product else PIVOT * usual**2
 

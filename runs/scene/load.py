@@ -18,7 +18,7 @@ from dataclasses import Field, fields, replace
 from pathlib import Path
 from typing import Any
 
-from tireroad.contact.results.band import USABLE
+from tireroad.contact.choices import USABLE
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Key, ParameterError, described, second_digit
 from tireroad.runs.scene import rules

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tireroad.contact.choices import LEAST_STEPS, TURN
 from tireroad.contact.patch import ON_A_NODE
 from tireroad.contact.roads.kinds.shapes import Edges
 from tireroad.contact.roads.under_tire import begun_at
@@ -126,8 +127,6 @@ def _layers_coupled(through: int, order: int) -> float:
     return (inside + 2 * (order + 1) + (through - 1) * (2 * order + 1)) / (through * order + 1)
 
 
-TURN = 0.3  # radians of the fastest mode per automatic step (stages.build.rolling.stepping)
-LEAST_STEPS = 200  # of an automatic step (ibid.)
 # Rotation shapes of a tire with cords: 28 of 60 modes, 55 of 120, 133 of 268, 455 of 1813 with the default
 # tolerance, 240 of 1813 with five times that; and per mode of one without.
 CORDED, PLAIN = 1.2, 0.1

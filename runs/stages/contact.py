@@ -11,10 +11,10 @@ import numpy as np
 from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
+from tireroad.contact.choices import USABLE
 from tireroad.contact.loop import DrivenTire, Loop, roll
 from tireroad.contact.model import solver_name
 from tireroad.contact.patch import Patch
-from tireroad.contact.results.band import USABLE
 from tireroad.contact.results.chatter import LIMIT, Chatter, Chosen, warning
 from tireroad.contact.results.energy import (
     Circulation,

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from tireroad.contact.choices import LEAST_STEPS, TURN
 from tireroad.contact.grid_patch import on_points
 from tireroad.contact.loop import DrivenTire, Loop, equal_steps, roll, steps_of
 from tireroad.contact.model import step_solver, tread_memory, tread_shear
@@ -80,9 +81,6 @@ def first_step(setup: ContactSetup, road: RoadTable, time: np.ndarray) -> int:
     return start if start < len(time) // 2 else 0
 
 
-# Radians that a kept mode may turn per automatic step: at 0.3 its phase error is below 1 %.
-_TURN = 0.3
-_LEAST_STEPS = 200
 _PER_PERIOD = 16  # steps per shortest period of the excitation
 
 
@@ -120,9 +118,9 @@ def planned(job: Job, record: Record, response: Response, shortest: float) -> Pl
     wanted = job.scene.time
     fastest = np.abs(response.every).max(initial=0.0)
     if isinstance(wanted.step, str):
-        limits = [wanted.duration / _LEAST_STEPS, shortest / _PER_PERIOD]
+        limits = [wanted.duration / LEAST_STEPS, shortest / _PER_PERIOD]
         if fastest > 0:
-            limits.append(_TURN / fastest)
+            limits.append(TURN / fastest)
         steps = equal_steps(wanted.duration, min(limits))
     else:
         steps = steps_of(wanted.duration, wanted.step)

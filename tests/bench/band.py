@@ -10,7 +10,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from tireroad.contact.results.band import USABLE
+from tireroad.contact.choices import USABLE
 from tireroad.contact.results.spectra import nominal, third_octaves
 from tireroad.runs.process import console
 from tireroad.runs.validation.tables import Table

@@ -9,8 +9,7 @@ from scipy import sparse
 
 from tireroad.fem.cavity import make_column
 from tireroad.fem.matrices import probe
-from tireroad.fem.matrices.operators import Operators, Support
-from tireroad.fem.matrices.rim_motion import rim_motion
+from tireroad.fem.matrices.operators import Operators, Support, rim_motion
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.virtual_work import Rolling

@@ -11,8 +11,7 @@ from scipy import sparse
 from tireroad.fem.collective import summed
 from tireroad.fem.matrices import probe
 from tireroad.fem.matrices.compliance import multiply, on_own_rows, relieved, rigid_space
-from tireroad.fem.matrices.operators import Operators, Support
-from tireroad.fem.matrices.rim_motion import RimMotion, rim_motion
+from tireroad.fem.matrices.operators import Operators, RimMotion, Support, rim_motion
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.virtual_work import Rolling

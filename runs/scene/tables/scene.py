@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tireroad.contact.results.band import USABLE
+from tireroad.contact.choices import USABLE
 from tireroad.contact.roads.road import ROADS, RoadKind
 from tireroad.contact.roads.under_tire import Motion, Placement
 from tireroad.fem.errors import InputError

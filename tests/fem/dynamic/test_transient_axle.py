@@ -7,7 +7,7 @@ from scipy import sparse
 from turning_torus import DAMPING, inflated, pulse
 
 from tireroad.fem.matrices import probe
-from tireroad.fem.matrices.rim_motion import rim_motion
+from tireroad.fem.matrices.operators import rim_motion
 from tireroad.fem.static.virtual_work import AT_REST
 from tireroad.fem.transient import FullTire
 from tireroad.fem.wheel import Axle

@@ -11,8 +11,7 @@ from scipy import sparse
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices import probe
 from tireroad.fem.matrices.compliance import on_own_rows
-from tireroad.fem.matrices.operators import Operators, Support, rigid_motions
-from tireroad.fem.matrices.rim_motion import rim_motion
+from tireroad.fem.matrices.operators import Operators, Support, rigid_motions, rim_motion
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.static.virtual_work import Rolling

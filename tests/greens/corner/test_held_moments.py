@@ -7,8 +7,7 @@ from scipy import sparse
 from test_corner import COMM, DAMPING, FREQUENCY, SPOTS, body, loads, places, wheel
 
 from tireroad.fem import compat
-from tireroad.fem.matrices.operators import FIXED, Operators
-from tireroad.fem.matrices.rim_motion import rim_motion
+from tireroad.fem.matrices.operators import FIXED, Operators, rim_motion
 from tireroad.fem.static.virtual_work import (
     AT_REST,
     Rolling,

@@ -1,0 +1,17 @@
+"""Choices of the method that its estimates of memory and time need, too: without numpy, for the reading of scenes."""
+
+# Of the highest mode: beyond, the truncated modes respond dynamically, not by their static residual
+# alone. Against twice the modes, third octaves with their upper edge below it are within 0.5 dB in
+# 80 of 84 cases and 1 dB in all; up to 0.9 within 1.6 dB (docs/verification/band.md).
+USABLE = 0.8
+
+TURN = 0.3  # rad of the fastest state per automatic step: its phase error is below 1 %
+LEAST_STEPS = 200  # of an automatic step
+
+# Up to here the matrix is stored (8 MB); beyond, the tread is a convolution.
+DENSE_POINTS = 1000
+# Points touching at rest above which conjugate gradients take over. The active set costs the cube
+# of the points that come and go: with 580 touching and 180 away from the usual set a fifth of
+# conjugate gradients, with 770 and 550 (a road as rough as the points are apart, a whole point per
+# step) twice as much.
+MOST_TOUCHING = 1000
