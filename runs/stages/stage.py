@@ -62,35 +62,6 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 MUMPS = "MUMPS through PETSc, ICNTL(14) = 100 %"
 
-MOST = 2  # per kind: those of a run and of its coarser companion
-_kept: dict[str, OrderedDict[Hashable, Any]] | None = None
-
-
-def keep_matrices() -> None:
-    """Start keeping: this process computes the members of a family one after the other."""
-    global _kept
-    _kept = {}
-
-
-def memoize(kind: str, key: Hashable, make: Callable[[], T]) -> T:
-    """The value of `make`, or that of an earlier run with the same key. Collective if `make` is."""
-    if _kept is None:
-        return make()
-    known = _kept.setdefault(kind, OrderedDict())
-    if key not in known:
-        while len(known) >= MOST:  # freed before the new ones need the memory
-            known.popitem(last=False)
-        known[key] = make()
-    known.move_to_end(key)
-    return known[key]
-
-
-def forget_matrices() -> None:
-    """Drop everything, before a new static state: matrices belong to one state."""
-    if _kept is not None:
-        _kept.clear()
-
-
 Figures = dict[str, tuple[Any, str]]
 
 
@@ -384,6 +355,35 @@ class Computed(Stage[P]):
 
     def end(self, key: str, product: P) -> None:
         """What has to happen once the product is written. Collective."""
+
+
+MOST = 2  # per kind: those of a run and of its coarser companion
+_kept: dict[str, OrderedDict[Hashable, Any]] | None = None
+
+
+def keep_matrices() -> None:
+    """Start keeping: this process computes the members of a family one after the other."""
+    global _kept
+    _kept = {}
+
+
+def memoize(kind: str, key: Hashable, make: Callable[[], T]) -> T:
+    """The value of `make`, or that of an earlier run with the same key. Collective if `make` is."""
+    if _kept is None:
+        return make()
+    known = _kept.setdefault(kind, OrderedDict())
+    if key not in known:
+        while len(known) >= MOST:  # freed before the new ones need the memory
+            known.popitem(last=False)
+        known[key] = make()
+    known.move_to_end(key)
+    return known[key]
+
+
+def forget_matrices() -> None:
+    """Drop everything, before a new static state: matrices belong to one state."""
+    if _kept is not None:
+        _kept.clear()
 
 
 WORTH = 60.0  # results are written once computing them has taken this many times the writing
