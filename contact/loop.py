@@ -258,6 +258,20 @@ class Loop:
     memory: TreadMemory | None = None
     normal: RoadNormal | None = None
 
+    def roll(
+        self,
+        patch: Patch,
+        drive: Drive,
+        step: float,
+        steps: int,
+        *,
+        done: int = 0,
+        motion: bool = True,
+    ) -> Iterator[Instant]:
+        """The instants of `roll` with these parts."""
+        parts = self.friction, done, self.memory, motion, self.normal
+        return roll(self.tire, self.solver, patch, drive, step, steps, *parts)
+
     def snapshot(self) -> dict[str, np.ndarray]:
         """Arrays by name, between two steps. Collective when the tire is."""
         friction = self.friction.state() if self.friction else {}

@@ -26,7 +26,6 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import sparse
 
-from tireroad.contact import loop as contact_loop
 from tireroad.contact.choices import LEAST_STEPS, TURN
 from tireroad.contact.loop import Instant, Steps, check_times, equal_steps
 from tireroad.contact.model import ContactSpec, NormalContact
@@ -519,10 +518,7 @@ def _instants(
     scheme = choose(oscillation(spec, setup.patch, kept, chosen.size)).scheme
     recursion = Recursion(response=kept, step=chosen.size, scheme=scheme, comm=comm)
     loop = make_loop(spec, setup, recursion, chosen.size)
-    given = setup.patch, setup.drive, chosen.size, chosen.count
-    return list(
-        contact_loop.roll(loop.tire, loop.solver, *given, memory=loop.memory, normal=loop.normal)
-    )
+    return list(loop.roll(setup.patch, setup.drive, chosen.size, chosen.count))
 
 
 def _history(patch: Patch, instants: list[Instant], limit: Limit, run_in: float) -> History:

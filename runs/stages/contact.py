@@ -12,7 +12,7 @@ from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
 from tireroad.contact.choices import USABLE
-from tireroad.contact.loop import DrivenTire, Loop, roll
+from tireroad.contact.loop import DrivenTire, Loop
 from tireroad.contact.model import solver_name
 from tireroad.contact.patch import Patch
 from tireroad.contact.results.chatter import LIMIT, Chatter, Chosen, warning
@@ -597,8 +597,7 @@ class ContactStage(Stage[ContactHistory]):
     def _steps(self, setup, loop: Loop, driven, file: ContactFile, totals, losses, chosen) -> None:
         """Take the remaining steps; stops between two of them when requested. Collective."""
         done, steps = totals.figures.steps, chosen.steps
-        given = setup.patch, setup.drive, chosen.step, steps, loop.friction, done, loop.memory
-        instants = roll(loop.tire, loop.solver, *given, normal=loop.normal)
+        instants = loop.roll(setup.patch, setup.drive, chosen.step, steps, done=done)
         watch = Watch(self.job.comm, self.job.scene.time.checkpoint)
         with (
             Deferred() as deferred,

@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from tireroad.contact.choices import LEAST_STEPS, TURN
 from tireroad.contact.grid_patch import on_points
-from tireroad.contact.loop import DrivenTire, Loop, equal_steps, roll, steps_of
+from tireroad.contact.loop import DrivenTire, Loop, equal_steps, steps_of
 from tireroad.contact.model import step_solver, tread_memory, tread_shear
 from tireroad.contact.patch import Patch
 from tireroad.contact.results.chatter import Chosen, choose, oscillation
@@ -274,11 +274,9 @@ def forces(
     driven = driven_tire(job, Integration(tire, step, steps, scheme), setup.patch)
     loop = make_loop(spec, setup, driven or tire, step)
     (total, axle), every = np.zeros((2, steps, 3)), np.ones(len(setup.patch.points))
-    given = setup.patch, setup.drive, step, steps
+    instants = loop.roll(setup.patch, setup.drive, step, steps, motion=False)
     with threadpool_limits(1, "blas"):
-        for k, instant in enumerate(
-            roll(loop.tire, loop.solver, *given, loop.friction, 0, loop.memory, False, loop.normal)
-        ):
+        for k, instant in enumerate(instants):
             total[k, :2] = every @ instant.horizontal
             total[k, 2], axle[k] = instant.force.sum(), instant.axle_force
             if instant.force[setup.patch.edge].any():
