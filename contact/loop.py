@@ -192,6 +192,11 @@ class Instant(NamedTuple):
     moved: np.ndarray
 
 
+def no_motion(time: float) -> float:
+    """A road that does not move, m."""
+    return 0.0
+
+
 @dataclass(frozen=True)
 class Drive:
     """The road's approach: `height(x, y)` m over the static plane, pointwise for any shape.

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from tireroad.contact.grid_patch import DeformedTread, equilibrate, make_grid_patch, spread_pull
-from tireroad.contact.loop import Drive
+from tireroad.contact.loop import Drive, no_motion
 from tireroad.contact.model import ContactSpec, static_solver
 from tireroad.contact.patch import LEAST_REACH, Patch, make_patch
 from tireroad.contact.roads.cell_mean import CellMean
@@ -51,12 +51,12 @@ class OuterFace(Protocol):
 @dataclass(frozen=True, kw_only=True)
 class Rolled:
     """How the tire rolls: `speed` m/s over the road, `duration` s of the run, and the road's
-    vertical `motion` m over time s, of at most `lift` m.
+    vertical `motion` m over time s, of at most `lift` m, by default none.
     """
 
     speed: float
     duration: float
-    motion: Callable[[float], float]
+    motion: Callable[[float], float] = no_motion
     lift: float = 0.0
 
     @property
@@ -159,7 +159,7 @@ class ContactSetup:
 
     def smooth(self, duration: float) -> ContactSetup:
         """The same on a flat road at rest, for `duration` s, without a pattern."""
-        still = replace(self.rolled, duration=duration, motion=lambda time: 0.0, lift=0.0)
+        still = replace(self.rolled, duration=duration, motion=no_motion, lift=0.0)
         road = _under(RoadUnderTire(Flat()), self.patch, still)
         return replace(self, road=road, rolled=still, pattern=None)
 

@@ -446,9 +446,7 @@ def drive(
     _check_motions(motions)
     if pitches is not None:
         _check_pitches(pitches, static.footprint())
-    rolled = Rolled(
-        speed=turning.speed * static.rolling_radius(), duration=duration, motion=lambda t: 0.0
-    )
+    rolled = Rolled(speed=turning.speed * static.rolling_radius(), duration=duration)
     setup = contact_setup(static, motions.lattice, road, rolled, spacing=pitches)
     along, across, loads = (
         probe.nodes(setup.patch.index, len(static.points), part) for part in range(3)

@@ -487,7 +487,7 @@ def rolled(pattern: Pattern | None, steps: int) -> tuple[np.ndarray, Patch]:
     patch = oval()
     bed = winkler_compliance(patch.area, BED)
     patch = replace(patch, gap=np.where(patch.force > 0, 0.0, patch.gap))
-    way = Rolled(speed=SPEED, duration=steps * STEP, motion=lambda t: 0.0)
+    way = Rolled(speed=SPEED, duration=steps * STEP)
     _, x1, y0, y1 = patch.extent
     road = RoadUnderTire(Flat()).prepare(x1, x1 + way.travel, y0, y1)
     setup = ContactSetup(patch=patch, reach=1.0, road=road, rolled=way, pattern=pattern)

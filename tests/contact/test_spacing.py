@@ -87,7 +87,7 @@ def test_points_stay_nodes_where_a_grid_cannot_be_or_means_something_else(
 def wheel():
     """A setup on nodes of 5 mm, and its tire's response: 1 um/N of each node, 0.1 of all."""
     patch = nodes(0.005)
-    rolled = Rolled(speed=10.0, duration=0.1, motion=lambda time: 0.0)
+    rolled = Rolled(speed=10.0, duration=0.1)
     road = RoadUnderTire(Flat()).prepare(-1.0, 2.0, -1.0, 1.0)
     setup = ContactSetup(patch=patch, reach=0.02, road=road, rolled=rolled)
     p = len(patch.index)
@@ -127,7 +127,7 @@ def test_a_standing_wheel_meets_no_relief(wheel) -> None:
     road = make_road(kind="sine", amplitude=1e-3, wavelength=0.1)
     found = []
     for speed in (0.0, 10.0):
-        rolled = Rolled(speed=speed, duration=0.1, motion=lambda time: 0.0)
+        rolled = Rolled(speed=speed, duration=0.1)
         _, x1, y0, y1 = wheel[0].patch.extent
         strip = road.prepare(x1, x1 + rolled.travel, y0, y1)
         found.append(replace(wheel[0], rolled=rolled, road=strip).relief)
