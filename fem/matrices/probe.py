@@ -6,7 +6,6 @@ import numpy as np
 from scipy import sparse
 
 from tireroad.fem.errors import InputError
-from tireroad.fem.sections.mesh2d import line
 from tireroad.fem.tire.mesh import NodeGrid
 
 _POINTS = 6  # Gauss points per direction in each element under a distributed load
@@ -100,7 +99,7 @@ def line_shape(
 ) -> tuple[np.ndarray, np.ndarray]:
     """First node (k,) of each point's element on a line; shape functions (k, order + 1) there."""
     element, local = _local(corners, points)
-    return (len(edge) - 1) * element, line(edge, local)
+    return (len(edge) - 1) * element, lagrange(edge, local)
 
 
 def _local(corners: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

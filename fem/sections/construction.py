@@ -22,8 +22,8 @@ from tireroad.fem.sections.mesh2d import (
     RegionPatch,
     Ring,
     SectionMesh,
-    corners,
-    product,
+    element_corners,
+    product_mesh,
     revolved,
 )
 
@@ -176,8 +176,12 @@ class Construction:
         fixed = [end for end in ends if end < length * (1 - 1e-9)]
         both = [*fixed, *(-end for end in fixed)]
         wall = np.linspace(0.0, 1.0, levels + 1)
-        arc = corners(elements, lambda s: 1 / self._size(s, elements), -length, length, both)
-        mesh = product(order=order, wall=wall, arc=arc, place=place, patches=patches, plies=plies)
+        arc = element_corners(
+            elements, lambda s: 1 / self._size(s, elements), -length, length, both
+        )
+        mesh = product_mesh(
+            order=order, wall=wall, arc=arc, place=place, patches=patches, plies=plies
+        )
         return _named(mesh, arc, self.tread, self._held)
 
     @property
@@ -263,7 +267,7 @@ class Construction:
         length = self._held
         thickness = self._surfaces()(np.array([length]))[0, -1]
         distance = np.maximum(length - np.abs(s), 0.0)
-        size = mesh2d.size(distance, 2 * length, count, mesh2d.LEAST * thickness / count)
+        size = mesh2d.graded_size(distance, 2 * length, count, mesh2d.LEAST * thickness / count)
         size = np.where(np.abs(s) < length, size, self.outline.length)  # held part: one element
         ends = np.array([line.to for line in self.cords if line.to < length])
         if not len(ends):

@@ -49,7 +49,9 @@ class Rule:
     def __init__(self, section: SectionMesh, points: int):
         edge, (t, w) = mesh2d.equispaced(section.order), _gauss(points)
         at = mesh2d.grid_points(t)
-        value, slope = ([shape(edge, x) for x in at] for shape in (mesh2d.line, mesh2d.line_slope))
+        value, slope = (
+            [shape(edge, x) for x in at] for shape in (mesh2d.lagrange, mesh2d.lagrange_slope)
+        )
         self.N = mesh2d.tensor(*value)
         dN = np.stack([mesh2d.tensor(slope[0], value[1]), mesh2d.tensor(value[0], slope[1])])
         places = section.nodes[section.cells]
@@ -78,7 +80,7 @@ class CordElements:
         order, chain = section.order, section.chain(edges)
         self.nodes = chain[order * np.arange(len(edges))[:, None] + np.arange(order + 1)]
         edge, (t, w) = mesh2d.equispaced(order), _gauss(points)
-        self.N, slope = mesh2d.line(edge, t), mesh2d.line_slope(edge, t)
+        self.N, slope = mesh2d.lagrange(edge, t), mesh2d.lagrange_slope(edge, t)
         places = section.nodes[self.nodes]
         tangent = np.einsum("qa,cax->cqx", slope, places)
         length = np.linalg.norm(tangent, axis=2)
@@ -121,7 +123,7 @@ class InnerFace:
     def __init__(self, section: SectionMesh, displacement: np.ndarray):
         self.nodes = section.side(section.inner)
         edge, (t, self._w) = mesh2d.equispaced(section.order), _gauss(section.order + 2)
-        self._N, self._slope = mesh2d.line(edge, t), mesh2d.line_slope(edge, t)
+        self._N, self._slope = mesh2d.lagrange(edge, t), mesh2d.lagrange_slope(edge, t)
         r, y = section.nodes[self.nodes].transpose(2, 0, 1)
         place = np.stack([r, 0 * r, y], axis=-1) + displacement[self.nodes]
         x = np.einsum("qa,cak->cqk", self._N, place)

@@ -26,7 +26,7 @@ def equispaced(order: int) -> np.ndarray:
     return np.linspace(0.0, 1.0, order + 1)
 
 
-def line(nodes: np.ndarray, t: np.ndarray) -> np.ndarray:
+def lagrange(nodes: np.ndarray, t: np.ndarray) -> np.ndarray:
     """Lagrange functions (k, n) of the nodes (n,) at points t (k,)."""
     values = np.empty((len(t), len(nodes)))
     for a in range(len(nodes)):
@@ -35,7 +35,7 @@ def line(nodes: np.ndarray, t: np.ndarray) -> np.ndarray:
     return values
 
 
-def line_slope(nodes: np.ndarray, t: np.ndarray) -> np.ndarray:
+def lagrange_slope(nodes: np.ndarray, t: np.ndarray) -> np.ndarray:
     """Derivatives (k, n) of the Lagrange functions of the nodes (n,) at points t (k,)."""
     slopes = np.zeros((len(t), len(nodes)))
     for a in range(len(nodes)):
@@ -114,7 +114,7 @@ class SectionMesh:
         if self.position is not None:
             return self.position(cells, xi, eta)
         edge = equispaced(self.order)
-        shape = tensor(line(edge, xi), line(edge, eta))
+        shape = tensor(lagrange(edge, xi), lagrange(edge, eta))
         return np.einsum("ka,kax->kx", shape, self.nodes[self.cells[cells]])
 
     def on_nodes(self, order: int, edge: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -261,8 +261,8 @@ def _jacobians(mesh: SectionMesh) -> None:
     edge = equispaced(mesh.order)
     t = np.polynomial.legendre.leggauss(_GAUSS)[0] / 2 + 0.5
     xi, eta = grid_points(np.concatenate([[0.0], t, [1.0]]))
-    value = [line(edge, x) for x in (xi, eta)]
-    slope = [line_slope(edge, x) for x in (xi, eta)]
+    value = [lagrange(edge, x) for x in (xi, eta)]
+    slope = [lagrange_slope(edge, x) for x in (xi, eta)]
     points = mesh.nodes[mesh.cells]
     along_xi = np.einsum("ka,cax->ckx", tensor(slope[0], value[1]), points)
     along_eta = np.einsum("ka,cax->ckx", tensor(value[0], slope[1]), points)
@@ -374,7 +374,7 @@ SPARE = 1.3  # largest size over the uniform one
 LEAST = 1.33  # smallest size: wall thicknesses over the number of elements
 
 
-def size(distance: np.ndarray, length: float, count: int, floor: float) -> np.ndarray:
+def graded_size(distance: np.ndarray, length: float, count: int, floor: float) -> np.ndarray:
     """Sizes at distances from the nearer of two clamped edges, for `count` elements over a length.
 
     Distances, length, floor (the least size at the edge) and result have the same unit.
@@ -415,7 +415,7 @@ class PlyLine:
     depth: float
 
 
-def product(
+def product_mesh(
     *,
     order: int,
     wall: np.ndarray,
@@ -505,7 +505,7 @@ def _ply(ply: PlyLine, wall: np.ndarray, arc: np.ndarray) -> np.ndarray:
     return _edges(row * along + np.arange(first, last), 1 if top else 0)
 
 
-def corners(
+def element_corners(
     count: int,
     density: Callable[[np.ndarray], np.ndarray],
     low: float,
@@ -583,7 +583,7 @@ def ring_corners(segments: int, footprint_size: float) -> np.ndarray:
     def density(angle: np.ndarray) -> np.ndarray:
         return 1 / near_road(np.pi - np.abs(angle - np.pi), footprint_size, RING_NEAR)
 
-    return corners(segments, density, 0.0, 2 * np.pi)
+    return element_corners(segments, density, 0.0, 2 * np.pi)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -18,9 +18,9 @@ from tireroad.fem.sections.mesh2d import (
     RegionPatch,
     Ring,
     SectionMesh,
-    corners,
+    element_corners,
     near_road,
-    product,
+    product_mesh,
     ring_corners,
 )
 
@@ -102,7 +102,7 @@ class Torus:
         def density(arc: np.ndarray) -> np.ndarray:
             return 1 / (size(arc) * _near_ends(arc, ends))
 
-        return corners(self.elements_arc, density, -half, half, both)
+        return element_corners(self.elements_arc, density, -half, half, both)
 
     def _size(self, arc: np.ndarray) -> np.ndarray:
         """Relative element size at a section angle."""
@@ -112,14 +112,14 @@ class Torus:
         edge = self.half_angle - np.abs(arc)
         length = 2 * self.half_angle
         floor = mesh2d.LEAST * self.thickness / self.minor_radius / self.elements_arc
-        return near * mesh2d.size(edge, length, self.elements_arc, floor)
+        return near * mesh2d.graded_size(edge, length, self.elements_arc, floor)
 
     def section(
         self, patches: Sequence[RegionPatch] = (), plies: Sequence[PlyLine] = ()
     ) -> SectionMesh:
         """The section mesh, with edges exactly on the boundaries of patches and on plies."""
         wall, arc = self.lines(patches, plies)
-        return product(
+        return product_mesh(
             order=self.order, wall=wall, arc=arc, place=self._place, patches=patches, plies=plies
         )
 
@@ -135,7 +135,7 @@ class Torus:
         )
         depths = [end for patch in patches for end in patch.depth]
         depths += [ply.depth for ply in plies]
-        wall = corners(self.elements_thickness, np.ones_like, 0.0, 1.0, depths)
+        wall = element_corners(self.elements_thickness, np.ones_like, 0.0, 1.0, depths)
         return wall, self.arc_corners(arcs, ends)
 
     def ring(self, patches: Sequence[RegionPatch] = (), plies: Sequence[PlyLine] = ()) -> Ring:

@@ -70,8 +70,8 @@ def _inverse(corners: np.ndarray, order: int, points: np.ndarray) -> np.ndarray:
     place = np.full(points.shape, 0.5)
     for _ in range(_NEWTON):
         xi, eta = place.T
-        value = mesh2d.line(edge, xi), mesh2d.line(edge, eta)
-        slope = mesh2d.line_slope(edge, xi), mesh2d.line_slope(edge, eta)
+        value = mesh2d.lagrange(edge, xi), mesh2d.lagrange(edge, eta)
+        slope = mesh2d.lagrange_slope(edge, xi), mesh2d.lagrange_slope(edge, eta)
         defect = np.einsum("ka,kax->kx", mesh2d.tensor(*value), corners) - points
         rates = [
             np.einsum("ka,kax->kx", mesh2d.tensor(*pair), corners)
@@ -90,7 +90,7 @@ def interpolation(
 ) -> sparse.csr_matrix:
     """Shape functions (k, count) at (cell, xi, eta) on cells (c, n) with nodes at `edge`."""
     cell, xi, eta = place
-    shape = mesh2d.tensor(mesh2d.line(edge, xi), mesh2d.line(edge, eta))
+    shape = mesh2d.tensor(mesh2d.lagrange(edge, xi), mesh2d.lagrange(edge, eta))
     rows = np.repeat(np.arange(len(cell)), shape.shape[1])
     entries = shape.ravel(), (rows, cells[cell].ravel())
     return sparse.csr_matrix(entries, shape=(len(cell), count))

@@ -117,7 +117,7 @@ def _points(body: Body, chain: np.ndarray) -> np.ndarray:
     xi = np.where(side < 2, fixed, t.ravel())
     eta = np.where(side < 2, t.ravel(), fixed)
     edge = mesh2d.equispaced(ring.order)
-    shape = mesh2d.tensor(mesh2d.line(edge, xi), mesh2d.line(edge, eta))
+    shape = mesh2d.tensor(mesh2d.lagrange(edge, xi), mesh2d.lagrange(edge, eta))
     section = ring.section
     place = np.einsum("ka,kax->kx", shape, section.nodes[section.cells[cell]])
     both = np.repeat(angle, len(place)), np.tile(place, (len(angle), 1))

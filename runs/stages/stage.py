@@ -575,7 +575,7 @@ def record_failure(stage: str, key: str, run: str, error: ConvergenceError) -> N
             write_text(file, f"{error} (as in {run}, which failed first and has the same inputs)")
 
 
-def check(stage: str, key: str) -> None:
+def check_failures(stage: str, key: str) -> None:
     """Raise ConvergenceError if the stage has failed on these inputs. Root process only."""
     file = _file(stage, key)
     if file and file.exists():
@@ -643,6 +643,6 @@ def _looked_up(stage: Stage, key: str, claim: ExitStack) -> tuple[str, str, dict
     claim.enter_context(job.cache.claimed(name, key))
     figures = job.cache.fetch(name, key, path)
     if figures is None:
-        check(name, key)
+        check_failures(name, key)
         return reason, "", {}
     return "", "by another run", figures

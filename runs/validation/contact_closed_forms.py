@@ -35,7 +35,7 @@ from tireroad.contact.tread.memory import steady
 from tireroad.contact.tread.pattern import Pattern, pitch_starts
 from tireroad.contact.tread.shear import KernelShear, half_space_shear
 from tireroad.fem.errors import ConvergenceError
-from tireroad.fem.sections.mesh2d import product
+from tireroad.fem.sections.mesh2d import product_mesh
 from tireroad.fem.sections.torus import Torus
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.friction_press import RubbingEquilibrium
@@ -551,7 +551,7 @@ class Roller:
         )
         around = _graded(self.size, np.pi * self.outer, self.reach) / self.outer
         depth = _graded(self.size, self.thickness, self.reach / 2) / self.thickness
-        section = product(
+        section = product_mesh(
             order=2, wall=1 - depth[::-1], arc=np.array([-half, half]), place=torus._place
         )
         ring = replace(

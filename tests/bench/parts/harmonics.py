@@ -77,8 +77,8 @@ def _solid(section: SectionMesh, rubbers: Mapping[str, Rubber], n: int):
     edge, (t, w) = mesh2d.equispaced(section.order), _rule(section.order)
     xi, eta = mesh2d.grid_points(t)
     weight = np.outer(w, w).ravel()
-    value = [mesh2d.line(edge, x) for x in (xi, eta)]
-    slope = [mesh2d.line_slope(edge, x) for x in (xi, eta)]
+    value = [mesh2d.lagrange(edge, x) for x in (xi, eta)]
+    slope = [mesh2d.lagrange_slope(edge, x) for x in (xi, eta)]
     N = mesh2d.tensor(*value)
     dN = np.stack([mesh2d.tensor(slope[0], value[1]), mesh2d.tensor(value[0], slope[1])])
     points = section.nodes[section.cells]
@@ -123,7 +123,7 @@ def _cords(section: SectionMesh, edges: np.ndarray, cords: Membrane, n: int):
     order = section.order
     line = chain[order * np.arange(len(edges))[:, None] + np.arange(order + 1)]
     edge, (t, w) = mesh2d.equispaced(order), _rule(order)
-    N, slope = mesh2d.line(edge, t), mesh2d.line_slope(edge, t)
+    N, slope = mesh2d.lagrange(edge, t), mesh2d.lagrange_slope(edge, t)
     points = section.nodes[line]
     r = np.einsum("qa,ca->cq", N, points[..., 0])
     tangent = np.einsum("qa,cax->cqx", slope, points)

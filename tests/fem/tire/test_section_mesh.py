@@ -7,7 +7,7 @@ import pytest
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections import mesh2d
-from tireroad.fem.sections.mesh2d import PlyLine, RegionPatch, corners
+from tireroad.fem.sections.mesh2d import PlyLine, RegionPatch, element_corners
 from tireroad.fem.sections.torus import Torus
 from tireroad.runs.validation.cases import thesis_torus
 
@@ -25,7 +25,9 @@ def area(mesh, region=None) -> float:
     t, w = points / 2 + 0.5, weights / 2
     edge = mesh2d.equispaced(mesh.order)
     xi, eta = mesh2d.grid_points(t)
-    shape, slope = ([f(edge, x) for x in (xi, eta)] for f in (mesh2d.line, mesh2d.line_slope))
+    shape, slope = (
+        [f(edge, x) for x in (xi, eta)] for f in (mesh2d.lagrange, mesh2d.lagrange_slope)
+    )
     nodes = mesh.nodes[mesh.cells if region is None else mesh.cells[mesh.region == region]]
     a = np.einsum("ka,cax->ckx", mesh2d.tensor(slope[0], shape[1]), nodes)
     b = np.einsum("ka,cax->ckx", mesh2d.tensor(shape[0], slope[1]), nodes)
@@ -74,7 +76,7 @@ def test_a_region_has_its_area_on_every_mesh(arc, layers):
 
 @pytest.mark.parametrize("count", [4, 7, 12, 40])
 def test_corners_share_out_a_density_between_fixed_places(count):
-    found = corners(count, lambda x: 1 + 3 * x**2, -1.0, 1.0, (-0.3, 0.3, 0.3 + 1e-13))
+    found = element_corners(count, lambda x: 1 + 3 * x**2, -1.0, 1.0, (-0.3, 0.3, 0.3 + 1e-13))
     np.testing.assert_array_equal(found, -found[::-1])
     assert np.isin([-1.0, -0.3, 0.3, 1.0], found).all()
     assert abs(len(found) - 1 - count) <= 1

@@ -13,7 +13,9 @@ def area(section) -> float:
     """By Gauss's rule over the cells, m2."""
     edge, (t, w) = mesh2d.equispaced(section.order), np.polynomial.legendre.leggauss(4)
     xi, eta = mesh2d.grid_points(t / 2 + 0.5)
-    value, slope = ([f(edge, x) for x in (xi, eta)] for f in (mesh2d.line, mesh2d.line_slope))
+    value, slope = (
+        [f(edge, x) for x in (xi, eta)] for f in (mesh2d.lagrange, mesh2d.lagrange_slope)
+    )
     shapes = mesh2d.tensor(slope[0], value[1]), mesh2d.tensor(value[0], slope[1])
     across, along = (
         np.einsum("qa,cax->cqx", shape, section.nodes[section.cells]) for shape in shapes
