@@ -6,6 +6,7 @@ import numpy as np
 from scipy import sparse
 
 from tireroad.fem.errors import InputError
+from tireroad.fem.sections.mesh2d import lagrange
 from tireroad.fem.tire.mesh import NodeGrid
 
 _POINTS = 6  # Gauss points per direction in each element under a distributed load
