@@ -87,7 +87,8 @@ _ARGUMENTS = {
     **{f"static.{name}": name for name in ("inflation", "load", "deflection", "road_height")},
     "rotation.speed": "turning.speed",
     **{f"modal.{name}": name for name in ("count", "up_to")},
-    **{f"tire.{name}": name for name in ("segments", "elements_arc", "footprint_size", "order")},
+    **{f"tire.{name}": name for name in ("size", "grooves", "segments", "elements_arc")},
+    **{f"tire.{name}": name for name in ("footprint_size", "order")},
 }
 _KEYS = re.compile("|".join(rf"(?<![\w.]){re.escape(key)}(?!\w)" for key in _ARGUMENTS))
 
@@ -206,7 +207,7 @@ def radial(
     try:
         built(size, grooves)
     except InputError as problem:
-        raise InputError(f"radial: {str(problem).removeprefix('tire.')}") from None
+        raise InputError(in_arguments(f"radial: {problem}")) from None
     return make_tire(comm, tire)
 
 
