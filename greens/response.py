@@ -181,21 +181,6 @@ class Response:
         rotation, and they can gain energy in contact."""
         return self.keeping_where(lambda s: np.abs(s) * step <= limit)
 
-    def rate(self) -> Response:
-        """The velocities at the outputs: g' for g, i omega H for H.
-
-        The poles' own jump at an impulse, Re[C P], is the new residual, zero for a complete set of
-        states. G_res f' is omitted: it needs the rate of the force."""
-        return replace(
-            self,
-            output=self.output * self.eigenvalue,
-            block_output=self.block_output @ self.block,
-            residual=(self.output @ self.input).real + self.block_output @ self.block_input,
-            pulse=0,
-            moments=None,
-            slope=None,
-        )
-
     def with_forces(self, more: Response) -> Response:
         """Followed by the forces of `more`, a response of the same states and outputs."""
 

@@ -554,7 +554,9 @@ def _everywhere(of: type, path: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
 
 
 _DROPPED: dict[tuple[str, ...], str] = {
-    ("greens", "choice"): "greens.dynamic takes the states that participate most; remove it"
+    ("greens", "choice"): "greens.dynamic takes the states that participate most; remove it",
+    ("output", "velocity"): "take the derivative of displacement in response.h5",
+    ("output", "acceleration"): "take the second derivative of displacement in response.h5",
 }
 
 

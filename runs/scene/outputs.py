@@ -24,15 +24,13 @@ MOST_FREQUENCIES = 1_000_000
 class Output(Parameters):
     """Base class of the kinds of output.
 
-    `of`: "points" for the driven points, which needs a [[force]], or "contact"; `in_contact`:
-    whether it is available in a scene with [contact]. `check` reports what a scene lacks; `curves`
-    is given what the run computed at the points (runs.stages.response.Driven) and where to note figures
-    (runs.stages.stage.Record). Their types are not imported: a scene knows nothing of the stages.
+    `of`: "points" for the driven points, which needs a [[force]], or "contact". `check` reports
+    what a scene lacks; `curves` is given what the run computed at the points
+    (runs.stages.response.Driven) and where to note figures (runs.stages.stage.Record). Their types are not imported: a scene knows nothing of the stages.
     """
 
     owner = "output"
     of: ClassVar[str] = "points"
-    in_contact: ClassVar[bool] = True
 
     def check(self, scene: Any, path: tuple[str, ...], error: Where) -> None:
         """Raise error((*path, key), reason) if the rest of the scene does not allow this output."""

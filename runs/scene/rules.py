@@ -211,11 +211,6 @@ def check_outputs(scene: Scene, raw: dict[str, Any], error: Where) -> Iterator[I
 
 
 def _check_kind(scene: Scene, kind: Output, path: tuple[str, ...], error: Where) -> None:
-    if scene.in_contact and not kind.in_contact:
-        raise error(
-            path,
-            "is not available in scenes with [contact]: leave it out, or take out [contact]",
-        )
     if kind.of == "contact" and not scene.in_contact:
         raise error(
             path, "is of the forces of the road: add [contact], [time], and load (N) to [static]"

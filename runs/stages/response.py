@@ -12,7 +12,6 @@ from tireroad.fem.model import SmallMotions
 from tireroad.fem.static.state import StaticState
 from tireroad.greens.coupling import Wheel, wheel_of
 from tireroad.greens.outputs import by_free_rim, remaining
-from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.standing import standing_modes
@@ -28,7 +27,6 @@ from tireroad.runs.stages.rolling import (
     integration,
     of_given_forces,
     planned,
-    recursive,
     shortest_period,
 )
 from tireroad.runs.stages.setup import driven_points
@@ -108,20 +106,6 @@ class Driven:
         forces = self.job.scene.force
         components = full.reshape(len(full), len(forces), 3, len(forces))
         return np.einsum("frdk,rd->frk", components, directions(forces))
-
-    def march(self, response: Response) -> Array:
-        """Readings (nt, 3 k) of another response to prescribed forces, from rest. Collective."""
-        taken = self.integration
-        scheme = recursive(taken.scheme)
-        tire = Recursion(response=response, step=taken.step, scheme=scheme, comm=self.job.comm)
-        force = self.force()
-        tire.start(force[0])
-        out = [response.residual @ force[0]]
-        for new in force[1:]:
-            free = tire.predict()
-            tire.advance(new)
-            out.append(free + tire.same_step @ new)
-        return np.stack(out)
 
 
 @dataclass(frozen=True)

@@ -106,36 +106,6 @@ def test_momentum_of_an_impulse() -> None:
     assert np.abs(response.direct_momentum_rate() - direct).max() < 1e-9 * np.abs(direct).max()
 
 
-@pytest.mark.parametrize("order", [1, 2])
-def test_velocity_and_acceleration_of_an_impulse(order) -> None:
-    """g' and g'' from the companion matrix; g'(0) is the inverse mass seen at the points."""
-    system = make(speed=60.0)
-    rate = system.response().rate()
-    inverse_mass = system.shape @ system.shape.T
-    assert np.abs(rate.impulse(np.zeros(1))[0] - inverse_mass).max() < 1e-11
-    wanted = rate if order == 1 else rate.rate()
-    exact = np.stack(
-        [
-            system.reading
-            @ np.linalg.matrix_power(system.companion, order)
-            @ linalg.expm(system.companion * t)
-            @ system.push
-            for t in TIMES
-        ]
-    )
-    assert np.abs(wanted.impulse(TIMES) - exact).max() < 1e-9 * np.abs(exact).max()
-
-
-def test_mobility_is_i_omega_times_receptance() -> None:
-    response = make().response()
-    frequency = np.array([3.0, 40.0, 300.0])
-    H = response.receptance(frequency)
-    velocity = response.rate()
-    for found, power in ((velocity, 1), (velocity.rate(), 2)):
-        exact = H * (2j * np.pi * frequency[:, None, None]) ** power
-        assert np.abs(found.receptance(frequency) - exact).max() < 1e-9 * np.abs(exact).max()
-
-
 @pytest.mark.parametrize(("speed", "names_it"), [(0.0, False), (244.0, True)])
 def test_only_a_turning_tire_is_told_of_the_critical_speed(monkeypatch, speed, names_it) -> None:
     """A free rim's singular K was blamed on the speed, which is not in it."""

@@ -60,8 +60,6 @@ amplitude = 2.0
 duration = 0.004
 [output]
 impulse = true
-velocity = true
-acceleration = true
 [output.receptance]
 to = 20.0
 step = 10.0

@@ -90,7 +90,7 @@ def test_bad_values_are_named(scene_file, text: str, words: list[str]) -> None:
         (["static.road_height=-0.3", "static.deflection=0.1", "static.load="], ["twice"]),
         (["modal.road=held"], ["modal.road", "[contact]"]),
         (["modal.rim=free"], ["modal.rim", "[contact]"]),
-        (["output.velocity=true"], ["output.velocity", "contact"]),
+        (["output.velocity=true"], ["output.velocity was dropped", "derivative"]),
         (["time=", "output.fields=true"], ["output.fields", "[time]"]),
         (["time=", "accuracy.target=0.1"], ["accuracy.target", "[time]"]),
         (["output.receptance={to=1.0,step=2.0}"], ["receptance.step", "1 Hz"]),
