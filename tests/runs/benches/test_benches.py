@@ -84,7 +84,7 @@ def test_pareto_names_its_front(tmp_path, monkeypatch) -> None:
         if row[0] == str(TINY) and row[2] != pareto.FULL:
             beaten = [b for b in best if b[cost] <= row[cost - 1] and b[error] <= row[error - 1]]
             assert beaten
-    assert len(every.rows) == 2 * 4 * 2 + 1 + 1 * 2 * 1
+    assert len(every.rows) == 2 * len(pareto.RESIDUALS) * 2 + 1 + 1 * 2 * 1
     check_page([first, meshes, every], images=2)
 
 
