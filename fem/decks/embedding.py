@@ -247,6 +247,7 @@ SNAP = 0.01  # of a cell: tolerance within which a point lies on a node or side
 # A line that ends nearer than this to a side ends on it: a cell of a hundredth of its neighbours'
 # length left no correct digits in the modes (relative residual 0.6), one of a twentieth does not.
 _SNAP_END = 0.05
+_WITHIN = 1e-3  # of an element of the line: from its end to where its last cell is looked for
 _LEAST_ANGLE = 0.1  # sine between a line and a side; below it the line runs along the side
 
 
@@ -328,8 +329,12 @@ def _cut_at_end(quads: Quads, line: HostedLine, end: float) -> tuple[Quads, floa
 
     Also returns how far (in s) beyond the end the line must then be followed.
     """
-    (cell,), where, _ = locate(quads, line.at(np.array([end])))
-    matrix, slope = rates(quads.points[quads.cells[[cell]]], where)[0], line.slope(end)
+    # An end on a side is in two cells, and to the one beyond it a line may run slantwise.
+    within = end + _WITHIN if end == 0.0 else end - _WITHIN
+    (cell,), _, _ = locate(quads, line.at(np.array([within])))
+    nine = quads.points[quads.cells[[cell]]]
+    where, _ = inverse(nine, line.at(np.array([end])))
+    matrix, slope = rates(nine, where)[0], line.slope(end)
     along = int(np.argmax(np.abs(np.linalg.solve(matrix, slope))))
     t = float(where[0, along])
     cell_length = float(np.linalg.norm(matrix[:, along]) / np.linalg.norm(slope))

@@ -5,6 +5,8 @@ import pytest
 from test_cords_of_decks import _by_vectors, depths
 from torus_decks import CORDS, HALF_ANGLE, RUBBER, WALL, Torus, membranes, plain
 
+from tireroad.fem.decks import embedding
+
 AREA, SPACING = 2.118e-7, 1.16e-3
 NUMBERS = f"{AREA}, {SPACING}"
 
@@ -49,6 +51,17 @@ def test_all_forms_in_one_deck(own):
     found = own(every_form())
     names = [one.name.partition(" ")[0] for one in found.plies]
     assert set(names) == {"S", "M", "C", "D"}
+
+
+@pytest.mark.parametrize("rounding", [1e-9, -1e-9])
+def test_a_line_that_ends_on_a_side_belongs_to_the_cell_that_it_runs_through(
+    own, monkeypatch, rounding
+) -> None:
+    """Which of both cells the end was in was rounding; in the one beyond, at an angle of 30 degrees, it was cut lengthwise."""
+    locate = embedding.locate
+    monkeypatch.setattr(embedding, "locate", lambda quads, at: locate(quads, at + [0.0, rounding]))
+    names = {one.name.partition(" ")[0] for one in own(every_form()).plies}
+    assert names == {"S", "M", "C", "D"}
 
 
 @pytest.mark.parametrize("angle", [70.0, -70.0, 25.0])
