@@ -141,7 +141,7 @@ _POINTS_AHEAD, _STEPS_AHEAD = 200_000, 64
 class LinearTire(Protocol):
     """A linear tire between the forces and displacements of the patch.
 
-    greens.recursion or greens.recursion; the processes of `comm` advance it together.
+    `Recursion` or `Convolution` of greens.recursion; the processes of `comm` advance it together.
     """
 
     comm: MPI.Comm
@@ -497,9 +497,7 @@ class DrivenTire:
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """Continue from a snapshot."""
-        self._step, (self.work, self.lead) = (
-            int(state["driven_step"]),
-            state["driven_work"].tolist(),
-        )
+        self._step = int(state["driven_step"])
+        self.work, self.lead = state["driven_work"].tolist()
         self._along = state["driven_along"]
         self._tire.restore(state)

@@ -34,7 +34,6 @@ def modal_statics(
 
 Array = np.ndarray
 Probes = sparse.csr_matrix  # (k, 3 s) over the outer face, or (k, 3 s + 6) with the rim
-Pencil = tuple[np.ndarray, np.ndarray]  # D~ and K~ of a projected problem
 ABOUT_AXLE = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])  # e_y x
 
 
@@ -161,22 +160,22 @@ class Basis:
 
 def regained(
     basis: Basis,
-    true: Pencil,
-    uniform: Pencil,
+    true: np.ndarray,
+    uniform: np.ndarray,
     outputs: sparse.csr_matrix,
     loads: sparse.csr_matrix,
 ) -> Statics:
     """Static answers of the modes under true damping less those under the full matrices' damping.
 
     Added to the answers of the full matrices, they yield those of matrices that damp the modes
-    truly and all other motions uniformly. `true`, `uniform`: D~ and K~ of both.
+    truly and all other motions uniformly. `true`, `uniform`: K~ of both.
     """
     own = basis.projection.squares > 0
-    flexible = np.pad(own, (0, len(true[0]) - len(own)), constant_values=True)  # the air's are
+    flexible = np.pad(own, (0, len(true) - len(own)), constant_values=True)  # the air's are
     seen = basis.seen(outputs)[:, flexible], basis.seen(loads)[:, flexible]
     carried = basis.beside(basis.of_hub(outputs))[:, flexible]
     both = (
         modal_statics(stiffness[np.ix_(flexible, flexible)], *seen, carried)
-        for _, stiffness in (true, uniform)
+        for stiffness in (true, uniform)
     )
     return Statics(*(a - b for a, b in zip(*both, strict=True)))

@@ -42,7 +42,6 @@ from tireroad.fem.wheel import Axle, Turning
 from tireroad.greens.basis import (
     Array,
     Basis,
-    Pencil,
     Probes,
     modal_statics,
     regained,
@@ -215,11 +214,12 @@ class Wheel:
         """Whether the modes are damped or stiffened otherwise than the full matrices."""
         return self.beyond is not None or self.growth is not None
 
-    def _pencils(self, projection: Projection) -> tuple[Pencil, Pencil]:
-        """Projected pencils with the rim held: of the modes, and of the full matrices."""
-        true = held_matrices(projection, self.speed, self.damping, self.inertia)
+    def _stiffnesses(self, projection: Projection) -> tuple[Array, Array]:
+        """K~ with the rim held, rolling damping in it: of the modes, and of the full matrices."""
+        _, true = held_matrices(projection, self.speed, self.damping, self.inertia)
         full = projection.as_elements(self.growth or 1.0)
-        return true, held_matrices(full, self.speed, self._uniform, self.inertia)
+        _, uniform = held_matrices(full, self.speed, self._uniform, self.inertia)
+        return true, uniform
 
     def respond(
         self,
@@ -274,7 +274,7 @@ class Wheel:
         answers = compliance(*given, self.air, beside=self._beside(basis.of_hub(outputs)))
         flexibility, beside = answers[: outputs.shape[0]], answers[outputs.shape[0] :]
         if self._apart:
-            lacking = regained(basis.held, *self._pencils(basis.projection), outputs, loads)
+            lacking = regained(basis.held, *self._stiffnesses(basis.projection), outputs, loads)
             flexibility, beside = flexibility + lacking.compliance, beside + lacking.momentum
         return self._completed(basis, outputs, loads, flexibility, beside)
 
@@ -311,7 +311,7 @@ class Wheel:
         del columns  # used up: what follows needs the memory
         grown, _ = self._grown(grown_modes, basis.projection)
         if self._apart:
-            lacking = regained(grown.held, *self._pencils(grown.projection), probes, probes)
+            lacking = regained(grown.held, *self._stiffnesses(grown.projection), probes, probes)
             flexibility, beside = flexibility + lacking.compliance, beside + lacking.momentum
         found = self._completed(grown, probes, probes, flexibility, beside)
         if light is not None:

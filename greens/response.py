@@ -220,24 +220,6 @@ class Response:
         r = len(self.residual)
         return np.append(np.arange(r)[outputs], [r, r + 1, r + 2])
 
-    def and_states_of(self, other: Response) -> Response:
-        """Both sets of states between the same outputs and forces; no rigid `other`."""
-        return Response(
-            eigenvalue=np.concatenate([self.eigenvalue, other.eigenvalue]),
-            output=np.hstack([self.output, other.output]),
-            input=np.vstack([self.input, other.input]),
-            block=linalg.block_diag(other.block, self.block),
-            block_output=np.hstack([other.block_output, self.block_output]),
-            block_input=np.vstack([other.block_input, self.block_input]),
-            residual=self.residual + other.residual,
-            momentum=np.hstack([self.momentum, other.momentum]),
-            block_momentum=np.hstack([other.block_momentum, self.block_momentum]),
-            pulse=self.pulse,
-            rigid=self.rigid,
-            moments=self.moments,
-            slope=added(self.slope, other.slope),
-        )
-
 
 def couple(
     modes: StateModes,

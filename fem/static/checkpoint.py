@@ -1,22 +1,11 @@
-"""Stored results of a long computation, so that an interrupted one resumes bit for bit.
-
-The path is a function of the outcomes and states of its solutions. It is retraced from its start,
-and each recorded solution is put in place. The solution after the last recorded one may use its
-tangent, which is not stored; the last solution of each problem is therefore solved again, from
-where it began.
-"""
+"""Stored results of a long computation, so that an interrupted one resumes bit for bit."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from mpi4py import MPI
-
-if TYPE_CHECKING:
-    pass
-
 
 Entry = Mapping[str, np.ndarray]
 

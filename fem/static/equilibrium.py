@@ -153,7 +153,7 @@ _ROAD = "active", "force", "height"
 class SolutionHistory:
     """Solutions of the equilibrium problems of one stage, in order; none without a `journal`.
 
-    An interrupted load path is retraced without solving (`History`): it is a function of the
+    An interrupted load path is retraced without solving: it is a function of the
     outcomes and states of its solutions. From its start, each recorded solution is put in place.
     The solution after the last recorded one may use its tangent, which is not stored; the last
     solution of each problem is therefore solved again, from where it began.

@@ -37,9 +37,11 @@ from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.model import TireModel
 from tireroad.fem.static.checkpoint import Entry, Journal
 from tireroad.fem.static.friction_press import Friction
+from tireroad.fem.static.road import RoadShape
 from tireroad.fem.static.state import StaticState
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.timing import Timing
+from tireroad.fem.tire.body import Body
 from tireroad.fem.wheel import Axle, Turning
 from tireroad.modal.damping import Damping, Proportional, StrainEnergy
 from tireroad.runs.files import store
@@ -55,8 +57,6 @@ from tireroad.runs.scene.tables.scene import Scene, axle_of
 
 if TYPE_CHECKING:
     from tireroad.fem.sections.mesh2d import Ring
-    from tireroad.fem.static.road import RoadShape
-    from tireroad.fem.tire.body import Body
     from tireroad.runs.scene.tables.tire import TireTable
 
 T = TypeVar("T")
@@ -99,16 +99,12 @@ def _shown(value: Any) -> str:
 
 def make_tire(comm: MPI.Comm, tire: TireTable):
     """The tire without loads; its finite elements are made on first use."""
-    from tireroad.fem.model import TireModel
-
     section = tire.ring()
     return TireModel(section, lambda: make_body(comm, tire, section))
 
 
 def road_shape(scene: Scene) -> RoadShape:
     """The road's shape under the tire: the wheel's camber, and the drum if there is one."""
-    from tireroad.fem.static.road import RoadShape
-
     drum = scene.road.drum_radius if scene.road else None
     return RoadShape(
         camber=math.radians(scene.static.camber),
@@ -119,8 +115,6 @@ def road_shape(scene: Scene) -> RoadShape:
 
 def make_body(comm: MPI.Comm, tire: TireTable, section: Ring) -> Body:
     """The finite-element body, undeformed. Collective."""
-    from tireroad.fem.tire.body import Body
-
     return Body(comm, section, tire.shape.rubbers(tire), cords=tire.shape.cords(tire))
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from tireroad.contact.tread.law import TREADS, TreadLaw
 from tireroad.fem.errors import InputError
@@ -21,10 +20,6 @@ from tireroad.runs.scene.schema import (
     variant,
     vector,
 )
-
-if TYPE_CHECKING:
-    pass
-
 
 Where = Callable[[tuple[str, ...], str], InputError]
 
