@@ -19,20 +19,15 @@ from typing import Any, Protocol
 import numpy as np
 from scipy import sparse
 from scipy.optimize import brentq
-from scipy.sparse.linalg import LinearOperator
 
-from tireroad.contact.loop import RoadNormal, looking_ahead
 from tireroad.contact.patch import Patch
 from tireroad.contact.solver.conditions import ContactSolver
 from tireroad.contact.tread.kernel import GridPlaces
 from tireroad.fem.errors import ConvergenceError, UnsuitedSettings
-from tireroad.greens.recursion import LoadedColumns
 
 # Points of the largest grid that is laid out before the patch is known.
 MOST_POINTS = 1_000_000
 LOAD_TOLERANCE = 1e-7
-# Number of displacements up to which W A W^T is kept as a matrix: 8 MB, three times that on a rough road.
-MOST_DENSE = 1000
 
 
 class DeformedTread(Protocol):
@@ -190,59 +185,6 @@ def _bracket(excess: Callable[[float], float], step: float) -> tuple[float, floa
         "contact: no height of the tire gives the static load on the points; take a finer grid "
         "(contact.points), or a larger contact.reach"
     )
-
-
-class PointTire:
-    """A tire given at nodes, as seen at the points of a patch: W u from it, W^T f into it.
-
-    `components` of the displacements, and of the forces if those are more: 1: vertical only; 3: z,
-    then x, then y of all points.
-    """
-
-    def __init__(
-        self, tire: Any, weights: sparse.csr_matrix, components: int = 1, pushed: int | None = None
-    ) -> None:
-        self._tire = tire
-        self._weights = sparse.block_diag([weights] * components, format="csr")
-        every = [weights.T] * (pushed or components)
-        self._transposed = sparse.block_diag(every, format="csr")
-        self.comm = tire.comm
-        self.same_step = self._same_step()
-        self.inertia_force, self.ahead = tire.inertia_force, looking_ahead(tire)
-        self.snapshot, self.restore = tire.snapshot, tire.restore
-
-    def start(self, force: np.ndarray) -> None:
-        """Begin with a force (c,) N present at t = 0."""
-        self._tire.start(self._transposed @ force)
-
-    def predict(self) -> np.ndarray:
-        """Displacement (c,) m at the end of the step without a new force."""
-        return self._weights @ self._tire.predict()
-
-    def advance(self, force: np.ndarray) -> None:
-        """Set the force (c,) N at the end of the step."""
-        self._tire.advance(self._transposed @ force)
-
-    def _same_step(self) -> np.ndarray | LinearOperator:
-        """W A W^T: a matrix if it is small, because a step then reads only its loaded columns."""
-        weights, tire = self._weights, self._tire.same_step
-        shape = weights.shape[0], self._transposed.shape[1]
-        if shape[0] > MOST_DENSE:
-            self._answers = LoadedColumns(tire, self.comm)
-            return LinearOperator(shape, matvec=self._answer, dtype=float)
-        return weights @ (self._transposed.T @ tire.T).T
-
-    def _answer(self, force: np.ndarray) -> np.ndarray:
-        return self._weights @ (self._answers @ (self._transposed @ force))
-
-
-def on_points(tire: Any, patch: Patch) -> tuple[Any, RoadNormal | None]:
-    """The tire as seen at the points of the patch, and the road's normal if its forces have three
-    components."""
-    seen, pushed = (count // len(patch.index) for count in tire.same_step.shape)
-    if patch.weights is not None:
-        tire = PointTire(tire, patch.weights, seen, pushed)
-    return tire, RoadNormal(len(patch.points)) if pushed == 3 else None
 
 
 ACROSS = 8  # points across the footprint below which twice their spacing gives no estimate

@@ -9,15 +9,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import partial
-from typing import NamedTuple, Protocol, runtime_checkable
+from functools import cached_property, partial
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from mpi4py import MPI
+from scipy import sparse
 
 from tireroad.contact.patch import Patch
+from tireroad.contact.solver.active_set import COMPILED
 from tireroad.contact.solver.conditions import Array, ContactSolver
-from tireroad.contact.solver.stick_slip import BrushFriction
+from tireroad.contact.solver.stick_slip import BrushFriction, CompressedRows
 from tireroad.contact.tread.memory import TreadMemory
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.greens.recursion import LoadedColumns, ahead_of_mean
@@ -61,7 +63,7 @@ def check_times(duration: float, size: float) -> None:
 class Solved(NamedTuple):
     """The solution at the contact points, and the residual and `penetration` (m) of it.
 
-    `force` (c,) N, `gap` (c,) m, `horizontal` (c, 2) N, or (0, 2) without friction.
+    `force` (c,) N, `gap` (c,) m, `horizontal` (2, c) N, or (2, 0) without friction.
     """
 
     force: Array
@@ -125,7 +127,7 @@ class RootSolve:
         c = self._count
         force, gap = values[2 : 2 + c], values[2 + c : 2 + 2 * c]
         residual, penetration = values[:2].tolist()
-        return Solved(force, gap, values[2 + 2 * c :].reshape(-1, 2), residual, penetration)
+        return Solved(force, gap, values[2 + 2 * c :].reshape(2, -1), residual, penetration)
 
 
 def _packed(found: Solved) -> Array:
@@ -133,9 +135,14 @@ def _packed(found: Solved) -> Array:
     return np.concatenate([scalars, found.force, found.gap, found.horizontal.ravel()])
 
 
-# Road heights are computed at once for as many steps as make this many points, to share the
-# overhead of a call; and for at most so many steps.
+# What needs no contact is computed for as many steps at once as make this many points, and for at most so many.
 _POINTS_AHEAD, _STEPS_AHEAD = 200_000, 64
+
+
+def block_size(points: int) -> int:
+    """Steps of a block for this many contact points, a power of two."""
+    most: int = min(max(_POINTS_AHEAD // points, 1), _STEPS_AHEAD)
+    return 1 << (most.bit_length() - 1)
 
 
 class LinearTire(Protocol):
@@ -171,13 +178,63 @@ class IteratedTire(LinearTire, Protocol):
     def settle(self, force: np.ndarray) -> np.ndarray | None: ...
 
 
-class Instant(NamedTuple):
-    """The state at the end of a step: (c,) arrays in N and m.
+@dataclass(frozen=True)
+class Block:
+    """The states at the ends of n successive steps, for c contact points on p nodes; N, m, s.
 
-    `force` vertical and `horizontal` (c, 2) N; `axle_force` (3,) N; `penetration` (m) of the deepest point in the
-    solution; `change` and `moved`: the tire's forces and displacements relative to the static
-    state, all components in which the tire's motion is followed.
+    `force` (n, c) vertical and `horizontal` (n, c, 2) on the tire; `axle_force` (n, 3); `penetration` (n,) of the
+    deepest point in the solution; `active` (n,) points that touch; `change` (n, k): the forces on the nodes from
+    the static state, z of all nodes, then x, then y; `free` (n, r): their displacements without the
+    forces of the same step, which `moved` adds; `reading` (n, m) of a tire that is read elsewhere too.
     """
+
+    time: Array
+    force: Array
+    horizontal: Array
+    gap: Array
+    axle_force: Array
+    residual: Array
+    penetration: Array
+    active: Array
+    change: Array
+    free: Array
+    reading: Array | None
+    problem: ContactProblem
+
+    @cached_property
+    def moved(self) -> Array:
+        """Displacements (n, r) m of the nodes from the static state, in the components that are followed."""
+        loaded = self.change.any(axis=0)
+        return self.free + self.change[:, loaded] @ self.problem.answer[loaded]
+
+    @property
+    def followed(self) -> Array:
+        """Changes (n, r) N of the forces on the nodes in the components whose motion is followed."""
+        return self.change[:, : self.free.shape[1]]
+
+    @property
+    def displacement(self) -> Array:
+        """Vertical displacements (n, c) m of the points from the static state."""
+        patch = self.problem.patch
+        vertical = self.moved[:, : self.problem.nodes]
+        return vertical if patch.weights is None else (patch.weights @ vertical.T).T
+
+    @property
+    def total_force(self) -> Array:
+        """Sum (n, 3) N of the forces of the road, in the axes in which they are given."""
+        return np.column_stack([self.horizontal.sum(axis=1), self.force.sum(axis=1)])
+
+    def instants(self) -> Iterator[Instant]:
+        """The steps one by one."""
+        displacement = self.displacement
+        parts = self.time.tolist(), self.force, self.horizontal, self.gap, displacement, self.axle_force
+        more = self.residual.tolist(), self.penetration.tolist(), self.active.tolist(), self.followed, self.moved
+        for values in zip(*parts, *more, strict=True):
+            yield Instant(*values)
+
+
+class Instant(NamedTuple):
+    """The state at the end of a step: as in `Block`, (c,) for each point."""
 
     time: float
     force: np.ndarray
@@ -211,8 +268,12 @@ class Drive:
     slope: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None
 
 
-class RoadNormal:
-    """Forces of a road that leans: along its normal, and tangential to it.
+class ContactProblem:
+    """The contact of a step between the `patch`'s points and the road: normal, or with `friction` too.
+
+    `same_step` (r, k) m/N: displacements at the end of a step of the nodes under forces on them, in z, then x, then
+    y: as many displacements as are followed, as many forces as act. `solver` is made for the normal
+    compliance A + C~. Where forces have three components a road with a slope `leans`.
 
     On a slope r = (r_x, r_y) a point with the vertical force f and the bristle's force t bears
 
@@ -222,35 +283,104 @@ class RoadNormal:
     it is predicted from the last step's f and t, so that the contact problem stays as it is.
     Neglected are two terms of second order that belong together, as their work does: the change of
     gap -u . r by the horizontal motion u, and the slope met there instead of at the point.
+
+    After `solve` and `commit`: `vertical` (c,), `horizontal` (2, c) N on the tire, `change` (k,) N on the nodes from the
+    static state, `resultant` (3,) N. Compiled (contact/solver/contact.c). Not collective.
     """
 
-    def __init__(self, count: int) -> None:
-        self._force, self._tangential = np.zeros(count), np.zeros((count, 2))
+    def __init__(
+        self, patch: Patch, same_step: Array, solver: ContactSolver, friction: BrushFriction | None = None
+    ) -> None:
+        self.patch, self._solver, self._friction = patch, solver, friction
+        c = len(patch.points)
+        p = c if patch.weights is None else patch.weights.shape[1]
+        self.components = 3 if friction else 1
+        followed, pushed = (count // p for count in same_step.shape)
+        self.nodes, self.leans = p, pushed == 3
+        self.answer = np.ascontiguousarray(same_step.T)  # (k, r)
+        weights = sparse.identity(p, format="csr") if patch.weights is None else patch.weights
+        up, down = CompressedRows(weights), CompressedRows(weights.T)
+        self._q, self._free = np.zeros(c), np.zeros((2, c))
+        self._touching: Array | None = patch.force > 0
+        self.vertical, self.horizontal, self.resultant = np.zeros(c), np.zeros((2, c)), np.zeros(3)
+        # Changes of the forces from the static state, on the nodes and on the points.
+        self.change, self.at_points = np.zeros(pushed * p), np.zeros(pushed * c)
+        self._force, self._tangential = np.zeros(c), np.zeros((2, c))
+        doubles = {
+            "gap0": np.ascontiguousarray(patch.gap), "at_rest": np.ascontiguousarray(patch.force), "q": self._q,
+            "free": self._free, "vertical": self.vertical, "horizontal": self.horizontal, "change": self.at_points,
+            "nodal": self.change, "resultant": self.resultant, "answer": self.answer, "normal_force": self._force,
+            "tangential": self._tangential, "lifted": np.empty(same_step.shape[0]), "added": np.empty(3 * c),
+            "value": np.empty(3 * p),
+        }  # fmt: skip
+        self._at_rest = doubles["at_rest"]
+        if patch.pull is not None and friction is None:
+            doubles["rest"] = np.ascontiguousarray(patch.pull.T)
+        self._held: dict[str, Any] = {name: COMPILED.doubles(values) for name, values in doubles.items()}
+        self._held |= {
+            "points": c, "nodes": p, "seen": 3 if friction and followed == 3 else 1, "pushed": pushed,
+            "leans": self.leans, "answer_rows": same_step.shape[0], "which": COMPILED.ints(np.empty(3 * p, np.int32)),
+            "w_begin": up.begin, "w_column": up.column, "w_value": up.value,
+            "t_begin": down.begin, "t_column": down.column, "t_value": down.value,
+        }  # fmt: skip
+        self._compiled = COMPILED.ffi.new("meeting *", self._held)
 
-    def added(self, slope: Array | None) -> Array:
-        """What the slope (c, 2) adds to the forces (3 c,) N in z, x and y: the prediction."""
-        return self._added(slope, self._force, self._tangential)
+    def solve(self, road: Array, slope: Array | None, tread: Array | None, free: Array) -> Solved:
+        """The forces for displacements `free` (r,) m of the nodes without those of the step.
 
-    def settle(self, slope: Array | None, force: Array, tangential: Array) -> Array:
-        """The same for the forces (c,) and (c, 2) N that the step found."""
-        self._force, self._tangential = force, tangential
-        return self._added(slope, force, tangential)
+        `road` (c,) m under the points, `slope` (c, 2) of it, `tread` (1 or 3, c) m: displacements of a tread that
+        creeps due to its past.
+        """
+        given = COMPILED.doubles(free), COMPILED.doubles(road), _pointer(slope), _pointer(tread)
+        COMPILED.lib.meeting_prepare(self._compiled, *given)
+        solver, touching = self._solver, self._touching
+        if self._friction is None:
+            force, tangential = solver.solve(self._q, touching, reference=self._at_rest), _NO_FORCE
+        else:
+            force, plane = self._friction.solve(solver, self._q, touching, self._at_rest, self._free)
+            tangential = plane.T
+        return Solved(force, solver.gap, tangential, solver.residual, solver.penetration)
 
-    @staticmethod
-    def _added(slope: Array | None, force: Array, tangential: Array) -> Array:
-        out = np.zeros((3, len(force)))
-        if slope is not None:
-            out[0] = (tangential * slope).sum(axis=1)
-            out[1:] = -force * slope.T
-        return out.ravel()
+    def commit(self, solved: Solved, slope: Array | None) -> Array:
+        """Set the solution of the step; returns the change (k,) N of the forces on the nodes."""
+        tangential = _pointer(solved.horizontal if self._friction else None)
+        force = COMPILED.doubles(solved.force)
+        COMPILED.lib.meeting_conclude(self._compiled, force, tangential, _pointer(slope))
+        self._touching = None
+        return self.change
+
+    @property
+    def factorisations(self) -> int:
+        """Number of matrices that the solver has factorised."""
+        return self._solver.factorisations
+
+    @property
+    def largest_unique(self) -> float | None:
+        """Friction coefficient up to which the points that touch at rest have one solution; None without friction."""
+        return self._friction.largest_unique(self.patch.force > 0, self._solver) if self._friction else None
 
     def state(self) -> dict[str, Array]:
         """The state that a checkpoint keeps."""
-        return {"normal_force_before": self._force, "normal_tangential": self._tangential}
+        kept = self._solver.state() | (self._friction.state() if self._friction else {})
+        if self.leans:
+            kept |= {"normal_force_before": self._force.copy(), "normal_tangential": self._tangential.T.copy()}
+        return kept
 
     def set_state(self, state: dict[str, Array]) -> None:
-        """Continue from `state`."""
-        self._force, self._tangential = state["normal_force_before"], state["normal_tangential"]
+        """Restore the state; what follows is bitwise that of an uninterrupted run."""
+        self._touching = None
+        self._solver.set_state(state)
+        if self._friction:
+            self._friction.set_state(state)
+        if self.leans:
+            self._force[:], self._tangential[:] = state["normal_force_before"], state["normal_tangential"].T
+
+
+_NO_FORCE = np.zeros((2, 0))
+
+
+def _pointer(values: Array | None) -> Any:
+    return COMPILED.ffi.NULL if values is None else COMPILED.doubles(values)
 
 
 @dataclass(frozen=True)
@@ -258,42 +388,72 @@ class Loop:
     """The parts of a time loop that have a history, which a checkpoint must keep."""
 
     tire: LinearTire
-    solver: ContactSolver
-    friction: BrushFriction | None = None
+    contact: ContactProblem
     memory: TreadMemory | None = None
-    normal: RoadNormal | None = None
 
-    def roll(
-        self,
-        patch: Patch,
-        drive: Drive,
-        step: float,
-        steps: int,
-        *,
-        done: int = 0,
-        motion: bool = True,
-    ) -> Iterator[Instant]:
-        """The instants of `roll` with these parts."""
-        parts = self.friction, done, self.memory, motion, self.normal
-        return roll(self.tire, self.solver, patch, drive, step, steps, *parts)
+    def roll(self, drive: Drive, step: float, steps: int, *, done: int = 0) -> Iterator[Block]:
+        """Yield the states after each of `steps` steps of `step` seconds, in blocks. Collective if the tire is.
+
+        A step predicts the tire's motion without its forces, solves the contact and advances the tire.
+        `done` steps have been taken before, and all parts are as they were then. The root of
+        `tire.comm` solves the contact problem and sends the result; solver and friction of other processes
+        stay unchanged, while tire and `memory` (of a viscoelastic tread, whose response within the step is part of
+        the solver) advance on each.
+        """
+        for times, roads, slopes in _roads(drive, self.contact.patch, step, steps, done, self.contact.leans):
+            yield self._block(times, roads, slopes)
+
+    def _block(self, times: Array, roads: Array, slopes: Array | None) -> Block:
+        tire, contact, memory = self.tire, self.contact, self.memory
+        n, count = roads.shape
+        force, gap, axle = np.empty((n, count)), np.empty((n, count)), np.empty((n, 3))
+        horizontal, change = np.empty((n, 2, count)), np.empty((n, len(contact.change)))
+        free_all = np.empty((n, contact.answer.shape[1]))
+        residual, penetration, active = np.empty((3, n))
+        together = RootSolve(tire.comm, count, looking_ahead(tire))
+        iterated = tire if isinstance(tire, IteratedTire) else None
+        frames, readings = contact.patch.frames, []
+        for k in range(n):
+            slope = None if slopes is None else slopes[k]
+            tread = memory.predict() if memory else None
+            predict, past = tire.predict, contact.state() if iterated else {}
+            while True:
+                solve = partial(contact.solve, roads[k], slope, tread)
+                free, solved = together(predict, solve, contact.components == 3)
+                pushed = contact.commit(solved, slope)
+                again = iterated.settle(pushed) if iterated else None
+                if again is None:
+                    break
+                contact.set_state(past)
+                predict = partial(np.asarray, again)
+            free_all[k], change[k] = free, pushed
+            tire.advance(pushed)
+            if memory:
+                memory.advance(contact.at_points)
+            force[k], horizontal[k], gap[k] = contact.vertical, contact.horizontal, solved.gap
+            residual[k], penetration[k] = solved.residual, solved.penetration
+            active[k] = np.count_nonzero(solved.force)
+            axle[k] = contact.resultant - tire.inertia_force()
+            if frames is not None:
+                axle[k] += contact.patch.resultant(force[k], horizontal[k].T) - contact.resultant
+            if isinstance(tire, DrivenTire):
+                readings.append(tire.reading)
+        return Block(
+            times, force, horizontal.transpose(0, 2, 1), gap, axle, residual, penetration, active.astype(int),
+            change, free_all, np.array(readings) if readings else None, contact,
+        )  # fmt: skip
 
     def snapshot(self) -> dict[str, np.ndarray]:
         """Arrays by name, between two steps. Collective when the tire is."""
-        friction = self.friction.state() if self.friction else {}
         memory = self.memory.state() if self.memory else {}
-        normal = self.normal.state() if self.normal else {}
-        return self.tire.snapshot() | self.solver.state() | friction | memory | normal
+        return self.tire.snapshot() | self.contact.state() | memory
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """Continue with the same bits as without interruption, on the same number of processes."""
         self.tire.restore(state)
-        self.solver.set_state(state)
-        if self.friction:
-            self.friction.set_state(state)
+        self.contact.set_state(state)
         if self.memory:
             self.memory.set_state(state)
-        if self.normal:
-            self.normal.set_state(state)
 
 
 def roll(
@@ -306,70 +466,11 @@ def roll(
     friction: BrushFriction | None = None,
     done: int = 0,
     memory: TreadMemory | None = None,
-    motion: bool = True,
-    normal: RoadNormal | None = None,
 ) -> Iterator[Instant]:
-    """Yield the state after each of `steps` steps of `step` seconds. Collective if the tire is.
-
-    `solver` is made for A + C~. With `friction` or a `normal` the tire's forces are three times as
-    many: z, then x, then y of all points; its displacements with `friction`. Without a `normal` the
-    road's slope is left out. `memory`: that of a viscoelastic tread, whose
-    response within the step is part of the solver. `done` steps have been taken before, and tire,
-    solver and friction are as they were then. The root of `tire.comm` solves the contact problem
-    and sends the result; solver and friction of other processes stay unchanged, while tire and
-    `memory` advance on each. Without `motion` nothing is `moved`, for callers that need only
-    forces.
-    """
-    count = len(patch.points)
-    still = np.zeros((count, 2))
-    rest = still if patch.pull is None or friction else patch.pull
-    # The first step starts from the static contact set, later ones from the solver's last one.
-    touching = None if done else patch.force > 0
-    answer = LoadedColumns.of(tire.same_step, tire.comm)
-    settle = tire.settle if isinstance(tire, IteratedTire) else None
-    together = RootSolve(tire.comm, count, looking_ahead(tire))
-    for time, road, slope in _roads(drive, patch, step, steps, done, normal is not None):
-        predict = tire.predict
-        tread = memory.predict() if memory else np.zeros((1, count))
-        past = friction.state() if friction and settle else {}
-        lifted = answer @ normal.added(slope) if normal else 0.0
-        while True:
-            solve = partial(_contact, solver, friction, patch, tread, road, touching, lifted)
-            free, found = together(predict, solve, friction is not None)
-            tangential = found.horizontal if friction else still
-            vertical, horizontal = found.force, rest + tangential
-            if normal:
-                more = normal.settle(slope, found.force, tangential).reshape(3, count)
-                vertical, horizontal = vertical + more[0], horizontal + more[1:].T
-            change = vertical - patch.force
-            if friction or normal:
-                change = np.concatenate([change, *(horizontal - rest).T])
-            touching = None
-            again = settle(change) if settle else None
-            if again is None:
-                break
-            predict = partial(np.asarray, again)
-            if friction:
-                friction.set_state(past)
-        moved = free + answer @ change if motion else free[:0]
-        tire.advance(change)
-        if memory:
-            memory.advance(change)
-        axle = -tire.inertia_force()
-        axle += patch.resultant(vertical, horizontal)
-        yield Instant(
-            time,
-            vertical,
-            horizontal,
-            found.gap,
-            moved[:count],
-            axle,
-            found.residual,
-            found.penetration,
-            int(np.count_nonzero(found.force)),
-            change[: len(moved)],
-            moved,
-        )
+    """Yield the state after each of `steps` steps of a loop of these parts; see Loop.roll. Collective if the tire is."""
+    loop = Loop(tire, ContactProblem(patch, tire.same_step, solver, friction), memory)
+    for block in loop.roll(drive, step, steps, done=done):
+        yield from block.instants()
 
 
 def looking_ahead(tire: object) -> Ahead | None:
@@ -378,50 +479,28 @@ def looking_ahead(tire: object) -> Ahead | None:
     return found
 
 
-def _contact(
-    solver: ContactSolver,
-    friction: BrushFriction | None,
-    patch: Patch,
-    tread: np.ndarray,
-    road: np.ndarray,
-    touching: np.ndarray | None,
-    lifted: np.ndarray | float,
-    free: np.ndarray,
-) -> Solved:
-    """The contact in one step; `free` (tire) and `tread` are the motions due to past forces, m, and
-    `lifted` the tire's due to what the slope adds in this step."""
-    count, free = len(road), free + lifted
-    q = patch.gap + free[:count] + tread[0] - road
-    if friction is None:
-        force, horizontal = solver.solve(q, touching, reference=patch.force), np.zeros((0, 2))
-    else:
-        beside = tread[1:].ravel() if len(tread) > 1 else 0.0
-        given = q, touching, patch.force, free[count:] + beside
-        force, horizontal = friction.solve(solver, *given)
-    return Solved(force, solver.gap, horizontal, solver.residual, solver.penetration)
-
-
 def _roads(
     drive: Drive, patch: Patch, step: float, steps: int, done: int, leans: bool
-) -> Iterator[tuple[float, np.ndarray, np.ndarray | None]]:
-    """Time (s), road (c,) m under the points and, if it `leans`, its slope (c, 2), for each step
-    after `done`.
+) -> Iterator[tuple[Array, Array, Array | None]]:
+    """Times (n,) s, road (n, c) m under the points and, if it `leans`, its slope (n, c, 2), for the steps
+    after `done`, block by block.
 
     Blocks of steps are counted from the first step on, so that a restarted loop finds the same
     bits.
     """
     x, y = patch.points[:, 0], patch.points[:, 1]
-    block = min(max(_POINTS_AHEAD // len(x), 1), _STEPS_AHEAD)
+    block = block_size(len(x))
     for first in range(done - done % block, steps, block):
         times = step * np.arange(first + 1, min(first + block, steps) + 1)
         along = x + drive.speed * times[:, None]
         across = np.broadcast_to(y, along.shape)
         heights = drive.height(along, across)
+        heights = heights + np.array([drive.motion(time) for time in times.tolist()])[:, None]
         slopes = drive.slope(along, across) if leans and drive.slope else None
-        for k, time in enumerate(times.tolist(), first):
-            if k >= done:
-                slope = None if slopes is None else slopes[k - first]
-                yield time, heights[k - first] + drive.motion(time), slope
+        skipped = max(done - first, 0)
+        if slopes is not None:
+            slopes = np.ascontiguousarray(slopes[skipped:], dtype=float)
+        yield times[skipped:], np.ascontiguousarray(heights[skipped:], dtype=float), slopes
 
 
 class DrivenTire:

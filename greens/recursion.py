@@ -27,6 +27,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
@@ -36,8 +37,11 @@ from scipy.sparse.linalg import LinearOperator
 from threadpoolctl import threadpool_info
 
 from tireroad.fem.collective import allgather_rows, same_on_all
+from tireroad.fem.compiled import library
 from tireroad.fem.errors import InputError
 from tireroad.greens.response import Response
+
+_C = library(Path(__file__).with_suffix(".c"))
 
 DAMPED = 1 / 16
 # Parts of f_{n-1} and f_{n-2} in the earlier force l of a step, z_n = e^{sh} z_{n-1} + b0 P l + b1 P f_n.
@@ -262,12 +266,6 @@ def at_once(response: Response) -> np.ndarray:
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-# Numbers in a run of columns, on average, above which each run is multiplied on its own instead of
-# first copying all columns side by side: 16 columns of 430 numbers, 7 of 1,000, 3 of 2,000; at
-# least two columns.
-LONG, FEWEST = 7000, 2
-
-
 class SharedRows:
     """This process's share `mine` of `count` rows, and their collection by `gathered`."""
 
@@ -291,16 +289,16 @@ class SharedRows:
 class LoadedColumns:
     """A (n, k), stored by `columns` (k, n); products read only columns of nonzero forces.
 
-    Runs of adjacent nonzero entries, such as the touching points of a line, are read in place:
-    copying them side by side first takes twice as long. The order of summation depends on the
-    nonzero entries alone, so that a run restarted from a checkpoint yields the same bits. With a
-    `comm` of several processes, each computes its share of the n rows.
+    The order of summation depends on the nonzero entries alone, so that a run restarted from a
+    checkpoint yields the same bits. With a `comm` of several processes, each computes its share of the n rows.
     """
 
     def __init__(self, matrix: Array, comm: MPI.Comm = MPI.COMM_SELF) -> None:
         self.columns = np.ascontiguousarray(matrix.T)
         self.rows = SharedRows(len(matrix), comm)
-        self._own = self.columns[:, self.rows.mine]
+        self._own = np.ascontiguousarray(self.columns[:, self.rows.mine])
+        count = len(self.columns)
+        self._pointers = _C.doubles(self._own), _C.ints(np.empty(count, np.int32)), _C.doubles(np.empty(count))
 
     @staticmethod
     def of(matrix: Array | LinearOperator, comm: MPI.Comm) -> LoadedColumns | LinearOperator:
@@ -313,50 +311,10 @@ class LoadedColumns:
 
     def product(self, force: Array) -> Array:
         """This process's rows of A f for f (k,)."""
-        index = force.nonzero()[0]
-        breaks = np.flatnonzero(index[1:] - index[:-1] > 1)
-        loaded, runs = len(index), len(breaks) + 1
-        if loaded < FEWEST * runs or loaded * self._own.shape[1] < LONG * runs:
-            return force[index] @ self._own[index]
-        begins = [index[0], *index[breaks + 1].tolist()]
-        ends = [*(index[breaks] + 1).tolist(), index[-1] + 1]
         out = np.zeros(self._own.shape[1])
-        for begin, end in zip(begins, ends, strict=True):
-            out += force[begin:end] @ self._own[begin:end]
+        force = np.ascontiguousarray(force, dtype=float)
+        _C.lib.add_loaded(*self._own.shape, self._pointers[0], _C.doubles(force), *self._pointers[1:], _C.doubles(out))
         return out
-
-    def between(self, rows: Index, columns: Index) -> Array:
-        """A (a, b) between `rows` (a,) and `columns` (b,), column-major."""
-        # Whole columns first: a third of the time of picking entry by entry.
-        return self.columns.take(columns, axis=0).take(rows, axis=1).T
-
-    def around(self, index: Index) -> ColumnsAround:
-        """The columns (a,) of `index`, for forces that are nonzero there and at few others."""
-        return ColumnsAround(self, index)
-
-
-class ColumnsAround:
-    """Columns of A (n, n), rows not shared, at `index` (a,), copied once for many products.
-
-    Finding and copying them is half the cost of a product.
-    """
-
-    def __init__(self, whole: LoadedColumns, index: Index) -> None:
-        self._whole, self._index = whole, index
-        self._columns = whole.columns.take(index, axis=0)
-
-    def block(self) -> Array:
-        """A (a, a) between them, column-major."""
-        return self._columns.take(self._index, axis=1).T
-
-    def spread(self, force: Array) -> Array:
-        """A f (n,) for f (n,), fastest if f is nonzero at `index` and few others."""
-        moved = force[self._index] @ self._columns
-        rest = force.copy()
-        rest[self._index] = 0.0
-        if rest.any():
-            moved += self._whole.product(rest)
-        return moved
 
 
 class Recursion:
@@ -391,8 +349,8 @@ class Recursion:
         self._spread = Spread(comm, self._idle)
         mine = self._spread.mine(np.arange(len(response.eigenvalue)))
         s = response.eigenvalue[mine]
-        self._decay = np.exp(s * step)
-        self._old, self._new = weights(s * step, step, scheme)
+        old, new = weights(s * step, step, scheme)
+        self._decay, self._old, self._new = np.exp(s * step), old.astype(complex), new.astype(complex)
         self._parts = EARLIER[scheme]
         # Real arithmetic on adjacent (re, im), as the states lie in memory.
         output = np.vstack([response.output[:, mine], response.inertia[0][:, mine]])
@@ -401,10 +359,11 @@ class Recursion:
         self._block = None
         if comm.rank == self._idle and len(response.block):
             self._block = Block(response, step, scheme)
+        forces = response.residual.shape[1]
         self._state = np.zeros(len(mine), complex)
+        self._free = self._state.copy()  # at the end of the step without a new force
         # P f of the previous step, and of the one before it.
-        self._push = self._before = np.zeros(len(mine), complex)
-        self._free = self._state  # at the end of the step without a new force
+        self._push, self._before = np.zeros((2, len(mine)), complex)
         self._moved = False  # whether `_free` belongs to this step yet
         self._taken = True  # whether `_state` includes the last force
         self._samples: list[tuple[np.ndarray, ...]] | None = None
@@ -416,13 +375,31 @@ class Recursion:
         if self._late is not None:
             self.same_step -= self._late[:-3].toarray()
             self._into_rate -= self._late[-3:].toarray()
-        self._force = np.zeros(response.residual.shape[1])
-        self._rate = np.zeros(3)
+        self._force, self._rate = np.zeros(forces), np.zeros(3)
         # Outputs at the end of this step; this process's and all known parts of the next step's.
         self._heard = False  # whether the processes have exchanged what they know of this step
         self._out = np.zeros(len(self._output))
         self._part = self._known = self._out
         self._unknown = self._force  # the force missing from `_known`
+        self._bind()
+
+    def _bind(self) -> None:
+        """The structure of the compiled step, which works in this object's arrays."""
+        self._into_rate = np.ascontiguousarray(self._into_rate)
+        complexes = {
+            "decay": self._decay, "old_": self._old, "new_": self._new, "state": self._state,
+            "moved": self._free, "push": self._push, "before": self._before,
+        }  # fmt: skip
+        doubles = {name: values.view(float) for name, values in complexes.items()} | {
+            "output": self._output, "input": self._input.columns, "into_rate": self._into_rate, "force": self._force,
+            "out": self._out, "rate": self._rate, "value": np.empty(len(self._force)),
+        }  # fmt: skip
+        sizes = {"states": len(self._state), "forces": len(self._force), "outputs": len(self._out)}
+        parts = {"last_part": self._parts[0], "before_part": self._parts[1]}
+        pointers = {name: _C.doubles(values) for name, values in doubles.items()}
+        pointers["which"] = _C.ints(np.empty(len(self._force), np.int32))
+        self._held = pointers
+        self._c = _C.ffi.new("states *", sizes | parts | pointers)
 
     def _add_same_step(self, response: Response, into: np.ndarray) -> None:
         """Immediate effect of a unit new force on the displacements and on the rate of momentum."""
@@ -456,9 +433,10 @@ class Recursion:
 
     def start(self, force: np.ndarray) -> None:
         """Begin with a force (k,) N at t = 0, at rest. Collective when looking ahead."""
-        self._force = force
-        self._push = self._before = (self._input @ force).view(complex)
-        self._rate = self._begun @ force
+        self._force[:] = force
+        self._push[:] = (self._input @ self._force).view(complex)
+        self._before[:] = self._push
+        self._rate[:] = self._begun @ force
         if self._block:
             self._block.start(force)
         self._begin()
@@ -467,20 +445,23 @@ class Recursion:
         """Compute all outputs of the first step. Collective when looking ahead."""
         if self.ahead:
             self._move()
-            self._known, self._unknown = self._reduce(self._seen()), np.zeros_like(self._force)
+            self._see()
+            self._known, self._unknown = self._reduce(self._out), np.zeros_like(self._force)
 
     def predict(self) -> np.ndarray:
-        """Displacement (r,) m at the end of the step without a new force.
+        """Displacement (r,) m at the end of the step without a new force, valid until the next call.
 
         Collective. When looking ahead the root calls it first, and the others may after `exchange`.
         """
         if not self.ahead:
             self._move()
-            self._out = self._reduce(self._seen())
+            self._see()
+            if self.comm.size > 1:
+                self._out[:] = self._reduce(self._out)
         elif self._next is not None:
-            self._out = self._known + self._next @ self._unknown
+            self._out[:] = self._known + self._next @ self._unknown
         out = self._out if self._late is None else self._out + self._late @ self._force
-        self._rate = out[-3:]
+        self._rate[:] = out[-3:]
         return out[:-3]
 
     def _move(self) -> None:
@@ -488,8 +469,7 @@ class Recursion:
         if self._moved:
             return
         self._take()
-        earlier = mixed(self._parts, self._push, self._before)
-        self._free = self._decay * self._state + self._old * earlier
+        _C.lib.move(self._c)
         if self._block:
             self._block.move()
         self._moved = True
@@ -498,21 +478,19 @@ class Recursion:
         """Add the force that `advance` was given to the states."""
         if self._taken:
             return
-        self._before, self._push = self._push, (self._input @ self._force).view(complex)
-        self._state = self._free + self._new * self._push
+        _C.lib.take(self._c)
         if self._block:
-            self._block.advance(self._force)
+            self._block.advance(self._force.copy())
         self._taken = True
         if self._samples is not None:
             block = self._block.state if self._block else np.zeros(0)
-            self._samples.append((self._state, self._push, self._force, block))
+            self._samples.append((self._state.copy(), self._push.copy(), self._force.copy(), block))
 
-    def _seen(self) -> np.ndarray:
-        """This process's part of the outputs without a new force."""
-        out = self._output @ self._free.view(float)
+    def _see(self) -> None:
+        """This process's part of the outputs without a new force, in `_out`."""
+        _C.lib.see(self._c)
         if self._block:
-            out += self._block.seen()
-        return out
+            self._out += self._block.seen()
 
     def look_ahead(self) -> None:
         """Compute the part of the next outputs that does not depend on the force of this step."""
@@ -528,7 +506,6 @@ class Recursion:
         """Broadcast the root's prediction and sum what was looked ahead; before `advance`.
         Collective."""
         self._heard = True
-        self._out = self._out if self._next is not None else np.empty_like(self._out)
         self.comm.Bcast(self._out)
         self._known = self._reduce(self._part)
 
@@ -538,15 +515,16 @@ class Recursion:
             raise RuntimeError("a recursion that looks ahead needs `exchange` in every step")
         self._heard = False
         self._move()
-        self._force = self._unknown = force
-        self._rate = self._rate + self._into_rate @ force
+        self._force[:] = force
+        self._unknown = self._force
+        _C.lib.advance(self._c)
         self._moved = self._taken = False
 
     @property
     def state(self) -> np.ndarray:
         """This process's states (mine,), after `advance`."""
         self._take()
-        return self._state
+        return self._state.copy()
 
     def keep_samples(self) -> None:
         """Record `samples` of each step from now on."""
@@ -575,20 +553,21 @@ class Recursion:
         Collective."""
         kept = {
             "state": self._spread.everywhere(self.state),
-            "push": self._spread.everywhere(self._push),
-            "push_before": self._spread.everywhere(self._before),
+            "push": self._spread.everywhere(self._push.copy()),
+            "push_before": self._spread.everywhere(self._before.copy()),
         }
-        kept["push_force"] = self._force
+        kept["push_force"] = self._force.copy()
         kept["known_ahead"] = self._known if self.ahead else self._known[:0]
         block = self._block.snapshot() if self._block else NO_BLOCK
         return kept | self.comm.bcast(block, root=self._idle)
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """Continue from a snapshot, after `advance`. Collective when looking ahead."""
-        self._state, self._push, self._before = (
-            self._spread.mine(state[name]).copy() for name in ("state", "push", "push_before")
-        )
-        self._force = self._unknown = state["push_force"]
+        arrays = {"state": self._state, "push": self._push, "push_before": self._before}
+        for name, own in arrays.items():
+            own[:] = self._spread.mine(state[name])
+        self._force[:] = state["push_force"]
+        self._unknown = self._force
         self._moved, self._taken = False, True
         if self._block:
             self._block.restore(state)
@@ -599,7 +578,7 @@ class Recursion:
 
     def inertia_force(self) -> np.ndarray:
         """Rate of the tire's momentum (3,), N, after `advance`: sum_k (int rho phi_k) eta_k''."""
-        return self._rate
+        return self._rate.copy()
 
 
 def marched(

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from tireroad.contact.choices import LEAST_STEPS, TURN
-from tireroad.contact.loop import Instant, Steps, check_times, equal_steps
+from tireroad.contact.loop import Block, Steps, check_times, equal_steps
 from tireroad.contact.model import ContactSpec, NormalContact
 from tireroad.contact.patch import Patch
 from tireroad.contact.results.chatter import choose, oscillation
@@ -458,10 +458,10 @@ def drive(
     fastest = np.abs(response.eigenvalue).max(initial=1.0 / duration)
     largest = min(duration / LEAST_STEPS, TURN / fastest) if step is None else step
     chosen = equal_steps(duration, largest)
-    instants = _instants(spec, setup, response, chosen, motions.body.comm)
+    blocks = _blocks(spec, setup, response, chosen, motions.body.comm)
     highest = tire.states.highest / (2 * np.pi)
     bounds = limits(step=chosen.size, highest=highest, pitch=pitch(setup.patch), speed=rolled.speed)
-    return _history(setup.patch, instants, lowest(bounds), grown(setup, road.run_in))
+    return _history(setup.patch, blocks, lowest(bounds), grown(setup, road.run_in))
 
 
 def _check_motions(motions: SmallMotions) -> None:
@@ -509,21 +509,21 @@ def _check_pitches(pitches: tuple[float, float], found: Footprint) -> None:
         )
 
 
-def _instants(
+def _blocks(
     spec: ContactSpec, setup: ContactSetup, response: Response, chosen: Steps, comm: MPI.Comm
-) -> list[Instant]:
+) -> list[Block]:
     """Run the time loop with the integration scheme that suits the contact. Collective."""
     kept = response.resolved(chosen.size)
     scheme = choose(oscillation(spec, setup.patch, kept, chosen.size)).scheme
     recursion = Recursion(response=kept, step=chosen.size, scheme=scheme, comm=comm)
     loop = make_loop(spec, setup, recursion, chosen.size)
-    return list(loop.roll(setup.patch, setup.drive, chosen.size, chosen.count))
+    return list(loop.roll(setup.drive, chosen.size, chosen.count))
 
 
-def _history(patch: Patch, instants: list[Instant], limit: Limit, run_in: float) -> History:
-    """Stack the instants. Raises ConvergenceError if the road touches the edge of the patch."""
+def _history(patch: Patch, blocks: list[Block], limit: Limit, run_in: float) -> History:
+    """Join the blocks. Raises ConvergenceError if the road touches the edge of the patch."""
     kept = {
-        name: np.stack([getattr(instant, name) for instant in instants])
+        name: np.concatenate([getattr(block, name) for block in blocks])
         for name in ("time", "force", "horizontal", "axle_force", "displacement", "gap")
     }
     if (kept["force"][:, patch.edge] > 0).any():

@@ -1,11 +1,12 @@
-"""Unilateral contact by active sets: factors that follow the set, pivoting, usual sets, the choice."""
+"""Unilateral contact by active sets: the kernel of a step, pivoting, usual sets, the choice."""
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import inv
-from scipy.linalg.lapack import dgetrf, dgetrs
 
 from tireroad.contact.solver.conditions import (
     Array,
@@ -18,129 +19,19 @@ from tireroad.contact.solver.conditions import (
     penetration,
 )
 from tireroad.contact.solver.projected_cg import Compliance, MatrixCompliance, ProjectedCG
+from tireroad.fem.compiled import library
 from tireroad.fem.errors import ConvergenceError, InputError
 
-# Number of changes above which a new factor costs less: k right-hand sides each time against 2/3
-# a^3.
-FEWEST_CHANGES, SHARE = 4, 16
-
-
-class ActiveFactor:
-    """Solves A_NN x = r for a touching set N that changes by a few points per step.
-
-    The result depends only on N and on the factorised set, not on the changes in between: `base`
-    (n,) bool is all that a checkpoint needs. `factorisations` counts them.
-
-    With the set B factorised, A_BB = L U, and the touching set N = B - R + S, the k = |R| + |S|
-    changes border the system,
-
-        [A_BB A_BS E_R] [x_B]   [r_B]
-        [A_SB A_SS  0 ] [x_S] = [r_S],
-        [E_R^T 0    0 ] [ l ]   [ 0 ]
-
-    whose Schur complement is of size k: k more right-hand sides instead of a new factor. Source:
-    Gill, Murray, Saunders and Wright, SIAM J. Matrix Anal. Appl. 5 (1984) 562.
-    """
-
-    def __init__(self, compliance: Compliance) -> None:
-        self._compliance = compliance
-        self.base: Mask = np.zeros(len(compliance.diagonal), dtype=bool)
-        self.index = np.flatnonzero(self.base)
-        self.factorisations = 0
-        self._members = self._changed = self.index
-        self._key = b""
-
-    def take(self, active: Mask) -> None:
-        """Prepare for the touching set. ConvergenceError if its compliance is singular."""
-        key = active.tobytes()
-        if key == self._key:
-            return
-        self.index = np.flatnonzero(active)
-        changed = np.flatnonzero(active ^ self.base)
-        if len(changed) > len(self._members) // SHARE + FEWEST_CHANGES or not self._members.size:
-            self.rebase(active)
-        else:
-            self._border(active, changed)
-        self._key = key
-
-    def rebase(self, base: Mask) -> None:
-        """Factorise this set, which then is the touching set too."""
-        self.base, self.index = base.copy(), np.flatnonzero(base)
-        self._members, self._changed = self.index, self.index[:0]
-        self._key = base.tobytes()
-        self.factorisations += 1
-        self._around = self._compliance.around(self.index)
-        if len(self.index):  # LAPACK refuses empty blocks
-            self._lu, self._pivots, info = dgetrf(self._around.block(), overwrite_a=True)
-            self._check(info)
-
-    def solve(self, right: Array) -> Array:
-        """x (a,) on the touching points for r (a,) m there."""
-        if len(self.index) == 0:
-            return right
-        if len(self._changed) == 0:
-            return dgetrs(self._lu, self._pivots, right)[0]
-        whole = np.zeros(len(self.base))
-        whole[self.index] = right
-        inner, _ = dgetrs(self._lu, self._pivots, whole[self._members])
-        rest = -self._rows @ inner
-        rest[: len(self._entered)] += whole[self._entered]
-        outer, _ = dgetrs(self._schur, self._turns, rest)
-        whole[self._members] = inner - self._columns @ outer
-        whole[self._entered] = outer[: len(self._entered)]
-        return whole[self.index]
-
-    def spread(self, force: Array) -> Array:
-        """A f (n,) m for forces f (n,) N that are nonzero at the factorised set and few others."""
-        return self._around.spread(force)
-
-    def _border(self, active: Mask, changed: NDArray[np.intp]) -> None:
-        """The Schur complement of the changes since the factorisation."""
-        self._changed = changed
-        if len(changed) == 0:
-            return
-        entered, left = changed[active[changed]], changed[~active[changed]]
-        place = np.searchsorted(self._members, left)
-        s, k, b = len(entered), len(changed), len(self._members)
-        columns, rows = np.zeros((b, k), order="F"), np.zeros((k, b))
-        columns[:, :s] = self._compliance.block(self._members, entered)
-        rows[:s] = self._compliance.block(entered, self._members)
-        columns[place, np.arange(s, k)] = rows[np.arange(s, k), place] = 1.0
-        self._columns, _ = dgetrs(self._lu, self._pivots, columns, overwrite_b=True)
-        schur = -rows @ self._columns
-        schur[:s, :s] += self._compliance.block(entered, entered)
-        self._schur, self._turns, info = dgetrf(schur)
-        self._check(info)
-        self._entered, self._rows = entered, rows
-
-    def _check(self, info: int) -> None:
-        if info > 0:
-            self._key, self._members = b"", self.index[:0]
-            raise ConvergenceError(
-                f"contact: the compliance of {len(self.index)} touching points is singular; add "
-                "tread compliance or a residual flexibility"
-            )
-
+COMPILED = library(Path(__file__).with_name("contact.c"))
+_C, _FFI = COMPILED.lib, COMPILED.ffi
 
 # A sign error below this share of the scale is rounding: otherwise a point whose force and gap are
 # both 0 would enter and leave for ever.
 ROUNDING = 1e-12
-# Full exchanges that may fail to reduce the number of wrong signs before single exchanges take
-# over.
-PATIENCE = 10
 
 
 class ActiveSet:
     """Semismooth Newton (primal-dual active set), safeguarded as block principal pivoting.
-
-    A step exchanges every point of wrong sign (f < 0 where active, g < 0 where not). When
-    `PATIENCE` steps in a row do not reduce their number, only the last wrong point is exchanged
-    (Murty's rule) until it falls, which is finite for every P-matrix. Random matrices, n = 200:
-    with a skew part three times the symmetric one 15 steps are needed; with ten times the step
-    limit is exceeded. Source: Judice and Pires, Computers Ops Res. 21 (1994) 587.
-
-    The factor is kept and bordered as points come and go: a step that ends
-    in the set it began with needs no factorisation.
 
     The contact problem of one time step: f >= 0, g = A (f - f_ref) + q >= 0, f . g = 0.
 
@@ -149,135 +40,110 @@ class ActiveSet:
     definite symmetric part A is a P-matrix and the solution unique (Cottle, Pang and Stone, The
     Linear Complementarity Problem, 3.1.6 and 3.3.7). Serial: every process that calls solves the
     same small problem for itself.
+
+    A step exchanges every point of wrong sign (f < 0 where active, g < 0 where not). When ten
+    steps in a row do not reduce their number, only the last wrong point is exchanged (Murty's rule)
+    until it falls, which is finite for every P-matrix. Random matrices, n = 200: with a skew part
+    three times the symmetric one 15 steps are needed; with ten times the step limit is exceeded.
+    Source: Judice and Pires, Computers Ops Res. 21 (1994) 587.
+
+    The factor of a set B is kept, A_BB = L U. The touching set N = B - R + S differs from it by k =
+    |R| + |S| points, which border the system,
+
+        [A_BB A_BS E_R] [x_B]   [r_B]
+        [A_SB A_SS  0 ] [x_S] = [r_S],
+        [E_R^T 0    0 ] [ l ]   [ 0 ]
+
+    whose Schur complement is of size k: k more right-hand sides instead of a new factor, which is
+    made beyond |B| / 16 + 4 changes. Source: Gill, Murray, Saunders and Wright, SIAM J. Matrix Anal.
+    Appl. 5 (1984) 562. The result depends only on N and B, so a checkpoint keeps these. Compiled
+    (contact.c).
     """
 
-    def __init__(self, matrix: Array | Compliance) -> None:
+    def __init__(self, matrix: Array | MatrixCompliance) -> None:
         if isinstance(matrix, np.ndarray):
             matrix = MatrixCompliance(checked_compliance(matrix))
         self._compliance = matrix
-        self._diagonal = matrix.diagonal
-        self._scale = float(self._diagonal.max())
-        n = len(self._diagonal)
+        rows, columns = matrix.stored
+        n = len(rows)
         self.active: Mask = np.zeros(n, dtype=bool)
         self.gap: Array = np.zeros(n)
-        self.penetration = 0.0
-        self.residual = 0.0
-        self.iterations = 0
-        self._factor = ActiveFactor(matrix)
-        self._lifted = b"", b""
-        self._reference: Array | None = None
-        self._signs = self._before = np.zeros(n)
+        self._base: Mask = np.zeros(n, dtype=bool)
+        self._signs, self._before, self._diagonal = np.zeros(n), np.zeros(n), matrix.diagonal
+        doubles = {
+            "rows": rows, "columns": columns, "diagonal": self._diagonal, "gap": self.gap,
+            "signs": self._signs, "signs_before": self._before,
+        }  # fmt: skip
+        self._held: dict[str, Any] = {name: COMPILED.doubles(array) for name, array in doubles.items()}
+        self._held |= {"active": COMPILED.flags(self.active), "base": COMPILED.flags(self._base)}
+        self.compiled = _FFI.new("active_set *", {"n": n} | self._held)
+        _C.active_set_begin(self.compiled)
+        self._freed = _FFI.gc(self.compiled, _C.active_set_end)
 
     def solve(
         self, q: Array, guess_active: Mask | None = None, reference: Array | None = None
     ) -> Array:
         """Forces f (n,) N with f >= 0, g = A (f - f_ref) + q >= 0, f . g = 0.
 
-        q (n,) m; guess_active (n,) bool, by default extrapolated from the last two solutions;
-        reference f_ref (n,) N, by default 0. With a reference, q = 0 where f_ref > 0 and q >= 0
-        elsewhere returns f_ref bit for bit, so that the state at rest cannot drift.
-        ConvergenceError if q is not finite or the residual max |min(diag(A) f, g)| exceeds 1e-9 of
-        max |q| + max diag(A) max f.
+        q (n,) m; guess_active (n,) bool, by default extrapolated from the last two solutions: without
+        points about to lift off and with those about to touch; reference f_ref (n,) N, by default 0.
+        With a reference, q = 0 where f_ref > 0 and q >= 0 elsewhere returns f_ref bit for bit, so that
+        the state at rest cannot drift. ConvergenceError if q is not finite or the residual
+        max |min(diag(A) f, g)| exceeds 1e-9 of max |q| + max diag(A) max f.
         """
-        n = len(self._diagonal)
-        active = self._guess() if guess_active is None else np.asarray(guess_active, dtype=bool)
-        largest = float(np.abs(q).max())
-        if not np.isfinite(largest):
-            check_residual("active-set", np.nan)
-        best, patience = n + 1, PATIENCE
-        for self.iterations in range(1, 20 * n + 100):
-            force, gap = self._at(active, q, reference)
-            scale = largest + self._scale * float(np.abs(force).max())
-            wrong = np.where(active, force * self._diagonal, gap) < -ROUNDING * scale
-            count = int(np.count_nonzero(wrong))
-            if count == 0:
-                return self._finish(active, force, gap, scale)
-            if count < best:
-                best, patience = count, PATIENCE
-            else:
-                patience -= 1
-            if patience < 0:
-                last = np.flatnonzero(wrong)[-1]
-                wrong = np.zeros(n, dtype=bool)
-                wrong[last] = True
-            active = active ^ wrong
-        raise ConvergenceError(
-            f"contact: no consistent set of the {n} points in {self.iterations} exchanges; A is "
-            "close to singular or far from symmetric: add tread compliance or a residual "
-            'flexibility, or take solver = "snes-vi"'
+        force, self.compiled.again = np.empty(len(self.active)), False
+        given = (
+            COMPILED.doubles(np.ascontiguousarray(q)),
+            _FFI.NULL if guess_active is None else COMPILED.flags(np.ascontiguousarray(guess_active, dtype=bool)),
+            _FFI.NULL if reference is None else COMPILED.doubles(np.ascontiguousarray(reference)),
         )
+        self.check(_C.active_set_solve(self.compiled, *given, COMPILED.doubles(force)))
+        return force
+
+    def check(self, failure: int) -> None:
+        """ConvergenceError for what the kernel could not do, and for too large a residual."""
+        if failure == _C.SINGULAR:
+            raise ConvergenceError(
+                "contact: the compliance between the touching points is singular; add tread compliance or a "
+                "residual flexibility"
+            )
+        if failure == _C.NO_SET:
+            raise ConvergenceError(
+                f"contact: no consistent set of the {len(self.active)} points in {self.iterations} exchanges; A is "
+                "close to singular or far from symmetric: add tread compliance or a residual "
+                'flexibility, or take solver = "snes-vi"'
+            )
+        check_residual("active-set", np.nan if failure else self.residual)
+
+    residual = property(lambda self: self.compiled.residual)
+    penetration = property(lambda self: self.compiled.penetration)
+    iterations = property(lambda self: self.compiled.iterations)
+    factorisations = property(lambda self: self.compiled.factorisations)
 
     def state(self) -> dict[str, Array | Mask]:
         """The state from which the next solve starts."""
-        signs = {"signs": self._signs, "signs_before": self._before}
-        return {"active": self.active, "factorised": self.factorised} | signs
+        signs = {"signs": self._signs.copy(), "signs_before": self._before.copy()}
+        return {"active": self.active.copy(), "factorised": self.factorised} | signs
 
     def set_state(self, state: dict[str, Array | Mask]) -> None:
         """Continue from `state`."""
-        self.active = np.asarray(state["active"], dtype=bool)
-        self._signs = np.asarray(state["signs"], dtype=float)
-        self._before = np.asarray(state["signs_before"], dtype=float)
+        self.active[:] = state["active"]
+        self._signs[:], self._before[:] = state["signs"], state["signs_before"]
         self.refactor(np.asarray(state["factorised"], dtype=bool))
 
     @property
     def factorised(self) -> Mask:
         """The set (n,) whose factor is kept."""
-        return self._factor.base
+        return self._base.copy()
 
     def refactor(self, touching: Mask) -> None:
         """Factorise this set (n,), from whose factor the next solve starts."""
-        self._factor.rebase(touching)
-
-    @property
-    def factorisations(self) -> int:
-        """Number of factorisations; changes in between only border the factor."""
-        return self._factor.factorisations
+        self._base[:] = touching
+        self.check(_C.active_set_refactor(self.compiled))
 
     def block(self, index: Index) -> Array:
         """A between the points `index`, (a, a) m/N."""
         return self._compliance.block(index, index)
-
-    def _guess(self) -> Mask:
-        """The last active set, without points about to lift off and with those about to touch.
-
-        On a rolling patch this is the right set in four steps of five, the last set in one of five.
-        """
-        ahead = 2.0 * self._signs - self._before
-        return (ahead > 0.0) | ((ahead == 0.0) & self.active)
-
-    def _at(self, active: Mask, q: Array, reference: Array | None) -> tuple[Array, Array]:
-        """Forces and gaps when exactly the active points touch (g = 0 there, f = 0 elsewhere)."""
-        self._factor.take(active)
-        index, force = self._factor.index, np.zeros(len(q))
-        change, right = np.zeros(len(q)), -q[index]
-        if reference is not None:
-            lifted = np.flatnonzero(~active & (reference != 0.0))
-            change[lifted] = -reference[lifted]
-            if len(lifted):
-                right += self._missed(index, lifted, reference)
-        change[index] = self._factor.solve(right)
-        gap = q + self._factor.spread(change)
-        force[index] = change[index] if reference is None else reference[index] + change[index]
-        return force, gap
-
-    def _missed(self, index: Index, lifted: Index, reference: Array) -> Array:
-        """Displacement (m) at touching points due to reference forces at points lifted off."""
-        key = index.tobytes(), lifted.tobytes()
-        if key != self._lifted or reference is not self._reference:
-            self._lifted, self._reference = key, reference
-            self._gone = self._compliance.block(index, lifted) @ reference[lifted]
-        return self._gone
-
-    def _finish(self, active: Mask, force: Array, gap: Array, scale: float) -> Array:
-        """Clear signs at rounding level, measure the residual, keep the state for the next step."""
-        np.maximum(force, 0.0, out=force)
-        self.residual = complementarity_residual(force, gap, self._diagonal, scale)
-        check_residual("active-set", self.residual)
-        self.penetration = penetration(gap)
-        gap[active] = 0.0
-        self.active, self.gap = active, gap
-        self._before, self._signs = self._signs, force * self._diagonal - gap
-        return force
 
 
 class Pivot:

@@ -5,8 +5,6 @@ Projected conjugate gradients for the contact problem of a step with thousands o
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -21,48 +19,24 @@ from tireroad.contact.solver.conditions import (
 )
 from tireroad.contact.tread.kernel import Box, KernelTread
 from tireroad.fem.errors import ConvergenceError
-from tireroad.greens.recursion import LoadedColumns
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 
-class Around(Protocol):
-    """A restricted to some points.
-
-    `block` (a, a) is A between them, column-major for LAPACK; `spread` is A f (c,) for forces (c,)
-    at those points and few others.
-    """
-
-    def block(self) -> Array: ...
-
-    def spread(self, force: Array) -> Array: ...
-
-
 class Compliance(Protocol):
     """The operations on A (c, c) m/N that the solvers need.
 
-    `block` is its part between given points, column-major; `around` prepares many products with
-    forces at about the same points; `precondition` is an approximate inverse.
+    `block` is its part between given points, column-major; `precondition` is an approximate inverse.
     """
 
     diagonal: Array
 
     def block(self, rows: Index, columns: Index) -> Array: ...
 
-    def around(self, index: Index) -> Around: ...
-
     def apply(self, force: Array) -> Array: ...
 
     def precondition(self, approach: Array) -> Array: ...
-
-
-@dataclass(frozen=True)
-class _ProductAround:
-    """For a compliance that is a product, which costs the same for few forces as for many."""
-
-    block: Callable[[], Array]
-    spread: Callable[[Array], Array]
 
 
 class SpreadCompliance:
@@ -82,10 +56,6 @@ class SpreadCompliance:
         """A between the points `rows` (a,) and `columns` (b,), (a, b) m/N."""
         ahead = self._weights[columns] @ self._tire.T
         return np.asfortranarray(self._weights[rows] @ ahead.T + self._tread.block(rows, columns))
-
-    def around(self, index: Index) -> Around:
-        """A restricted to the points of `index` (a,)."""
-        return _ProductAround(lambda: self.block(index, index), self.apply)
 
     @property
     def cells(self) -> tuple[Index, Index]:
@@ -109,18 +79,17 @@ class MatrixCompliance:
     """A given matrix (c, c) m/N, preconditioned by its diagonal."""
 
     def __init__(self, matrix: Array) -> None:
-        self._matrix, self._columns = matrix, LoadedColumns(matrix)
+        self._matrix = np.ascontiguousarray(matrix)
         self.diagonal = matrix.diagonal().copy()
+
+    @property
+    def stored(self) -> tuple[Array, Array]:
+        """A by rows and by columns, (c, c) each."""
+        return self._matrix, np.ascontiguousarray(self._matrix.T)
 
     def block(self, rows: Index, columns: Index) -> Array:
         """A between the points `rows` (a,) and `columns` (b,), (a, b) m/N."""
-        if len(rows) < len(columns):
-            return np.asfortranarray(self._matrix.take(rows, axis=0).take(columns, axis=1))
-        return self._columns.between(rows, columns)
-
-    def around(self, index: Index) -> Around:
-        """A restricted to the points of `index` (a,)."""
-        return self._columns.around(index)
+        return np.asfortranarray(self._matrix[np.ix_(rows, columns)])
 
     def apply(self, force: Array) -> Array:
         """Displacement (c,) m under forces (c,) N."""

@@ -57,64 +57,45 @@ class BrushLaw:
 class Brush:
     """The bristles at c points: deflections e (c, 2) m, and the state of the points one step ago.
 
-    `x` (c,) m and `line` (c,) int: points of one line follow each other in the rolling direction.
+    `x` (c,) m and `line` (c,) int: points of one line follow each other in the rolling direction. The
+    kernel of a step (contact.solver.stick_slip) reads and advances the state in these arrays: `deflected`
+    and `moved` (2, c) m, `touched` (c,); by `upstream` (c, c), the next point `ahead` (c,), the way of a step in
+    `pitches` (c,) to that point, `slip` (2,) or (c, 2) m a step.
     """
 
     def __init__(self, law: BrushLaw, x: Array, line: Array, speed: float, step: float) -> None:
         self.law = law
-        self._way = speed * step
-        self._upstream = upstream(x, line, self._way)
-        self._ahead, pitch = next_ahead(x, line)
-        self._pitches = np.where(pitch > 0, self._way / np.where(pitch > 0, pitch, 1.0), np.inf)
-        self._slip = self._way * np.array([-1.0, 1.0]) * np.asarray(law.slip)
-        self.deflection = np.zeros((len(x), 2))
-        self._moved = np.zeros((len(x), 2))
-        self._touched: Mask = np.zeros(len(x), dtype=bool)
+        self.way = speed * step
+        self.upstream = upstream(x, line, self.way)
+        self.ahead, pitch = next_ahead(x, line)
+        self.pitches = np.where(pitch > 0, self.way / np.where(pitch > 0, pitch, 1.0), np.inf)
+        self.slip = self.way * np.array([-1.0, 1.0]) * np.asarray(law.slip)
+        self.deflected, self.moved = np.zeros((2, len(x))), np.zeros((2, len(x)))
+        self.touched: Mask = np.zeros(len(x), dtype=bool)
+
+    @property
+    def deflection(self) -> Array:
+        """Deflections e (c, 2) m."""
+        return self.deflected.T.copy()
 
     def begin(self, touching: Mask, moved: Array | None = None) -> None:
         """Begin with the points that touch in the static state and undeflected bristles.
 
         `moved` (c, 2) m: displacements in that state, by default none.
         """
-        self._touched = touching.copy()
+        self.touched[:] = touching
         if moved is not None:
-            self._moved = moved
-
-    def offer(self) -> tuple[Array, Array]:
-        """(share (c,), past (c, 2) m) of the next step: e = share u + past."""
-        if self.law.kind == "spring":
-            return np.ones(len(self._touched)), np.zeros_like(self.deflection)
-        share = self._upstream @ self._touched.astype(float)
-        anchor = np.where(self._touched[:, None], self.deflection - self._moved, 0.0)
-        past = self._upstream @ anchor + share[:, None] * self._slip
-        self._enter(share, past)
-        return share, past
-
-    def _enter(self, share: Array, past: Array) -> None:
-        """Set share and past of the points that were foremost."""
-        foremost = self._touched & ~self._touched[self._ahead] & (self._pitches <= 1.0 + 1e-9)
-        some = np.flatnonzero(foremost & (self._way > 0))
-        inside = np.minimum(2.0 * self._pitches[some, None], 1.0)  # how far towards the edge it was
-        edge = 0.5 * (self._moved[some] + self._moved[self._ahead[some]])
-        own = self.deflection[some] - self._moved[some]
-        slip = np.broadcast_to(self._slip, past.shape)[some]
-        share[some] = 1.0
-        travelled = np.minimum(0.5 / self._pitches[some, None], 1.0)
-        past[some] = (1.0 - inside) * own - inside * edge + travelled * slip
-
-    def take(self, force: Array, moved: Array, touching: Mask) -> None:
-        """Set the step's horizontal forces (c, 2) N, displacements (c, 2) m and touching points."""
-        self.deflection = -force / np.reshape(self.law.stiffness, (-1, 1))
-        self._moved, self._touched = moved, touching
+            self.moved[:] = moved.T
 
     def state(self) -> dict[str, np.ndarray]:
         """The state that a checkpoint keeps."""
-        return {"deflection": self.deflection, "moved": self._moved, "touched": self._touched}
+        moved, touched = self.moved.T.copy(), self.touched.copy()
+        return {"deflection": self.deflection, "moved": moved, "touched": touched}
 
     def set_state(self, state: dict[str, np.ndarray]) -> None:
         """Continue from `state`."""
-        self.deflection, self._moved = state["deflection"], state["moved"]
-        self._touched = np.asarray(state["touched"], dtype=bool)
+        self.deflected[:], self.moved[:] = state["deflection"].T, state["moved"].T
+        self.touched[:] = state["touched"]
 
 
 def next_ahead(x: Array, line: Array) -> tuple[NDArray[np.intp], Array]:

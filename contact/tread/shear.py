@@ -15,9 +15,7 @@ Mechanics, (3.75) and (3.76).
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from copy import copy
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,68 +28,23 @@ from tireroad.contact.tread.compliance import (
     rectangle_potential,
 )
 from tireroad.contact.tread.kernel import GridPlaces, doubled
+from tireroad.fem.compiled import Library
 
 Array = NDArray[np.float64]
 Plane = NDArray[np.complex128]  # x + iy
 Index = NDArray[np.intp]
 
 
-MARGIN = 4  # points beyond the grid, over which the kernel of the preconditioner has fallen off
-
-
 class ShearConvolution:
-    """Convolution by FFT over twice a grid of `shape`, with kernels (3 or 5, ...) of a larger one.
-
-    `place` (a,): flat indices of the points on the grid. `beside` m/N: compliance of each point in
-    series with the tread, which the preconditioner includes.
+    """Convolution by FFT over twice a grid of `shape`, with kernels (5, ...) on it; `place` (a,): flat
+    indices of the points on the grid.
     """
 
-    def __init__(
-        self, kernels: Array, shape: tuple[int, int], place: Index, beside: float = 0.0
-    ) -> None:
-        self._shape = shape
-        self._size = tuple(fft.next_fast_len(2 * n - 1, real=True) for n in shape)
-        rows, columns = (
-            np.concatenate([np.arange(n), np.zeros(size - 2 * n + 1, int), np.arange(1 - n, 0)])
-            for n, size in zip(shape, self._size, strict=True)
-        )
-        some = kernels[:, rows[:, None], columns]
-        self.own = float(some[0, 0, 0] + some[2, 0, 0]) / 2
-        # Upper bound of the row sums of both components of `spread`.
-        self.bound = float(np.abs(some[:3]).sum())
-        self._xx, self._xy, self._yy, *self._lift = fft.rfft2(some)
-        self._period = tuple(
-            min(fft.next_fast_len(n + MARGIN, real=True), 2 * n - 1) for n in shape
-        )
-        around = np.ix_(*(np.fft.ifftshift(np.arange(n) - n // 2) for n in self._period))
-        xx, xy, yy = (fft.rfft2(kernel[around]).real for kernel in kernels[:3])
-        xx, yy = xx + beside, yy + beside
-        determinant = xx * yy - xy**2
-        least = 1e-6 * float(determinant.max())
-        self._inverse = np.stack([yy, -xy, xx]) / np.maximum(determinant, least)
-        self.set_points(place)
-
-    def at(self, place: Index) -> ShearConvolution:
-        """The same between other points of the grid."""
-        other = copy(self)
-        other.set_points(place)
-        return other
-
-    def set_points(self, place: Index) -> None:
-        """Take the points `place` (a,)."""
-        rows, columns = np.divmod(place, self._shape[1])
+    def __init__(self, kernels: Array, shape: tuple[int, int], place: Index) -> None:
+        self._size = kernels.shape[1:]
+        self._xx, self._xy, self._yy, *self._lift = fft.rfft2(kernels)
+        rows, columns = np.divmod(place, shape[1])
         self._place = rows * self._size[1] + columns
-        self._place_in_period = rows * self._period[1] + columns
-
-    def precondition(self, moved: Plane) -> Plane:
-        """Approximate forces (a,) N in the plane for displacements (a,) m: the periodic inverse."""
-        field = np.zeros((2, self._period[0] * self._period[1]))
-        field[:, self._place_in_period] = _parts(moved)
-        x, y = fft.rfft2(field.reshape(2, *self._period), overwrite_x=True)
-        xx, xy, yy = self._inverse
-        force = np.stack([xx * x + xy * y, xy * x + yy * y])
-        whole = fft.irfft2(force, self._period, overwrite_x=True).reshape(2, -1)
-        return _plane(whole[:, self._place_in_period])
 
     def spread(self, force: Plane) -> Plane:
         """Displacements (a,) m in the plane under forces (a,) N in the plane."""
@@ -178,13 +131,17 @@ def _lift(x: Array, y: Array) -> Array:
 
 
 class Shear(Protocol):
-    """The tread's displacements between all points in the plane of the road.
+    """The tread's displacements between c points (`count`) in the plane of the road.
 
     Forces and displacements in the plane are complex, x + iy. `coupled`: whether pressure causes
-    horizontal displacement.
+    horizontal displacement. `own` m/N: mean self-compliance of a point's two components; `bound` m/N of the
+    largest singular value.
     """
 
+    count: int
     coupled: bool
+    own: float | Array
+    bound: float
 
     def spread(self, force: Plane) -> Plane:
         """Displacements (c,) m in the plane under forces (c,) N in the plane."""
@@ -198,28 +155,11 @@ class Shear(Protocol):
     def lifted(self, index: Index) -> Array:
         """`lift` between the points `index`, (a, 2a): of all forces along x, then along y."""
 
-    def between(self, index: Index, beside: float = 0.0) -> Between:
-        """`spread` between the points `index`; `beside` m/N is in series with each."""
-
     def matrix(self, index: Index) -> Array:
-        """The same as a matrix (2a, 2a): all forces along x, then those along y."""
+        """`spread` between the points `index`, (2a, 2a): all forces along x, then those along y."""
 
-
-class Between:
-    """The operator `apply` from (a,) N to (a,) m, complex.
-
-    `own` m/N: mean self-compliance of a point's two components; `bound` m/N of the largest singular
-    value; `precondition` from (a,) m to (a,) N, about the inverse, None: only `own` is known.
-    """
-
-    def __init__(
-        self,
-        apply: Callable[[Plane], Plane],
-        own: float | Array,
-        bound: float,
-        precondition: Callable[[Plane], Plane] | None = None,
-    ) -> None:
-        self.apply, self.own, self.bound, self.precondition = apply, own, bound, precondition
+    def compiled(self, library: Library) -> dict[str, Any]:
+        """The tread in the structure `plane` of the kernel (contact.solver.stick_slip)."""
 
 
 class MatrixShear:
@@ -228,78 +168,60 @@ class MatrixShear:
     def __init__(self, points: Array, half_sizes: Array, influence: Influence) -> None:
         x, y = (points[:, None, k] - points[None, :, k] for k in (0, 1))
         xx, xy, yy, zx, zy = influence(x, y, half_sizes[None, :, 0], half_sizes[None, :, 1])
-        # As a matrix of adjacent real and imaginary parts.
-        count = len(points)
-        both = np.block([[xx, xy], [xy, yy]])
-        both = 0.5 * (both + both.T)
-        order = np.arange(2 * count).reshape(2, -1).T.ravel()
-        self._matrix = both[np.ix_(order, order)]
-        self._lift = 0.5 * (zx - zx.T) - 0.5j * (zy - zy.T)
-        self.coupled = bool(self._lift.any())
+        self.count = len(points)
+        even = (0.5 * (part + part.T) for part in (xx, xy, yy))
+        odd = (0.5 * (part - part.T) for part in (zx, zy))
+        self._parts = [np.ascontiguousarray(part) for part in (*even, *odd)]
+        self.coupled = bool(self._parts[3].any() or self._parts[4].any())
+        self.own = 0.5 * (self._parts[0].diagonal() + self._parts[2].diagonal())
+        along, mixed, across = (np.abs(part).sum(axis=1) for part in self._parts[:3])
+        self.bound = float(max((along + mixed).max(initial=0.0), (mixed + across).max(initial=0.0)))
 
     def spread(self, force: Plane) -> Plane:
         """Displacements (c,) m in the plane under forces (c,) N in the plane."""
-        return (self._matrix @ force.view(float)).view(complex)
+        xx, xy, yy = self._parts[:3]
+        return xx @ force.real + xy @ force.imag + 1j * (xy @ force.real + yy @ force.imag)
 
     def lift(self, force: Plane) -> Array:
         """Displacements (c,) m away from the road under forces (c,) N in the plane."""
-        return (self._lift @ force).real
+        zx, zy = self._parts[3:]
+        return np.asarray(zx @ force.real + zy @ force.imag)
 
     def drag(self, force: Array) -> Plane:
         """Displacements (c,) m in the plane under normal forces (c,) N, the transpose of `lift`."""
-        return self._lift.T.conj() @ force
+        zx, zy = self._parts[3:]
+        return -(zx @ force) - 1j * (zy @ force)
 
     def lifted(self, index: Index) -> Array:
         """`lift` between the points `index` as a matrix (a, 2a)."""
-        some = self._lift[np.ix_(index, index)]
-        return np.hstack([some.real, -some.imag])
+        return np.hstack([part[np.ix_(index, index)] for part in self._parts[3:]])
 
     def matrix(self, index: Index) -> Array:
         """`spread` as a matrix, x of all points, then y."""
-        some = np.concatenate([2 * index, 2 * index + 1])
-        return self._matrix[np.ix_(some, some)]
+        xx, xy, yy = (part[np.ix_(index, index)] for part in self._parts[:3])
+        return np.block([[xx, xy], [xy, yy]])
 
-    def between(self, index: Index, beside: float = 0.0) -> Between:
-        """`spread` between the points `index`."""
-        some = np.stack([2 * index, 2 * index + 1], axis=-1).ravel()
-        matrix = self._matrix[np.ix_(some, some)]
-
-        def apply(force: Plane) -> Plane:
-            return (matrix @ force.view(float)).view(complex)
-
-        own = matrix.diagonal().reshape(-1, 2).mean(axis=1)
-        return Between(apply, own, float(np.abs(matrix).sum(axis=1).max(initial=0.0)))
-
-
-MOST_RECTANGLES = 100  # whose kernels are kept
+    def compiled(self, library: Library) -> dict[str, Any]:
+        """The five matrices."""
+        kernel = [library.doubles(part) for part in self._parts]
+        return {"tread": library.lib.MATRIX, "coupled": self.coupled, "kernel": kernel}
 
 
 class KernelShear:
-    """The same on a regular grid, by FFT.
-
-    Between some of the points over the rectangle that contains them, whose kernels are kept: it
-    changes less often than the points.
-    """
+    """The same on a regular grid: for all points by FFT, for those that touch by their kernels (contact.c)."""
 
     def __init__(self, grid: GridPlaces, influence: Influence) -> None:
-        self._grid = grid
+        self._grid, self.count = grid, len(grid.place)
         _, x, y = doubled(grid)
         self._kernels = influence(x, y, *(np.full(x.shape, d / 2) for d in grid.spacing))
         self.coupled = bool(self._kernels[3:].any())
         self._whole = ShearConvolution(self._kernels, grid.shape, grid.place)
-        self._rectangles: dict[tuple[int, int, float], ShearConvolution] = {}
-
-    def spread(self, force: Plane) -> Plane:
-        """Displacements (c,) m in the plane under forces (c,) N in the plane."""
-        return self._whole.spread(force)
-
-    def lift(self, force: Plane) -> Array:
-        """Displacements (c,) m away from the road under forces (c,) N in the plane."""
-        return self._whole.lift(force)
-
-    def drag(self, force: Array) -> Plane:
-        """Displacements (c,) m in the plane under normal forces (c,) N, the transpose of `lift`."""
-        return self._whole.drag(force)
+        far = (np.arange(1 - n, n) for n in grid.shape)  # behind, in the layout of `doubled`
+        self._around = np.ascontiguousarray(self._kernels[:, *np.ix_(*far)])
+        self.own = float(self._kernels[0, 0, 0] + self._kernels[2, 0, 0]) / 2
+        # Upper bound of the row sums of both components of `spread`.
+        self.bound = float(np.abs(self._around[:3]).sum())
+        self.spread, self.lift, self.drag = self._whole.spread, self._whole.lift, self._whole.drag
 
     def lifted(self, index: Index) -> Array:
         """`lift` between the points `index` as a matrix (a, 2a)."""
@@ -310,19 +232,15 @@ class KernelShear:
         xx, xy, yy = self._between(index)[:3]
         return np.block([[xx, xy], [xy, yy]])
 
-    def between(self, index: Index, beside: float = 0.0) -> Between:
-        """`spread` between the points `index`; `beside` m/N is in series with each."""
-        i, j = np.divmod(self._grid.place[index], self._grid.shape[1])
-        i, j = i - i.min(), j - j.min()
-        shape = int(i.max()) + 1, int(j.max()) + 1
-        place = i * shape[1] + j
-        if (*shape, beside) not in self._rectangles:
-            if len(self._rectangles) >= MOST_RECTANGLES:
-                self._rectangles.clear()
-            one = ShearConvolution(self._kernels[:3], shape, place, beside)
-            self._rectangles[(*shape, beside)] = one
-        part = self._rectangles[(*shape, beside)].at(place)
-        return Between(part.spread, part.own, part.bound, part.precondition)
+    def compiled(self, library: Library) -> dict[str, Any]:
+        """The five kernels over the offsets from one end of the grid to the other, and the points on it."""
+        row, column = np.divmod(self._grid.place, self._grid.shape[1])
+        return {
+            "tread": library.lib.GRID, "coupled": self.coupled,
+            "kernel": [library.doubles(kernel) for kernel in self._around],
+            "nx": self._grid.shape[0], "ny": self._grid.shape[1],
+            "row": library.ints(row.astype(np.int32)), "column": library.ints(column.astype(np.int32)),
+        }  # fmt: skip
 
     def _between(self, index: Index) -> Array:
         """All kernels between the points `index`, (5, a, a)."""

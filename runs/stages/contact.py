@@ -75,7 +75,9 @@ _CREEPING = 0.02
 LINEAR = 1 / 3
 
 
-def describe(record: Record, counted: Totals, solver, chosen: Integration, taken: int) -> None:
+def describe(
+    record: Record, counted: Totals, factorisations: int, chosen: Integration, taken: int
+) -> None:
     """Record loads, the step, its cost and accuracy; `taken`: steps since the checkpoint."""
     totals, chattering = counted.figures, counted.alternation.worst
     record.headline |= {
@@ -91,7 +93,7 @@ def describe(record: Record, counted: Totals, solver, chosen: Integration, taken
         "largest load of a step, all frequencies": (float(totals.most), "N"),
         "worst complementarity residual": (float(totals.residual), "-"),
         "largest penetration": (float(totals.penetration), "m"),
-        "factorisations": (solver.factorisations, "-"),
+        "factorisations": (factorisations, "-"),
         "points that change back from step to step, at worst": (chattering, "-"),
     }
     if totals.least == 0:
@@ -163,9 +165,6 @@ def excursion(record: Record, most: float, deflection: float | None, *, held: bo
         )
 
 
-_TOGETHER = 8  # steps between two agreements of several processes on whether to stop
-
-
 class Watch:
     """Whether to stop, and whether a checkpoint is due; the same answer on every process.
 
@@ -175,13 +174,9 @@ class Watch:
     def __init__(self, comm: MPI.Comm, every: float) -> None:
         self._comm, self._every = comm, every
         self._last = time.monotonic()
-        self._count = 0
 
     def __call__(self, asked: str) -> tuple[str, bool]:
-        """Stop signal ("" if none), and whether a checkpoint is due. Collective at some steps."""
-        self._count += 1
-        if self._comm.size > 1 and self._count % _TOGETHER:
-            return "", False
+        """Stop signal ("" if none), and whether a checkpoint is due. Collective."""
         due = time.monotonic() - self._last > self._every
         if self._comm.size > 1:
             answers = self._comm.allgather((asked, due))
@@ -535,13 +530,13 @@ class ContactStage(Stage[ContactHistory]):
                 reached = totals.figures.steps * chosen.step
                 console.say(f"  continues from the checkpoint at t = {reached:.6g} s")
             done, began = totals.figures.steps, time.thread_time()
-            self._steps(setup, loop, driven, file, totals, losses, chosen)
+            self._steps(setup, loop, file, totals, losses, chosen)
             # CPU time of this process's own thread: the cost of a step when no other process needs
             # the cores.
             busy = (time.thread_time() - began) / max(chosen.steps - done, 1)
             record.indicators["processor time a step"] = (1e6 * busy, "us")
             file.finish()
-        describe(record, totals, loop.solver, chosen, chosen.steps - done)
+        describe(record, totals, loop.contact.factorisations, chosen, chosen.steps - done)
         alternation(record, totals.alternation.worst, scheme)
         points(record, setup.patch, self.static.product.footprint(), setup.relief)
         highest = self.rotating.product.highest / (2 * np.pi)
@@ -586,18 +581,18 @@ class ContactStage(Stage[ContactHistory]):
         """The loop of tire, normal solver and friction at the patch's points; recorded."""
         spec = self.job.scene.contact
         loop = make_loop(spec, setup, tire, step)
-        if loop.friction is not None:
-            limit = loop.friction.largest_unique(setup.patch.force > 0, loop.solver)
+        limit = loop.contact.largest_unique
+        if limit is not None:
             record.indicators["friction up to which a step has one answer"] = (limit, "-")
             record.warnings += [
                 text for text in beyond_unique(spec.friction, limit) if text not in record.warnings
             ]
         return loop
 
-    def _steps(self, setup, loop: Loop, driven, file: ContactFile, totals, losses, chosen) -> None:
-        """Take the remaining steps; stops between two of them when requested. Collective."""
+    def _steps(self, setup, loop: Loop, file: ContactFile, totals, losses, chosen) -> None:
+        """Take the remaining steps; stops between two blocks of them when requested. Collective."""
         done, steps = totals.figures.steps, chosen.steps
-        instants = loop.roll(setup.patch, setup.drive, chosen.step, steps, done=done)
+        blocks = loop.roll(setup.drive, chosen.step, steps, done=done)
         watch = Watch(self.job.comm, self.job.scene.time.checkpoint)
         with (
             Deferred() as deferred,
@@ -606,20 +601,16 @@ class ContactStage(Stage[ContactHistory]):
             # each other in every product took ten times as long where cores are shared.
             threadpool_limits(1, "blas"),
         ):
-            for instant in instants:
-                full = file.add(instant, driven.reading if driven else None)
-                bar.advance()
+            for block in blocks:
+                file.write(block, totals.add)
+                losses.flush()
+                bar.advance(len(block.time))
                 stop, due = watch(deferred.asked)
-                if full or stop or due:
-                    file.flush(totals.add)
-                    losses.flush()
                 if stop or due:
                     file.checkpoint(loop.snapshot() | totals.state() | losses.state())
                 if stop:
                     raise Stopped(stop)
-            file.flush(totals.add)
             totals.finish()
-            losses.flush()
 
     def read(self, file) -> ContactHistory:
         """The totals over time, without the single points."""

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import h5py
 import numpy as np
 
-from tireroad.contact.loop import Instant
+from tireroad.contact.loop import Block, block_size
 from tireroad.contact.results.chatter import Chosen
 from tireroad.contact.roads.cell_mean import CellMean
 from tireroad.contact.roads.under_tire import NOTHING, is_level
@@ -196,7 +196,7 @@ def _places(setup: ContactSetup) -> np.ndarray:
     return first + length * (np.arange(count) + 0.5) / max(count, 1)
 
 
-BLOCK = 512  # steps kept in memory between two writes
+_CHUNK = 512  # steps in a chunk of what is not one number a point
 CHECKPOINT = "checkpoint.h5"
 STATE = "state"  # the group that a checkpoint has in addition to those of contact.h5
 
@@ -211,6 +211,9 @@ _LAYOUT: dict[str, tuple[tuple, str]] = {
     "active": ((), "-"),
     "residual": ((), "-"),
 }
+_OF_BLOCK = (
+    "time", "gap", "displacement", "axle_force", "active", "residual", "penetration", "moved", "total_force",
+)  # fmt: skip
 DRIVEN = "driven_displacement"  # (nt, k, 3) m at the k prescribed forces, if the scene has them
 
 
@@ -277,8 +280,6 @@ class ContactFile:
             "road_speed": setup.rolled.speed,
         }
         self._checkpoint = job.directory / CHECKPOINT
-        self._stack: list = []
-        self._readings: list[np.ndarray] = []
         self._horizontal = job.scene.horizontal_forces or job.scene.static.friction is not None
         self._layout = dict(_LAYOUT)
         if not job.scene.output.axle_force:
@@ -327,43 +328,31 @@ class ContactFile:
         forces = len(self._job.scene.force)
         driven: dict[str, tuple[tuple, str]] = {DRIVEN: ((forces, 3), "m")} if forces else {}
         driven |= corner.layout(self._job)
-        # Limit a chunk, the least that is read at once, to 4 MB.
-        rows = 2 ** int(np.log2(np.clip(500_000 // max(c, 1), 1, BLOCK)))
+        rows = block_size(c)  # so that each block fills a chunk
         for name, (shape, unit) in (self._layout | driven).items():
             width = tuple(c if n is None else n for n in shape)
             if width[:1] == (c,):
                 dataset = create(self._file, name, rows, width)
             else:
-                sizes = {"maxshape": (None, *width), "chunks": (BLOCK, *width)}
+                sizes = {"maxshape": (None, *width), "chunks": (_CHUNK, *width)}
                 dataset = self._file.create_dataset(name, (0, *width), "f8", **sizes)
             dataset.attrs["unit"] = unit
         self._file.attrs.update(self._attributes)
 
-    def add(self, instant, reading: np.ndarray | None = None) -> bool:
-        """Add a step, with the readings of driven points and wheel; returns whether to `flush`."""
-        self._stack.append(instant)
-        if reading is not None:
-            self._readings.append(reading)
-        return (self._done + len(self._stack)) % BLOCK == 0
-
-    def flush(self, count: Callable[[dict[str, np.ndarray]], None]) -> None:
-        """Write the n steps since the last call, after passing them to `count`: all fields of
-        `Instant` and `total_force` as arrays (n, ...) by name. Collective."""
-        if not self._stack:
-            return
-        steps = _columns(self._stack)
+    def write(self, block: Block, count: Callable[[dict[str, np.ndarray]], None]) -> None:
+        """Write a block of steps, after passing it to `count`: the fields of `Block`, in the names of the file, and
+        `total_force`, as arrays (n, ...) by name. Collective."""
+        steps = {name: getattr(block, name) for name in _OF_BLOCK}
+        steps["normal_force"], steps["horizontal_force"] = block.force, block.horizontal
+        steps["change"] = block.followed
         if self._job.axle:
-            height = 3 * len(self._job.scene.force) + 2
-            steps["wheel_height"] = np.array([reading[height] for reading in self._readings])
+            steps["wheel_height"] = block.reading[:, 3 * len(self._job.scene.force) + 2]
         count(steps)
-        on_root(self._job.comm, lambda: self._write(steps))
-        self._done += len(self._stack)
-        self._stack.clear()
-        self._readings.clear()
+        on_root(self._job.comm, lambda: self._write(steps, self._read(block.reading)))
+        self._done += len(block.time)
 
-    def _write(self, steps: dict[str, np.ndarray]) -> None:
+    def _write(self, steps: dict[str, np.ndarray], driven: dict[str, np.ndarray]) -> None:
         self._packer.wait()
-        driven = self._read()
         for name in self._layout | driven:
             dataset, values = self._file[name], (steps | driven)[name]
             if name == "horizontal_force" and not self._horizontal:
@@ -374,11 +363,11 @@ class ContactFile:
                 dataset.resize(self._done + len(values), axis=0)
                 dataset[self._done :] = values
 
-    def _read(self) -> dict[str, np.ndarray]:
-        """Readings other than contact since the last call, by name."""
-        if not self._readings:
+    def _read(self, readings: np.ndarray | None) -> dict[str, np.ndarray]:
+        """Readings (n, r) other than contact, by name."""
+        if readings is None:
             return {}
-        readings, forces = np.stack(self._readings), len(self._job.scene.force)
+        forces = len(self._job.scene.force)
         points, wheel = np.split(readings, [3 * forces], axis=1)
         driven = {DRIVEN: points.reshape(-1, forces, 3)} if forces else {}
         if not corner.readings(self._job):
@@ -406,16 +395,3 @@ class ContactFile:
     def _finish(self) -> None:
         self._packer.wait()
         self._checkpoint.unlink(missing_ok=True)
-
-
-def _columns(instants: list[Instant]) -> dict[str, np.ndarray]:
-    """A block of steps as arrays by name."""
-    steps = {
-        name: np.array(values)
-        for name, values in zip(Instant._fields, zip(*instants, strict=True), strict=True)
-    }
-    steps["normal_force"] = steps.pop("force")
-    steps["horizontal_force"] = steps.pop("horizontal")
-    normal = steps["normal_force"]
-    sums = np.ones(normal.shape[1]) @ steps["horizontal_force"], normal.sum(axis=1)[:, None]
-    return steps | {"total_force": np.concatenate(sums, axis=1)}

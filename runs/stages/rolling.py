@@ -11,8 +11,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from tireroad.contact.choices import LEAST_STEPS, TURN
-from tireroad.contact.grid_patch import on_points
-from tireroad.contact.loop import DrivenTire, Loop, equal_steps, steps_of
+from tireroad.contact.loop import ContactProblem, DrivenTire, Loop, equal_steps, steps_of
 from tireroad.contact.model import step_solver, tread_memory, tread_shear
 from tireroad.contact.patch import Patch
 from tireroad.contact.results.chatter import Chosen, choose, oscillation
@@ -191,8 +190,7 @@ def make_loop(spec, setup: ContactSetup, tire, step: float) -> Loop:
     friction = None
     if spec.has_friction:
         friction = _friction(spec, setup, tire, step, at_once)
-    tire, normal = on_points(tire, patch)
-    return Loop(tire, solver, friction, memory, normal)
+    return Loop(tire, ContactProblem(patch, tire.same_step, solver, friction), memory)
 
 
 def bristles(spec, patch: Patch):
@@ -273,15 +271,12 @@ def forces(
     spec = contact or job.scene.contact
     driven = driven_tire(job, Integration(tire, step, steps, scheme), setup.patch)
     loop = make_loop(spec, setup, driven or tire, step)
-    (total, axle), every = np.zeros((2, steps, 3)), np.ones(len(setup.patch.points))
-    instants = loop.roll(setup.patch, setup.drive, step, steps, motion=False)
     with threadpool_limits(1, "blas"):
-        for k, instant in enumerate(instants):
-            total[k, :2] = every @ instant.horizontal
-            total[k, 2], axle[k] = instant.force.sum(), instant.axle_force
-            if instant.force[setup.patch.edge].any():
-                setup.patch.check_edge(instant.force[None], np.array([instant.time]), setup.reach)
-    return ContactForces(total, axle, step)
+        total, axle = [], []
+        for block in loop.roll(setup.drive, step, steps):
+            setup.patch.check_edge(block.force, block.time, setup.reach)
+            total.append(block.total_force), axle.append(block.axle_force)
+    return ContactForces(np.concatenate(total), np.concatenate(axle), step)
 
 
 def chosen_scheme(

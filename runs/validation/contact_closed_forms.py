@@ -20,7 +20,7 @@ from tireroad.contact.roads.kinds.shapes import Flat
 from tireroad.contact.roads.under_tire import RoadUnderTire
 from tireroad.contact.setup import ContactSetup, Rolled
 from tireroad.contact.solver.active_set import ActiveSet
-from tireroad.contact.solver.stick_slip import BrushFriction, Carcass, SlidingStiffness, stick_slip
+from tireroad.contact.solver.stick_slip import BrushFriction, PlaneCompliance, stick_slip
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import (
     Influence,
@@ -139,8 +139,7 @@ def _cattaneo_mindlin() -> Iterator[tuple]:
     x, y, normal = x[on], y[on], pressure[on] * pitch**2
     half = np.float64(pitch / 2)
     potential = rectangle_potential(x[:, None] - x, y[:, None] - y, half, half)
-    both = np.kron(potential / (2 * np.pi * pitch**2), np.eye(2))
-    matrix = SlidingStiffness(Carcass(np.asarray(both, dtype=float)))
+    matrix = PlaneCompliance(np.kron(np.eye(2), potential / (2 * np.pi * pitch**2)))
     total = normal.sum()
     for share in (0.3, 0.7):
         shift = 3 * friction * total / 8 * (1 - (1 - share) ** (2 / 3))
@@ -295,8 +294,7 @@ def pushed(nu: float, cells: int) -> Iterator[tuple]:
     disc = Disc(cells)
     normal = np.sqrt(1 - disc.x**2 - disc.y**2) * disc.pitch**2
     total, count = float(normal.sum()), len(normal)
-    tread = disc.shear(nu).between(np.arange(count))
-    stiffness = SlidingStiffness(Carcass(np.zeros((2 * count, 2 * count))), tread=tread)
+    stiffness = PlaneCompliance(np.zeros((2 * count, 2 * count)), shear=disc.shear(nu))
     for share in (0.3, 0.7):
         shift = 3 * SHEAR_FRICTION * total * (2 - nu) / 16 * (1 - (1 - share) ** (2 / 3))
         moved = np.tile([-shift, 0.0], (count, 1))

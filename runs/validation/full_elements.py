@@ -13,7 +13,6 @@ from mpi4py import MPI
 from scipy import sparse
 from threadpoolctl import threadpool_limits
 
-from tireroad.contact.grid_patch import on_points
 from tireroad.contact.loop import roll
 from tireroad.contact.model import ContactSpec, step_solver
 from tireroad.contact.results.spectra import BAND, Distance, distance
@@ -65,13 +64,12 @@ def follow(trial: Conditions, tire, step: float, setup: float) -> FullHistory:
     patch, drive = trial.setup.patch, trial.setup.drive
     p = len(patch.index)
     solver = step_solver(trial.spec, patch, tire.same_step[:p, :p])
-    tire, normal = on_points(tire, patch)
     steps = round(trial.duration / step)
     contact, axle = np.zeros((2, steps, 3))
     moved = np.zeros((steps, len(patch.points)))
     with threadpool_limits(1, "blas"):
         began = time.process_time()
-        instants = roll(tire, solver, patch, drive, step, steps, normal=normal)
+        instants = roll(tire, solver, patch, drive, step, steps)
         for k, instant in enumerate(instants):
             contact[k] = patch.resultant(instant.force, instant.horizontal)
             axle[k] = instant.axle_force

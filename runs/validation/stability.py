@@ -18,7 +18,6 @@ import numpy as np
 from mpi4py import MPI
 from scipy import linalg, sparse
 
-from tireroad.contact.grid_patch import PointTire
 from tireroad.contact.loop import Drive, roll
 from tireroad.contact.roads.kinds.shapes import Cleat, Flat, StepRoad
 from tireroad.contact.solver.active_set import ActiveSet
@@ -592,7 +591,7 @@ def many_points(steps: int = 150) -> RolledCase:
     )
     solver = ProjectedCG(SpreadCompliance(tire.same_step, weights.tocsr(), kernel))
     drive = Drive(lambda x, y: 0.1 * wavy(x, y), lambda t: 0.0, 20.0)
-    instants = roll(PointTire(tire, weights.tocsr()), solver, fine, drive, step, steps)
+    instants = roll(tire, solver, replace(fine, weights=weights.tocsr()), drive, step, steps)
     return _contact_followed("20,000 points", instants, steps)
 
 

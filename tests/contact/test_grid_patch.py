@@ -8,7 +8,6 @@ from mpi4py import MPI
 
 from tireroad.contact import grid_patch, model
 from tireroad.contact.grid_patch import (
-    PointTire,
     equilibrate,
     halved,
     make_grid_patch,
@@ -16,6 +15,7 @@ from tireroad.contact.grid_patch import (
     thinned,
 )
 from tireroad.contact.model import step_solver
+from tireroad.contact.loop import ContactProblem
 from tireroad.contact.patch import make_patch
 from tireroad.contact.solver.active_set import ActiveSet, UsualSet
 from tireroad.contact.solver.projected_cg import ProjectedCG
@@ -130,38 +130,16 @@ def test_a_patch_clear_of_the_road_settles_without_force(tread) -> None:
     assert not pull.any() and pull.shape == (len(settled.force), 2)
 
 
-@pytest.mark.parametrize("most", [0, 100_000])  # a product, a matrix
-def test_nodes_and_points_exchange_the_same_work(tread, most, monkeypatch) -> None:
-    _, _, patch = patches(tread, 2e-3, 0.004)
-
-    class Tire:
-        comm = MPI.COMM_SELF
-        same_step = 1e-5 * np.eye(len(patch.index))
-        force = None
-
-        def predict(self):
-            return np.linspace(0, 1, len(patch.index))
-
-        def advance(self, force):
-            self.force = force
-
-        def inertia_force(self):
-            return np.zeros(3)
-
-        def snapshot(self):
-            return {}
-
-        def restore(self, state):
-            pass
-
-    tire = Tire()
-    monkeypatch.setattr(grid_patch, "MOST_DENSE", most)
-    on = PointTire(tire, patch.weights)
-    force = np.random.default_rng(0).random(len(patch.points))
-    on.advance(force)
-    assert tire.force.sum() == pytest.approx(force.sum())
-    assert tire.force @ tire.predict() == pytest.approx(force @ on.predict())
-    assert np.allclose(on.same_step @ force, patch.weights @ (1e-5 * tire.force))
+def test_nodes_and_points_exchange_the_same_work(tread) -> None:
+    force, _, patch = patches(tread, 2e-3, 0.004)
+    p = len(patch.index)
+    same_step = 1e-5 * np.eye(p)
+    spec = ContactTable(law=HalfSpace(youngs_modulus=5e6), points=Pitch(0.004, 0.004))
+    problem = ContactProblem(patch, same_step, step_solver(spec, patch, same_step))
+    free, road = np.linspace(0, 1e-3, p), np.zeros(len(patch.points))
+    pushed = problem.commit(problem.solve(road, None, None, free), None)
+    assert pushed.sum() == pytest.approx(problem.at_points.sum())
+    assert pushed @ free == pytest.approx(problem.at_points @ (patch.weights @ free))
 
 
 def test_every_other_point_is_a_grid_of_twice_the_pitch(tread) -> None:

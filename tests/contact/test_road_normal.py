@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import tireroad as tr
-from tireroad.contact.loop import RoadNormal
 from tireroad.contact.roads.cell_mean import CellMean
 
 Y = np.array([-0.02, 0.0, 0.01])
@@ -18,23 +17,6 @@ class Given:
 
     def __init__(self, height) -> None:
         self.height = height
-
-
-def test_a_slope_turns_the_force() -> None:
-    """To first order in the slope, what is added leaves the force along the normal and the pull in
-    the road's plane."""
-    slope, force = np.array([[0.01, -0.02], [0.0, 0.03]]), np.array([100.0, 50.0])
-    pull = np.array([[30.0, 0.0], [0.0, -20.0]])
-    normal = RoadNormal(2)
-    assert not normal.added(slope).any()
-    vertical, x, y = normal.settle(slope, force, pull).reshape(3, 2)
-    assert np.allclose([x, y], -force * slope.T)
-    assert np.allclose(vertical, [0.3, -0.6])
-    assert np.array_equal(normal.added(slope), normal.settle(slope, force, pull))
-    again = RoadNormal(2)
-    again.set_state(normal.state())
-    assert np.array_equal(again.added(slope), normal.added(slope))
-    assert not normal.added(None).any()
 
 
 def test_slopes_of_a_plane_are_exact() -> None:

@@ -8,7 +8,7 @@ import pytest
 from mpi4py import MPI
 from scipy import sparse
 
-from tireroad.contact.loop import RoadNormal, roll
+from tireroad.contact.loop import roll
 from tireroad.contact.model import step_solver
 from tireroad.contact.results.spectra import amplitudes
 from tireroad.contact.roads.road import make_road
@@ -96,8 +96,7 @@ def test_the_chain_gives_what_the_program_gives(tire, tmp_path, launch) -> None:
     tread = SimpleNamespace(law=HalfSpace(youngs_modulus=2e7), solver="active-set")
     count = len(setup.patch.points)
     solver = step_solver(tread, setup.patch, march.same_step[:, :count])
-    normal = RoadNormal(count)
-    steps = list(roll(march, solver, setup.patch, setup.drive, STEP, 200, normal=normal))
+    steps = list(roll(march, solver, setup.patch, setup.drive, STEP, 200))
     force = np.array([[*step.horizontal.sum(axis=0), step.force.sum()] for step in steps])
     frequency, spectrum = amplitudes(force, STEP)
 

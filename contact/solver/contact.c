@@ -1,0 +1,1075 @@
+/* The contact of one time step: unilateral contact by active sets, stick and slip of the touching points, both
+   in turn. contact/solver/active_set.py and stick_slip.py have the equations and their sources. */
+#include "products.h"
+
+// for Python
+typedef struct {
+    void *dgetrf, *dgetrs;
+} blas;
+extern blas linked;
+
+enum { SOLVED, SINGULAR, NO_SET, NOT_FINITE, UNSOLVED, REFUSED };
+
+/* f >= 0, g = A (f - f_ref) + q >= 0, f . g = 0 for a matrix A (n, n), stored by rows and by columns. */
+typedef struct {
+    int n;
+    const double *rows, *columns, *diagonal;
+    double *signs, *signs_before, *gap;   /* of the last two solutions; f diag(A) - g, and g */
+    uint8_t *active, *base;               /* touching; factorised */
+    int again;                            /* whether the last solution is of the same step */
+    double residual, penetration;
+    long iterations, factorisations;
+    struct factor *factor;
+} active_set;
+
+int active_set_begin(active_set *s);
+void active_set_end(active_set *s);
+int active_set_refactor(active_set *s);
+int active_set_solve(active_set *s, const double *q, const uint8_t *guess, const double *reference, double *force);
+
+/* What moves in the plane of the road, and away from it, under forces in the plane and normal to it: the tire
+   between its nodes, and the tread between the points. In arrays (2, n), those of all x come before those of all y. */
+typedef struct {
+    int points, nodes;
+    const int *w_begin, *w_column, *t_begin, *t_column;  /* W (c, p) from nodes to points, and its transpose */
+    const double *w_value, *t_value;
+    const double *zh, *hz, *hh;           /* by columns: (2p, p), (p, 2p), (2p, 2p); zh, hz may be 0 */
+    int tread;                            /* RIGID, GRID or MATRIX */
+    int coupled;                          /* whether pressure shears it */
+    const double *kernel[5];              /* xx, xy, yy, zx, zy: (2 nx - 1, 2 ny - 1) of the grid, or (c, c) */
+    int nx, ny;
+    const int *row, *column;              /* (c,) of each point in the grid */
+    struct plane_work *work;
+} plane;
+
+enum { RIGID, GRID, MATRIX };
+
+int plane_begin(plane *s);
+void plane_end(plane *s);
+void plane_shear(plane *s, const double *force, double *moved);
+void plane_lift(plane *s, const double *force, double *moved);
+void plane_drag(plane *s, const double *force, double *moved);
+void tread_drag(plane *s, const double *force, double *moved);
+
+/* Tangential forces t: B t + c = 0 within the bounds, against the slip on them, at `count` of the points. */
+typedef struct {
+    plane *compliance;
+    int count;
+    const int *index;                     /* (count,) points */
+    const double *spring;                 /* (count,) m/N in series */
+    const double *inverse;                /* (count,) N/m, of B's diagonal */
+    const double *constant, *bound;       /* (2, count) m; (count,) N, infinite where nothing slips */
+    double *force;                        /* (2, count) N: guess, then solution */
+    double off, largest;                  /* residual, and the largest bound or force, N */
+    double norm;                          /* an upper bound of the largest singular value of B, m/N */
+    long products;
+} stick_slip;
+
+int stick_slip_take(stick_slip *s);
+int stick_slip_improve(stick_slip *s);
+int stick_slip_solve(stick_slip *s, double tolerance);
+int krylov(int n, int (*apply)(void *, const double *, double *), void *of, const double *right, double tolerance,
+           double *x);
+
+typedef int (*normal_solver)(void *of, const double *q, const uint8_t *guess, const double *reference, double *force);
+
+/* A brush on the tire: normal and tangential forces of a step. */
+typedef struct {
+    plane *compliance;
+    int spring_kind;                      /* springs fixed at the points */
+    double friction;                      /* negative: nothing slips */
+    double tolerance, way;
+    const double *stiffness, *slip;       /* (c,) N/m; (2, c) m a step */
+    const double *own;                    /* (c,) m/N: the compliance's diagonal, mean of both directions */
+    const int *u_begin, *u_column, *ahead;  /* what lies one step upstream, and the next point ahead */
+    const double *u_value, *pitches;
+    const double *pressed;                /* (c,) N: normal forces from which pressure shears the tread, or 0 */
+    double norm;
+    double *deflection, *moved;           /* (2, c) m of the bristles and their bases, one step ago */
+    uint8_t *touched;
+    double *horizontal, *before;          /* (2, c) N of the last two steps */
+    long turns, products, all_turns;      /* of the last step; of all steps */
+    struct brush_work *work;
+} brush;
+
+int brush_begin(brush *s);
+void brush_end(brush *s);
+int brush_solve(brush *s, normal_solver solve, void *of, const double *q, const uint8_t *guess, const double *at_rest,
+                const double *free, double *force);
+int active_set_normal(void *of, const double *q, const uint8_t *guess, const double *reference, double *force);
+
+/* Tire at its nodes and contact at the points: what a step needs before and after its solution. */
+typedef struct {
+    int points, nodes, seen, pushed, leans;  /* seen, pushed: components 1 or 3 of displacements and forces */
+    const int *w_begin, *w_column, *t_begin, *t_column;
+    const double *w_value, *t_value;
+    const double *answer;                 /* (k, r): same-step displacement of all nodes, by columns */
+    int answer_rows;
+    const double *gap0, *at_rest, *rest;  /* (c,) m, N; (2, c) N of a static state with friction, or 0 */
+    double *normal_force, *tangential;    /* (c,), (2, c) N of the last step: what leans predicts from */
+    double *q, *free;                     /* (c,) m, (2, c) m: gaps at rest forces; displacements in the plane */
+    double *vertical, *horizontal;        /* (c,), (2, c) N on the tire */
+    double *change, *nodal;               /* (pushed c,) and (pushed p,) N from the static state */
+    double *resultant;                    /* (3,) N */
+    double *lifted, *added;               /* workspace: (r,), (3 c,) */
+    int *which; double *value;            /* workspace: (k,) */
+} meeting;
+
+void meeting_prepare(meeting *s, const double *moved, const double *road, const double *slope, const double *tread);
+void meeting_conclude(meeting *s, const double *force, const double *tangential, const double *slope);
+// end
+
+typedef void (*getrf)(int *, int *, double *, int *, int *, int *);
+typedef void (*getrs)(char *, int *, int *, const double *, int *, const int *, double *, int *, int *);
+blas linked;
+
+static void *room(size_t count, size_t size) {
+    void *found = calloc(count ? count : 1, size);
+    if (!found) abort();
+    return found;
+}
+#define DOUBLES(n) ((double *)room((n), sizeof(double)))
+#define INTS(n) ((int *)room((n), sizeof(int)))
+
+/* ---- Unilateral contact -------------------------------------------------------------------------------------- */
+
+/* A_NN x = r for a touching set N that differs by k points from the factorised set B: bordered by them. */
+struct factor {
+    int members, changes, entered, count;
+    int *member, *enter, *leave, *pivots, *turns, *index, *place;
+    double *lu, *columns, *rows, *schur, *whole, *rest, *inner, *change, *value, *right, *force, *gap;
+    int *which;
+    uint8_t *set, *trial;
+    int known;                            /* whether `set` has been prepared */
+};
+
+enum { SHARE = 16, FEWEST_CHANGES = 4, PATIENCE = 10 };
+static const double ROUNDING = 1e-12;
+
+int active_set_begin(active_set *s) {
+    const int n = s->n;
+    struct factor *f = s->factor = room(1, sizeof *f);
+    int **ints[] = {&f->member, &f->enter, &f->leave, &f->pivots, &f->turns, &f->index, &f->place, &f->which};
+    for (int i = 0; i < 8; i++) *ints[i] = INTS(n);
+    double **doubles[] = {&f->whole, &f->rest, &f->inner, &f->change, &f->value, &f->right, &f->force, &f->gap};
+    for (int i = 0; i < 8; i++) *doubles[i] = DOUBLES(n);
+    const int k = n / SHARE + FEWEST_CHANGES;
+    f->lu = DOUBLES((size_t)n * n);
+    f->columns = DOUBLES((size_t)n * k), f->rows = DOUBLES((size_t)n * k), f->schur = DOUBLES((size_t)k * k);
+    f->set = room(n, 1), f->trial = room(n, 1);
+    return SOLVED;
+}
+
+void active_set_end(active_set *s) {
+    struct factor *f = s->factor;
+    void *all[] = {f->member, f->enter, f->leave, f->pivots, f->turns, f->index, f->place, f->which, f->whole,
+                   f->rest, f->inner, f->change, f->value, f->right, f->force, f->gap, f->lu, f->columns, f->rows,
+                   f->schur, f->set, f->trial, f};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++) free(all[i]);
+}
+
+/* Factorise A between the points of `base`. */
+static int factorise(active_set *s) {
+    struct factor *f = s->factor;
+    const int n = s->n;
+    f->members = f->changes = f->known = 0;
+    for (int i = 0; i < n; i++)
+        if (s->base[i]) f->place[i] = f->members, f->member[f->members++] = i;
+    const int b = f->members;
+    s->factorisations++;
+    for (int j = 0; j < b; j++) {
+        const double *column = s->columns + (size_t)f->member[j] * n;
+        for (int i = 0; i < b; i++) f->lu[(size_t)j * b + i] = column[f->member[i]];
+    }
+    int size = b, info = 0;
+    if (b) ((getrf)linked.dgetrf)(&size, &size, f->lu, &size, f->pivots, &info);
+    if (info) f->members = 0;
+    return info ? SINGULAR : SOLVED;
+}
+
+/* The Schur complement of the points that entered and left the factorised set. */
+static int border(active_set *s, const uint8_t *active) {
+    struct factor *f = s->factor;
+    const int n = s->n;
+    int b = f->members, left = 0, info = 0;
+    f->entered = 0;
+    for (int i = 0; i < n; i++)
+        if (active[i] != s->base[i]) {
+            if (active[i]) f->enter[f->entered++] = i;
+            else f->leave[left++] = i;
+        }
+    int k = f->changes = f->entered + left;
+    if (!k) return SOLVED;
+    memset(f->columns, 0, sizeof(double) * b * k), memset(f->rows, 0, sizeof(double) * b * k);
+    for (int j = 0; j < f->entered; j++) {
+        const double *column = s->columns + (size_t)f->enter[j] * n, *row = s->rows + (size_t)f->enter[j] * n;
+        for (int i = 0; i < b; i++) f->columns[(size_t)j * b + i] = column[f->member[i]];
+        for (int i = 0; i < b; i++) f->rows[(size_t)j * b + i] = row[f->member[i]];
+    }
+    for (int j = 0; j < left; j++) f->columns[(size_t)(f->entered + j) * b + f->place[f->leave[j]]] = 1.0;
+    ((getrs)linked.dgetrs)("N", &b, &k, f->lu, &b, f->pivots, f->columns, &b, &info);
+    for (int j = 0; j < k; j++) {
+        const double *column = f->columns + (size_t)j * b;
+        for (int i = 0; i < k; i++) {
+            const int own = i < f->entered;
+            double sum = own ? dot(b, f->rows + (size_t)i * b, column) : column[f->place[f->leave[i - f->entered]]];
+            if (own && j < f->entered) sum -= s->columns[(size_t)f->enter[j] * n + f->enter[i]];
+            f->schur[(size_t)j * k + i] = -sum;
+        }
+    }
+    ((getrf)linked.dgetrf)(&k, &k, f->schur, &k, f->turns, &info);
+    if (info) f->members = 0;
+    return info ? SINGULAR : SOLVED;
+}
+
+/* Prepare for a touching set. */
+static int prepare(active_set *s, const uint8_t *active) {
+    struct factor *f = s->factor;
+    const int n = s->n;
+    if (f->known && !memcmp(f->set, active, n)) return SOLVED;
+    f->known = f->count = 0;
+    int changes = 0, failed;
+    for (int i = 0; i < n; i++) {
+        if (active[i]) f->index[f->count++] = i;
+        changes += active[i] != s->base[i];
+    }
+    if (changes > f->members / SHARE + FEWEST_CHANGES || !f->members) {
+        memcpy(s->base, active, n);
+        failed = factorise(s);
+    } else
+        failed = border(s, active);
+    if (failed) return failed;
+    memcpy(f->set, active, n);
+    f->known = 1;
+    return SOLVED;
+}
+
+int active_set_refactor(active_set *s) {
+    int failed = factorise(s);
+    if (failed) return failed;
+    struct factor *f = s->factor;
+    memcpy(f->set, s->base, s->n);
+    memcpy(f->index, f->member, f->members * sizeof(int));
+    f->count = f->members, f->known = 1;
+    return SOLVED;
+}
+
+/* x (n,) on the touching points: the right side becomes the solution. */
+static void solve_factor(struct factor *f, double *x) {
+    int one = 1, info, b = f->members, k = f->changes;
+    if (!k) {
+        for (int i = 0; i < b; i++) f->inner[i] = x[f->member[i]];
+        if (b) ((getrs)linked.dgetrs)("N", &b, &one, f->lu, &b, f->pivots, f->inner, &b, &info);
+        for (int i = 0; i < b; i++) x[f->member[i]] = f->inner[i];
+        return;
+    }
+    for (int i = 0; i < b; i++) f->inner[i] = f->set[f->member[i]] ? x[f->member[i]] : 0.0;
+    ((getrs)linked.dgetrs)("N", &b, &one, f->lu, &b, f->pivots, f->inner, &b, &info);
+    for (int i = 0; i < k; i++)
+        f->rest[i] = i < f->entered ? x[f->enter[i]] - dot(b, f->rows + (size_t)i * b, f->inner)
+                                    : -f->inner[f->place[f->leave[i - f->entered]]];
+    ((getrs)linked.dgetrs)("N", &k, &one, f->schur, &k, f->turns, f->rest, &k, &info);
+    for (int j = 0; j < k; j++) {
+        const double *restrict column = f->columns + (size_t)j * b, share = f->rest[j];
+        double *restrict inner = f->inner;
+        for (int i = 0; i < b; i++) inner[i] -= share * column[i];
+    }
+    for (int i = 0; i < b; i++)
+        if (f->set[f->member[i]]) x[f->member[i]] = f->inner[i];
+    for (int j = 0; j < f->entered; j++) x[f->enter[j]] = f->rest[j];
+}
+
+/* Forces and gaps where exactly the active points touch: g = 0 there, f = 0 elsewhere. */
+static void touch(active_set *s, const uint8_t *active, const double *q, const double *reference, double *force,
+                  double *gap) {
+    struct factor *f = s->factor;
+    const int n = s->n;
+    int lifted = 0;
+    memset(f->change, 0, n * sizeof(double));
+    if (reference)
+        for (int i = 0; i < n; i++)
+            if (!active[i] && reference[i] != 0.0) {
+                f->which[lifted] = i, f->value[lifted++] = reference[i];
+                f->change[i] = -reference[i];
+            }
+    if (lifted) {
+        memset(f->right, 0, n * sizeof(double));
+        add_columns(n, s->columns, lifted, f->which, f->value, f->right);
+    }
+    for (int t = 0; t < f->count; t++) {
+        const int i = f->index[t];
+        f->change[i] = -q[i] + (lifted ? f->right[i] : 0.0);
+    }
+    solve_factor(f, f->change);
+    memcpy(gap, q, n * sizeof(double));
+    add_columns(n, s->columns, nonzero(n, f->change, f->which, f->value), f->which, f->value, gap);
+    for (int i = 0; i < n; i++) force[i] = active[i] ? (reference ? reference[i] : 0.0) + f->change[i] : 0.0;
+}
+
+int active_set_solve(active_set *s, const double *q, const uint8_t *guess, const double *reference, double *force) {
+    struct factor *f = s->factor;
+    const int n = s->n;
+    const double *d = s->diagonal;
+    double *gap = f->gap, most = 0.0, widest = largest(n, d);
+    uint8_t *active = f->trial;
+    for (int i = 0; i < n; i++) {
+        if (!isfinite(q[i])) return NOT_FINITE;
+        most = fmax(most, fabs(q[i]));
+        /* Without points about to lift off and with those about to touch: right in four steps of five. */
+        const double ahead = 2.0 * s->signs[i] - s->signs_before[i];
+        active[i] = guess ? guess[i] : ahead > 0.0 || (ahead == 0.0 && s->active[i]);
+    }
+    int best = n + 1, patience = PATIENCE, failed;
+    for (s->iterations = 1; s->iterations < 20L * n + 100; s->iterations++) {
+        if ((failed = prepare(s, active))) return failed;
+        touch(s, active, q, reference, force, gap);
+        const double scale = most + widest * largest(n, force), least = -ROUNDING * scale;
+        int wrong = 0, last = 0;
+        for (int i = 0; i < n; i++)
+            if ((active[i] ? force[i] * d[i] : gap[i]) < least) wrong++, last = i;
+        if (!wrong) {
+            double worst = 0.0, deepest = 0.0;
+            for (int i = 0; i < n; i++) {
+                force[i] = fmax(force[i], 0.0);
+                worst = fmax(worst, fabs(fmin(force[i] * d[i], gap[i])));
+                deepest = fmin(deepest, gap[i]);
+                if (active[i]) gap[i] = 0.0;
+                if (!s->again) s->signs_before[i] = s->signs[i];
+                s->signs[i] = force[i] * d[i] - gap[i];
+            }
+            s->residual = scale > 0.0 ? worst / scale : worst;
+            s->penetration = -deepest;
+            memcpy(s->active, active, n), memcpy(s->gap, gap, n * sizeof(double));
+            return isfinite(s->residual) ? SOLVED : NOT_FINITE;
+        }
+        if (wrong < best) best = wrong, patience = PATIENCE;
+        else patience--;
+        if (patience < 0) active[last] ^= 1; /* Murty's rule: finite for every P-matrix */
+        else
+            for (int i = 0; i < n; i++)
+                if ((active[i] ? force[i] * d[i] : gap[i]) < least) active[i] ^= 1;
+    }
+    return NO_SET;
+}
+
+int active_set_normal(void *of, const double *q, const uint8_t *guess, const double *reference, double *force) {
+    return active_set_solve(of, q, guess, reference, force);
+}
+
+/* ---- Displacements in the plane and away from it --------------------------------------------------------------- */
+
+struct plane_work {
+    double *nodal, *nodes, *value, *field, *given, *compact;
+    int *which, *first, *last, *some, *carried;
+    uint8_t *bears, *kept;
+    int carriers;                         /* nodes between which `compact` (2m, 2m) has hh */
+};
+
+int plane_begin(plane *s) {
+    const int p = s->nodes, c = s->points, most = p > c ? p : c;
+    struct plane_work *w = s->work = room(1, sizeof *w);
+    w->nodal = DOUBLES(2 * p), w->nodes = DOUBLES(2 * p), w->value = DOUBLES(2 * most), w->given = DOUBLES(2 * c);
+    w->field = DOUBLES(2 * (size_t)s->nx * s->ny), w->compact = DOUBLES(4 * (size_t)p * p);
+    w->which = INTS(2 * most), w->first = INTS(s->nx), w->last = INTS(s->nx), w->some = INTS(c);
+    w->carried = INTS(p), w->bears = room(p, 1), w->kept = room(p, 1);
+    return SOLVED;
+}
+
+void plane_end(plane *s) {
+    struct plane_work *w = s->work;
+    void *all[] = {w->nodal, w->nodes, w->value, w->given, w->field, w->compact, w->which, w->first, w->last, w->some,
+                   w->carried, w->bears, w->kept, w};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++) free(all[i]);
+}
+
+static void to_nodes(const plane *s, const double *points, double *nodes) {
+    sparse down = {s->nodes, s->t_begin, s->t_column, s->t_value};
+    multiply(&down, points, nodes);
+}
+
+static void to_points(const plane *s, const double *nodes, double *points) {
+    sparse up = {s->points, s->w_begin, s->w_column, s->w_value};
+    multiply(&up, nodes, points);
+}
+
+/* The columns j0 to j1 of the outputs on each row of the grid, from the points at which they are read. */
+static void bounds(const plane *s, int count, const int *index) {
+    struct plane_work *w = s->work;
+    for (int i = 0; i < s->nx; i++) w->first[i] = s->ny, w->last[i] = -1;
+    for (int a = 0; a < count; a++) {
+        const int i = s->row[index[a]], j = s->column[index[a]];
+        if (j < w->first[i]) w->first[i] = j;
+        if (j > w->last[i]) w->last[i] = j;
+    }
+}
+
+/* On the grid, between `bounds`: out (m, nx, ny) += sum over forces of kernel times force; k kernels in pairs. */
+static void spread(const plane *s, int count, const int *index, const double *fx, const double *fy,
+                   const double *kernel0, const double *kernel1, const double *kernel2, double *ux, double *uy) {
+    const struct plane_work *w = s->work;
+    const int wide = 2 * s->ny - 1;
+    for (int i = 0; i < s->nx; i++) {
+        const int low = w->first[i], n = w->last[i] - low + 1;
+        if (n <= 0) continue;
+        double *restrict x = ux + (size_t)i * s->ny + low, *restrict y = uy ? uy + (size_t)i * s->ny + low : 0;
+        for (int a = 0; a < count; a++) {
+            const int point = index[a];
+            const double p = fx[a], q = fy ? fy[a] : 0.0;
+            if (p == 0.0 && q == 0.0) continue;
+            const size_t at = (size_t)(i - s->row[point] + s->nx - 1) * wide + (s->ny - 1 - s->column[point] + low);
+            const double *restrict k0 = kernel0 + at, *restrict k1 = kernel1 ? kernel1 + at : 0;
+            const double *restrict k2 = kernel2 ? kernel2 + at : 0;
+            if (k2) /* both components of both */
+                for (int j = 0; j < n; j++) x[j] += k0[j] * p + k1[j] * q, y[j] += k1[j] * p + k2[j] * q;
+            else if (fy) /* one of both */
+                for (int j = 0; j < n; j++) x[j] += k0[j] * p + k1[j] * q;
+            else /* both of one */
+                for (int j = 0; j < n; j++) x[j] += k0[j] * p, y[j] += k1[j] * p;
+        }
+    }
+}
+
+/* moved (2, count) += the tread's displacements in the plane under forces (2, count), between the points `index`. */
+static void shear_tread(plane *s, int count, const int *index, const double *force, double *moved) {
+    struct plane_work *w = s->work;
+    const double *x = force, *y = force + count;
+    if (s->tread == GRID) {
+        const size_t cells = (size_t)s->nx * s->ny;
+        bounds(s, count, index);
+        memset(w->field, 0, 2 * cells * sizeof(double));
+        spread(s, count, index, x, y, s->kernel[0], s->kernel[1], s->kernel[2], w->field, w->field + cells);
+        for (int a = 0; a < count; a++) {
+            const size_t at = (size_t)s->row[index[a]] * s->ny + s->column[index[a]];
+            moved[a] += w->field[at], moved[count + a] += w->field[cells + at];
+        }
+    } else if (s->tread == MATRIX)
+        for (int a = 0; a < count; a++) {
+            const size_t at = (size_t)index[a] * s->points;
+            const double *xx = s->kernel[0] + at, *xy = s->kernel[1] + at, *yy = s->kernel[2] + at;
+            double across = 0.0, along = 0.0;
+            for (int b = 0; b < count; b++) {
+                const int j = index[b];
+                along += xx[j] * x[b] + xy[j] * y[b], across += xy[j] * x[b] + yy[j] * y[b];
+            }
+            moved[a] += along, moved[count + a] += across;
+        }
+}
+
+/* hh between the nodes that carry some points, kept while it has all of them and not twice as many. */
+static void carry(plane *s, int count, const int *index) {
+    struct plane_work *w = s->work;
+    const int p = s->nodes;
+    int needed = 0, lacking = 0;
+    memset(w->bears, 0, p);
+    for (int a = 0; a < count; a++)
+        for (int k = s->w_begin[index[a]]; k < s->w_begin[index[a] + 1]; k++) w->bears[s->w_column[k]] = 1;
+    for (int k = 0; k < p; k++) needed += w->bears[k], lacking += w->bears[k] && !w->kept[k];
+    if (!lacking && w->carriers <= 2 * needed) return;
+    memcpy(w->kept, w->bears, p);
+    int m = 0;
+    for (int k = 0; k < p; k++)
+        if (w->kept[k]) w->carried[m++] = k;
+    w->carriers = m;
+    for (int j = 0; j < 2 * m; j++) {
+        const double *from = s->hh + (size_t)(w->carried[j % m] + (j / m) * p) * 2 * p;
+        double *to = w->compact + (size_t)j * 2 * m;
+        for (int i = 0; i < m; i++) to[i] = from[w->carried[i]], to[m + i] = from[p + w->carried[i]];
+    }
+}
+
+/* moved (2, count) = the displacements in the plane between some points; after `carry` of these. */
+static void shear_some(plane *s, int count, const int *index, const double *force, double *moved) {
+    struct plane_work *w = s->work;
+    const int m = w->carriers, p = s->nodes;
+    double *down = w->nodal, *up = w->nodes;
+    for (int d = 0; d < 2; d++) { /* to all nodes, then side by side to those that carry */
+        double *full = w->value;
+        memset(full, 0, p * sizeof(double));
+        for (int a = 0; a < count; a++)
+            for (int k = s->w_begin[index[a]]; k < s->w_begin[index[a] + 1]; k++)
+                full[s->w_column[k]] += s->w_value[k] * force[d * count + a];
+        for (int i = 0; i < m; i++) down[d * m + i] = full[w->carried[i]];
+    }
+    memset(up, 0, 2 * m * sizeof(double));
+    add_columns(2 * m, w->compact, nonzero(2 * m, down, w->which, w->value), w->which, w->value, up);
+    for (int d = 0; d < 2; d++) {
+        double *full = w->value;
+        for (int i = 0; i < m; i++) full[w->carried[i]] = up[d * m + i];
+        for (int a = 0; a < count; a++) {
+            double sum = 0.0;
+            for (int k = s->w_begin[index[a]]; k < s->w_begin[index[a] + 1]; k++)
+                sum += s->w_value[k] * full[s->w_column[k]];
+            moved[d * count + a] = sum;
+        }
+    }
+    shear_tread(s, count, index, force, moved);
+}
+
+/* The points with a force, and their forces side by side in `given`. */
+static int loaded(plane *s, const double *force, int components) {
+    struct plane_work *w = s->work;
+    const int c = s->points;
+    int count = 0;
+    for (int i = 0; i < c; i++)
+        if (force[i] != 0.0 || (components == 2 && force[c + i] != 0.0)) w->some[count++] = i;
+    for (int d = 0; d < components; d++)
+        for (int a = 0; a < count; a++) w->given[d * count + a] = force[d * c + w->some[a]];
+    return count;
+}
+
+static void every_cell(plane *s) {
+    for (int i = 0; i < s->nx; i++) s->work->first[i] = 0, s->work->last[i] = s->ny - 1;
+}
+
+/* moved (2, c) = the displacements in the plane of all points under forces in the plane (2, c). */
+void plane_shear(plane *s, const double *force, double *moved) {
+    struct plane_work *w = s->work;
+    const int c = s->points, p = s->nodes;
+    for (int d = 0; d < 2; d++) to_nodes(s, force + d * c, w->nodal + d * p);
+    memset(w->nodes, 0, 2 * p * sizeof(double));
+    add_columns(2 * p, s->hh, nonzero(2 * p, w->nodal, w->which, w->value), w->which, w->value, w->nodes);
+    for (int d = 0; d < 2; d++) to_points(s, w->nodes + d * p, moved + d * c);
+    if (s->tread == RIGID) return;
+    const int count = loaded(s, force, 2);
+    if (s->tread == GRID) {
+        const size_t cells = (size_t)s->nx * s->ny;
+        every_cell(s);
+        memset(w->field, 0, 2 * cells * sizeof(double));
+        spread(s, count, w->some, w->given, w->given + count, s->kernel[0], s->kernel[1], s->kernel[2], w->field,
+               w->field + cells);
+        for (int i = 0; i < c; i++) {
+            const size_t at = (size_t)s->row[i] * s->ny + s->column[i];
+            moved[i] += w->field[at], moved[c + i] += w->field[cells + at];
+        }
+    } else
+        for (int i = 0; i < c; i++)
+            for (int a = 0; a < count; a++) {
+                const size_t at = (size_t)i * c + w->some[a];
+                const double x = w->given[a], y = w->given[count + a];
+                moved[i] += s->kernel[0][at] * x + s->kernel[1][at] * y;
+                moved[c + i] += s->kernel[1][at] * x + s->kernel[2][at] * y;
+            }
+}
+
+/* moved (c,) = the displacements away from the road under forces in the plane (2, c). */
+void plane_lift(plane *s, const double *force, double *moved) {
+    struct plane_work *w = s->work;
+    const int c = s->points, p = s->nodes;
+    for (int d = 0; d < 2; d++) to_nodes(s, force + d * c, w->nodal + d * p);
+    memset(w->nodes, 0, p * sizeof(double));
+    if (s->zh) add_columns(p, s->zh, nonzero(2 * p, w->nodal, w->which, w->value), w->which, w->value, w->nodes);
+    to_points(s, w->nodes, moved);
+    if (s->tread == RIGID || !s->coupled) return;
+    const int count = loaded(s, force, 2);
+    if (s->tread == GRID) {
+        every_cell(s);
+        memset(w->field, 0, (size_t)s->nx * s->ny * sizeof(double));
+        spread(s, count, w->some, w->given, w->given + count, s->kernel[3], s->kernel[4], 0, w->field, 0);
+        for (int i = 0; i < c; i++) moved[i] += w->field[(size_t)s->row[i] * s->ny + s->column[i]];
+    } else
+        for (int i = 0; i < c; i++)
+            for (int a = 0; a < count; a++) {
+                const size_t at = (size_t)i * c + w->some[a];
+                moved[i] += s->kernel[3][at] * w->given[a] + s->kernel[4][at] * w->given[count + a];
+            }
+}
+
+/* moved (2, c) += the tread's displacements in the plane under normal forces (c,). */
+void tread_drag(plane *s, const double *force, double *moved) {
+    struct plane_work *w = s->work;
+    const int c = s->points;
+    if (s->tread == RIGID || !s->coupled) return;
+    const int count = loaded(s, force, 1);
+    if (s->tread == GRID) {
+        const size_t cells = (size_t)s->nx * s->ny;
+        every_cell(s);
+        memset(w->field, 0, 2 * cells * sizeof(double));
+        spread(s, count, w->some, w->given, 0, s->kernel[3], s->kernel[4], 0, w->field, w->field + cells);
+        for (int i = 0; i < c; i++) {
+            const size_t at = (size_t)s->row[i] * s->ny + s->column[i];
+            moved[i] -= w->field[at], moved[c + i] -= w->field[cells + at];
+        }
+    } else
+        for (int i = 0; i < c; i++)
+            for (int a = 0; a < count; a++) {
+                const size_t at = (size_t)i * c + w->some[a];
+                moved[i] -= s->kernel[3][at] * w->given[a], moved[c + i] -= s->kernel[4][at] * w->given[a];
+            }
+}
+
+/* moved (2, c) = the tire's displacements in the plane under normal forces (c,). */
+void plane_drag(plane *s, const double *force, double *moved) {
+    struct plane_work *w = s->work;
+    const int c = s->points, p = s->nodes;
+    to_nodes(s, force, w->nodal);
+    memset(w->nodes, 0, 2 * p * sizeof(double));
+    if (s->hz) add_columns(2 * p, s->hz, nonzero(p, w->nodal, w->which, w->value), w->which, w->value, w->nodes);
+    for (int d = 0; d < 2; d++) to_points(s, w->nodes + d * p, moved + d * c);
+}
+
+/* ---- Stick and slip ---------------------------------------------------------------------------------------------- */
+
+enum { NEWTON_STEPS = 30, GRADIENT_STEPS = 5000, SHORT = 40 };
+static const double INNER = 5e-2; /* residual reduction in a Newton step; which points slip is known no better */
+
+/* x (n,) with |A x - b| <= tolerance |b| by GMRES, in cycles of SHORT steps, at most n steps in all. */
+int krylov(int n, int (*apply)(void *, const double *, double *), void *of, const double *right, double tolerance,
+           double *x) {
+    const int most = n < SHORT ? n : SHORT;
+    double *basis = DOUBLES((size_t)(most + 1) * n), *h = DOUBLES((size_t)(most + 1) * most), *e = DOUBLES(most + 1);
+    double *cosine = DOUBLES(most), *sine = DOUBLES(most);
+    const double size = sqrt(dot(n, right, right));
+    memset(x, 0, n * sizeof(double));
+    int taken = 0, first = 1;
+    while (size > 0.0 && taken < 2 * n + SHORT) {
+        double *r = basis;
+        if (first) memcpy(r, right, n * sizeof(double));
+        else {
+            apply(of, x, r);
+            for (int i = 0; i < n; i++) r[i] = right[i] - r[i];
+        }
+        first = 0;
+        const double begun = sqrt(dot(n, r, r));
+        if (!(begun > tolerance * size)) break;
+        for (int i = 0; i < n; i++) r[i] /= begun;
+        memset(e, 0, (most + 1) * sizeof(double));
+        e[0] = begun;
+        int k = 0, done = 0;
+        for (; k < most && !done; k++) {
+            double *v = basis + (size_t)k * n, *w = v + n, *column = h + (size_t)k * (most + 1);
+            apply(of, v, w);
+            taken++;
+            for (int l = 0; l <= k; l++) {
+                const double *u = basis + (size_t)l * n, part = column[l] = dot(n, u, w);
+                for (int i = 0; i < n; i++) w[i] -= part * u[i];
+            }
+            const double length = column[k + 1] = sqrt(dot(n, w, w));
+            if (length > 0.0)
+                for (int i = 0; i < n; i++) w[i] /= length;
+            for (int l = 0; l < k; l++) {
+                const double a = column[l], b = column[l + 1];
+                column[l] = cosine[l] * a + sine[l] * b, column[l + 1] = -sine[l] * a + cosine[l] * b;
+            }
+            const double a = column[k], b = column[k + 1], radius = hypot(a, b);
+            cosine[k] = radius > 0.0 ? a / radius : 1.0, sine[k] = radius > 0.0 ? b / radius : 0.0;
+            column[k] = radius, column[k + 1] = 0.0;
+            e[k + 1] = -sine[k] * e[k], e[k] *= cosine[k];
+            done = !(fabs(e[k + 1]) > tolerance * size) || length == 0.0;
+        }
+        for (int l = k - 1; l >= 0; l--) {
+            double sum = e[l];
+            for (int m = l + 1; m < k; m++) sum -= h[(size_t)m * (most + 1) + l] * e[m];
+            e[l] = h[(size_t)l * (most + 1) + l] != 0.0 ? sum / h[(size_t)l * (most + 1) + l] : 0.0;
+        }
+        for (int l = 0; l < k; l++)
+            for (int i = 0; i < n; i++) x[i] += e[l] * basis[(size_t)l * n + i];
+        if (done) break;
+    }
+    free(basis), free(h), free(e), free(cosine), free(sine);
+    return taken;
+}
+
+/* B t (2, a) m for t (2, a) N. */
+static void stiffness(stick_slip *s, const double *force, double *moved) {
+    const int a = s->count;
+    s->products++;
+    shear_some(s->compliance, a, s->index, force, moved);
+    for (int d = 0; d < 2; d++)
+        for (int i = 0; i < a; i++) moved[d * a + i] += s->spring[i] * force[d * a + i];
+}
+
+static void onto_discs(int a, const double *bound, double *force) {
+    for (int i = 0; i < a; i++) {
+        const double length = hypot(force[i], force[a + i]);
+        if (length > bound[i]) force[i] *= bound[i] / length, force[a + i] *= bound[i] / length;
+    }
+}
+
+static double most_force(const stick_slip *s) {
+    double most = 0.0;
+    for (int i = 0; i < s->count; i++) {
+        if (isfinite(s->bound[i])) most = fmax(most, s->bound[i]);
+        most = fmax(most, hypot(s->force[i], s->force[s->count + i]));
+    }
+    return most;
+}
+
+/* The trial forces t - r (B t + c) and the residual t - P(trial) of the present forces. */
+static double residual(stick_slip *s, double *trial, double *off) {
+    const int a = s->count;
+    double worst = 0.0;
+    stiffness(s, s->force, trial);
+    for (int i = 0; i < 2 * a; i++) trial[i] = s->force[i] - s->inverse[i % a] * (trial[i] + s->constant[i]);
+    memcpy(off, trial, 2 * a * sizeof(double));
+    onto_discs(a, s->bound, off);
+    for (int i = 0; i < 2 * a; i++) off[i] = s->force[i] - off[i];
+    for (int i = 0; i < a; i++) worst = fmax(worst, hypot(off[i], off[a + i]));
+    return worst;
+}
+
+/* Take the guess, cut to the bounds: its residual is in `off`. */
+int stick_slip_take(stick_slip *s) {
+    double *trial = DOUBLES(2 * s->count), *off = DOUBLES(2 * s->count);
+    onto_discs(s->count, s->bound, s->force);
+    s->off = residual(s, trial, off);
+    s->largest = most_force(s);
+    free(trial), free(off);
+    return isfinite(s->off) ? SOLVED : NOT_FINITE;
+}
+
+struct newton {
+    stick_slip *problem;
+    double *normal, *share;               /* (2, a), (a,): the projection's derivative b/|t| (I - n n^T) */
+};
+
+static int derivative(void *of, const double *step, double *out) {
+    struct newton *s = of;
+    const int a = s->problem->count;
+    const double *inverse = s->problem->inverse, *n = s->normal;
+    stiffness(s->problem, step, out);
+    for (int i = 0; i < a; i++) {
+        double x = inverse[i] * out[i] - step[i], y = inverse[i] * out[a + i] - step[a + i];
+        const double along = n[i] * x + n[a + i] * y;
+        x -= n[i] * along, y -= n[a + i] * along;
+        out[i] = step[i] + s->share[i] * x, out[a + i] = step[a + i] + s->share[i] * y;
+    }
+    return 0;
+}
+
+/* A semismooth Newton step from the trial forces and their residual: d + P' (r B d - d) = -residual. */
+static void newton_step(stick_slip *s, const double *trial, double *off) {
+    const int a = s->count;
+    double *normal = DOUBLES(2 * a), *share = DOUBLES(a), *step = DOUBLES(2 * a);
+    for (int i = 0; i < a; i++) {
+        const double length = hypot(trial[i], trial[a + i]);
+        const int slips = length > s->bound[i];
+        share[i] = slips ? s->bound[i] / length : 1.0;
+        normal[i] = slips ? trial[i] / length : 0.0, normal[a + i] = slips ? trial[a + i] / length : 0.0;
+    }
+    for (int i = 0; i < 2 * a; i++) off[i] = -off[i];
+    struct newton given = {s, normal, share};
+    krylov(2 * a, derivative, &given, off, INNER, step);
+    for (int i = 0; i < 2 * a; i++) s->force[i] += step[i];
+    free(normal), free(share), free(step);
+}
+
+/* The forces after one Newton step, within the bounds. */
+int stick_slip_improve(stick_slip *s) {
+    double *trial = DOUBLES(2 * s->count), *off = DOUBLES(2 * s->count);
+    residual(s, trial, off);
+    newton_step(s, trial, off);
+    onto_discs(s->count, s->bound, s->force);
+    free(trial), free(off);
+    return SOLVED;
+}
+
+/* Projected gradients with Nesterov's momentum, restarted where it points uphill: slow but safe for symmetric B. */
+static int gradients(stick_slip *s, double tolerance) {
+    const int a = s->count;
+    const double rate = 1.0 / s->norm;
+    double *ahead = DOUBLES(2 * a), *new = DOUBLES(2 * a), *moved = DOUBLES(2 * a), weight = 1.0;
+    int found = UNSOLVED;
+    memcpy(ahead, s->force, 2 * a * sizeof(double));
+    for (int step = 0; step < GRADIENT_STEPS && found != SOLVED; step++) {
+        stiffness(s, ahead, moved);
+        for (int i = 0; i < 2 * a; i++) new[i] = ahead[i] - rate * (moved[i] + s->constant[i]);
+        onto_discs(a, s->bound, new);
+        double worst = 0.0, uphill = 0.0;
+        for (int i = 0; i < 2 * a; i++) {
+            worst = fmax(worst, fabs(new[i] - ahead[i]) * s->inverse[i % a] / rate);
+            uphill += (ahead[i] - new[i]) * (new[i] - s->force[i]);
+        }
+        if (uphill > 0.0) weight = 1.0;
+        const double later = 0.5 + sqrt(0.25 + weight * weight), share = (weight - 1.0) / later;
+        for (int i = 0; i < 2 * a; i++) ahead[i] = new[i] + share * (new[i] - s->force[i]);
+        memcpy(s->force, new, 2 * a * sizeof(double));
+        weight = later;
+        if (worst <= tolerance * most_force(s)) found = SOLVED;
+    }
+    free(ahead), free(new), free(moved);
+    return found;
+}
+
+/* The forces to `tolerance` of the largest, by Newton; where it cycles by projected gradients. */
+int stick_slip_solve(stick_slip *s, double tolerance) {
+    const int a = s->count;
+    double *trial = DOUBLES(2 * a), *off = DOUBLES(2 * a), *begun = DOUBLES(2 * a);
+    int found = UNSOLVED;
+    memcpy(begun, s->force, 2 * a * sizeof(double));
+    for (int step = 0; step < NEWTON_STEPS; step++) {
+        s->off = residual(s, trial, off);
+        s->largest = most_force(s);
+        if (s->off <= tolerance * s->largest) {
+            found = SOLVED;
+            break;
+        }
+        newton_step(s, trial, off);
+    }
+    if (found != SOLVED) {
+        memcpy(s->force, begun, 2 * a * sizeof(double));
+        found = gradients(s, tolerance);
+    }
+    onto_discs(a, s->bound, s->force);
+    free(trial), free(off), free(begun);
+    return found;
+}
+
+/* ---- Both in turn -------------------------------------------------------------------------------------------------- */
+
+enum { TURNS = 100, FLAT = 30, MIXED = 4, LIFT_PATIENCE = 10 };
+static const double SLIDING_TOLERANCE = 1e-10;
+
+struct brush_work {
+    double *share, *past, *trial, *given, *moved, *lift, *found, *q, *mixed;
+    double *spring, *inverse, *constant, *bound, *force;
+    double *results[MIXED], *residuals[MIXED];
+    int *index;
+    uint8_t *lifted, *touching, *set;
+};
+
+int brush_begin(brush *s) {
+    const int c = s->compliance->points;
+    struct brush_work *w = s->work = room(1, sizeof *w);
+    double **doubles[] = {&w->share, &w->past, &w->trial, &w->given, &w->moved, &w->lift, &w->found, &w->q,
+                          &w->mixed, &w->spring, &w->inverse, &w->constant, &w->bound, &w->force};
+    for (int i = 0; i < 14; i++) *doubles[i] = DOUBLES(2 * c);
+    for (int i = 0; i < MIXED; i++) w->results[i] = DOUBLES(2 * c), w->residuals[i] = DOUBLES(2 * c);
+    w->index = INTS(c), w->lifted = room(c, 1), w->touching = room(c, 1), w->set = room(c, 1);
+    return SOLVED;
+}
+
+void brush_end(brush *s) {
+    struct brush_work *w = s->work;
+    for (int i = 0; i < MIXED; i++) free(w->results[i]), free(w->residuals[i]);
+    void *all[] = {w->share, w->past, w->trial, w->given, w->moved, w->lift, w->found, w->q, w->mixed, w->spring,
+                   w->inverse, w->constant, w->bound, w->force, w->index, w->lifted, w->touching, w->set, w};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++) free(all[i]);
+}
+
+/* share (c,) and past (2, c) of e = share u + past at the end of the step (contact.tread.brush). */
+static void offer(const brush *s, double *share, double *past) {
+    const int c = s->compliance->points;
+    for (int i = 0; i < c; i++) share[i] = 1.0, past[i] = past[c + i] = 0.0;
+    if (s->spring_kind) return;
+    for (int i = 0; i < c; i++) {
+        double part = 0.0, x = 0.0, y = 0.0;
+        for (int k = s->u_begin[i]; k < s->u_begin[i + 1]; k++) {
+            const int j = s->u_column[k];
+            if (!s->touched[j]) continue;
+            part += s->u_value[k];
+            x += s->u_value[k] * (s->deflection[j] - s->moved[j]);
+            y += s->u_value[k] * (s->deflection[c + j] - s->moved[c + j]);
+        }
+        share[i] = part;
+        past[i] = x + part * s->slip[i], past[c + i] = y + part * s->slip[c + i];
+        const int next = s->ahead[i];
+        if (!(s->touched[i] && !s->touched[next] && s->pitches[i] <= 1.0 + 1e-9 && s->way > 0.0)) continue;
+        const double inside = fmin(2.0 * s->pitches[i], 1.0), travelled = fmin(0.5 / s->pitches[i], 1.0);
+        share[i] = 1.0;
+        for (int d = 0; d < 2 * c; d += c) { /* foremost: bristles enter half a pitch ahead of it */
+            const double edge = 0.5 * (s->moved[d + i] + s->moved[d + next]), own = s->deflection[d + i] - s->moved[d + i];
+            past[d + i] = (1.0 - inside) * own - inside * edge + travelled * s->slip[d + i];
+        }
+    }
+}
+
+/* Anderson's acceleration of t = G(t): the next t from `given` t and `result` G(t); `held` earlier ones are kept. */
+static int mix(brush *s, int held, const double *given, const double *result, double *next) {
+    struct brush_work *w = s->work;
+    const int n = 2 * s->compliance->points;
+    double worst = 0.0, before = 0.0;
+    double *spare = w->mixed;
+    for (int i = 0; i < n; i++) spare[i] = result[i] - given[i], worst = fmax(worst, fabs(spare[i]));
+    if (held) before = largest(n, w->residuals[held - 1]);
+    if (held && worst > before) held = 0;
+    if (held == MIXED) { /* the oldest goes */
+        double *r = w->results[0], *o = w->residuals[0];
+        for (int i = 1; i < MIXED; i++) w->results[i - 1] = w->results[i], w->residuals[i - 1] = w->residuals[i];
+        w->results[MIXED - 1] = r, w->residuals[MIXED - 1] = o;
+        held--;
+    }
+    memcpy(w->results[held], result, n * sizeof(double)), memcpy(w->residuals[held], spare, n * sizeof(double));
+    memcpy(next, result, n * sizeof(double));
+    const double *last = w->residuals[held];
+    /* Least squares of the last residual by its differences to the earlier ones. */
+    double share[MIXED] = {0};
+    double gram[MIXED][MIXED], right[MIXED], size = 0.0;
+    for (int a = 0; a < held; a++) {
+        for (int b = 0; b <= a; b++) {
+            double sum = 0.0;
+            for (int i = 0; i < n; i++) sum += (last[i] - w->residuals[a][i]) * (last[i] - w->residuals[b][i]);
+            gram[a][b] = gram[b][a] = sum;
+        }
+        double sum = 0.0;
+        for (int i = 0; i < n; i++) sum += (last[i] - w->residuals[a][i]) * last[i];
+        right[a] = sum, size = fmax(size, gram[a][a]);
+    }
+    /* Elimination with diagonal pivots; directions below rounding take no share. */
+    uint8_t used[MIXED] = {0};
+    int order[MIXED], rank = 0;
+    for (; rank < held; rank++) {
+        int best = -1;
+        for (int a = 0; a < held; a++)
+            if (!used[a] && (best < 0 || gram[a][a] > gram[best][best])) best = a;
+        if (!(gram[best][best] > 1e-12 * size)) break;
+        used[best] = 1, order[rank] = best;
+        for (int a = 0; a < held; a++) {
+            if (used[a]) continue;
+            const double factor = gram[a][best] / gram[best][best];
+            for (int b = 0; b < held; b++) gram[a][b] -= factor * gram[best][b];
+            right[a] -= factor * right[best];
+        }
+    }
+    for (int k = rank - 1; k >= 0; k--) {
+        const int a = order[k];
+        double sum = right[a];
+        for (int l = k + 1; l < rank; l++) sum -= gram[a][order[l]] * share[order[l]];
+        share[a] = sum / gram[a][a];
+    }
+    for (int a = 0; a < held; a++)
+        if (share[a] != 0.0)
+            for (int i = 0; i < n; i++) next[i] -= share[a] * (result[i] - w->results[a][i]);
+    return held + 1;
+}
+
+/* The points whose bristles bear, and their problem with the normal forces `force`. */
+static stick_slip sticking(brush *s, const double *force) {
+    struct brush_work *w = s->work;
+    const int c = s->compliance->points;
+    int a = 0;
+    for (int i = 0; i < c; i++)
+        if (force[i] > 0.0 && !w->lifted[i] && w->share[i] > 1e-9) w->index[a++] = i;
+    for (int k = 0; k < a; k++) {
+        const int i = w->index[k];
+        w->spring[k] = 1.0 / (s->stiffness[i] * w->share[i]);
+        w->inverse[k] = 1.0 / (s->own[i] + w->spring[k]);
+        w->bound[k] = s->friction < 0.0 ? INFINITY : s->friction * force[i];
+        for (int d = 0; d < 2; d++) w->constant[d * a + k] = w->moved[d * c + i] + w->past[d * c + i] / w->share[i];
+    }
+    carry(s->compliance, a, w->index);
+    stick_slip problem = {s->compliance, a, w->index, w->spring, w->inverse, w->constant, w->bound, w->force};
+    problem.norm = s->norm + (a ? largest(a, w->spring) : 0.0);
+    return problem;
+}
+
+int brush_solve(brush *s, normal_solver solve, void *of, const double *q, const uint8_t *guess, const double *at_rest,
+                const double *free, double *force) {
+    struct brush_work *w = s->work;
+    plane *compliance = s->compliance;
+    const int c = compliance->points, unbounded = s->friction < 0.0;
+    int held = 0, failed;
+    offer(s, w->share, w->past);
+    memset(w->lifted, 0, c);
+    for (int i = 0; i < 2 * c; i++) w->trial[i] = 2.0 * s->horizontal[i] - s->before[i]; /* saves a turn */
+    for (s->turns = 1; s->turns <= TURNS; s->turns++) {
+        plane_lift(compliance, w->trial, w->lift);
+        for (int i = 0; i < c; i++) w->q[i] = q[i] + w->lift[i];
+        if (solve == active_set_normal) ((active_set *)of)->again = s->turns > 1;
+        if ((failed = solve(of, w->q, guess, at_rest, force))) return failed;
+        for (int i = 0; i < c; i++) w->set[i] = force[i] > 0.0;
+        guess = w->set;
+        for (int i = 0; i < c; i++) w->given[i] = force[i] - at_rest[i];
+        plane_drag(compliance, w->given, w->moved);
+        for (int i = 0; i < c; i++) w->given[i] = force[i] - (s->pressed ? s->pressed[i] : at_rest[i]);
+        tread_drag(compliance, w->given, w->moved);
+        for (int i = 0; i < 2 * c; i++) w->moved[i] += free[i];
+        if (unbounded) /* a point that comes and goes: its own bristle lifts it off */
+            for (int i = 0; i < c; i++) {
+                const uint8_t now = force[i] > 0.0;
+                if (s->turns > LIFT_PATIENCE && now != w->touching[i]) w->lifted[i] = 1;
+                w->touching[i] = now;
+            }
+        stick_slip problem = sticking(s, force);
+        const int a = problem.count;
+        for (int d = 0; d < 2; d++)
+            for (int k = 0; k < a; k++) w->force[d * a + k] = w->trial[d * c + w->index[k]];
+        if ((failed = stick_slip_take(&problem))) return failed;
+        const double limit = s->tolerance * problem.largest;
+        double cut = 0.0; /* what the bounds have cut off still acted on the normal forces */
+        memset(w->found, 0, 2 * c * sizeof(double));
+        for (int d = 0; d < 2; d++)
+            for (int k = 0; k < a; k++) w->found[d * c + w->index[k]] = w->force[d * a + k];
+        for (int i = 0; i < 2 * c; i++) cut = fmax(cut, fabs(w->found[i] - w->trial[i]));
+        if (fmax(problem.off, cut) <= limit) {
+            s->products += problem.products, s->all_turns += s->turns;
+            memcpy(s->before, s->horizontal, 2 * c * sizeof(double));
+            memcpy(s->horizontal, w->found, 2 * c * sizeof(double));
+            plane_shear(compliance, w->found, w->lift);
+            for (int i = 0; i < 2 * c; i++) {
+                s->moved[i] = w->moved[i] + w->lift[i];
+                s->deflection[i] = -w->found[i] / s->stiffness[i % c];
+            }
+            for (int i = 0; i < c; i++) s->touched[i] = force[i] > 0.0;
+            return SOLVED;
+        }
+        failed = s->turns <= FLAT ? stick_slip_improve(&problem) : stick_slip_solve(&problem, SLIDING_TOLERANCE);
+        s->products += problem.products;
+        if (failed) return failed;
+        for (int d = 0; d < 2; d++)
+            for (int k = 0; k < a; k++) w->found[d * c + w->index[k]] = w->force[d * a + k];
+        held = mix(s, held, w->trial, w->found, w->trial);
+    }
+    return UNSOLVED;
+}
+
+/* ---- Before and after the solution of a step ------------------------------------------------------------------------ */
+
+/* What a slope adds to normal forces f and bristle forces t: t . r away from the road, -f r along it. */
+static void lean(int c, const double *slope, const double *force, const double *tangential, double *added) {
+    for (int i = 0; i < c; i++) {
+        const double x = slope[2 * i], y = slope[2 * i + 1];
+        added[i] = tangential[i] * x + tangential[c + i] * y;
+        added[c + i] = -force[i] * x, added[2 * c + i] = -force[i] * y;
+    }
+}
+
+/* q and the free displacements in the plane, from the displacements (r,) of the nodes without new forces; the slope
+   (c, 2) may be 0, and so may the displacements (1 or 3, c) of a tread that creeps. */
+void meeting_prepare(meeting *s, const double *moved, const double *road, const double *slope, const double *tread) {
+    const int c = s->points, p = s->nodes, three = s->seen == 3;
+    const double *nodes = moved;
+    if (s->leans && slope) {
+        sparse down = {p, s->t_begin, s->t_column, s->t_value};
+        lean(c, slope, s->normal_force, s->tangential, s->added);
+        for (int d = 0; d < 3; d++) multiply(&down, s->added + d * c, s->nodal + d * p);
+        memcpy(s->lifted, moved, s->seen * p * sizeof(double));
+        int count = nonzero(3 * p, s->nodal, s->which, s->value);
+        if (s->seen * p == s->answer_rows) add_columns(s->answer_rows, s->answer, count, s->which, s->value, s->lifted);
+        else
+            for (int k = 0; k < count; k++) {
+                const double *column = s->answer + (size_t)s->which[k] * s->answer_rows;
+                for (int i = 0; i < s->seen * p; i++) s->lifted[i] += s->value[k] * column[i];
+            }
+        nodes = s->lifted;
+    }
+    sparse up = {c, s->w_begin, s->w_column, s->w_value};
+    multiply(&up, nodes, s->q);
+    for (int i = 0; i < c; i++) s->q[i] = s->gap0[i] + s->q[i] + (tread ? tread[i] : 0.0) - road[i];
+    if (!three) return;
+    for (int d = 0; d < 2; d++) multiply(&up, nodes + (d + 1) * p, s->free + d * c);
+    if (tread)
+        for (int i = 0; i < 2 * c; i++) s->free[i] += tread[c + i];
+}
+
+/* Forces on the tire from the normal (c,) and bristle forces (2, c) found, the latter 0 without friction. */
+void meeting_conclude(meeting *s, const double *force, const double *tangential, const double *slope) {
+    const int c = s->points, p = s->nodes;
+    memcpy(s->normal_force, force, c * sizeof(double));
+    if (tangential) memcpy(s->tangential, tangential, 2 * c * sizeof(double));
+    memcpy(s->vertical, force, c * sizeof(double));
+    memcpy(s->horizontal, s->tangential, 2 * c * sizeof(double));
+    if (s->leans && slope) {
+        lean(c, slope, force, s->tangential, s->added);
+        for (int i = 0; i < c; i++) s->vertical[i] += s->added[i];
+        for (int i = 0; i < 2 * c; i++) s->horizontal[i] += s->added[c + i];
+    }
+    for (int i = 0; i < c; i++) s->change[i] = s->vertical[i] - s->at_rest[i];
+    if (s->pushed == 3) memcpy(s->change + c, s->horizontal, 2 * c * sizeof(double));
+    if (s->rest)
+        for (int i = 0; i < 2 * c; i++) s->horizontal[i] += s->rest[i];
+    sparse down = {p, s->t_begin, s->t_column, s->t_value};
+    for (int d = 0; d < s->pushed; d++) multiply(&down, s->change + d * c, s->nodal + d * p);
+    double sum[3] = {0.0, 0.0, 0.0};
+    for (int i = 0; i < c; i++) sum[0] += s->horizontal[i], sum[1] += s->horizontal[c + i], sum[2] += s->vertical[i];
+    memcpy(s->resultant, sum, sizeof sum);
+}

@@ -1,0 +1,1 @@
+"""Plain NumPy versions of what is compiled: the oracles of its tests."""

@@ -1,0 +1,156 @@
+"""The time loop in plain NumPy: dense matrices, complex states, each step solved from the last one to rounding."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tireroad.greens.recursion import EARLIER, late_answers, weights
+from tireroad.greens.response import Response
+
+Array = NDArray[np.float64]
+
+
+def unilateral(matrix: Array, q: Array, touching: NDArray[np.bool_]) -> Array:
+    """f >= 0, g = A f + q >= 0, f . g = 0 by exchange of all points of wrong sign."""
+    for _ in range(200):
+        force = np.zeros(len(q))
+        force[touching] = np.linalg.solve(matrix[np.ix_(touching, touching)], -q[touching])
+        gap = matrix @ force + q
+        wrong = np.where(touching, force < -1e-11 * np.abs(force).max(), gap < -1e-12 * np.abs(q).max())
+        if not wrong.any():
+            return np.maximum(force, 0.0)
+        touching = touching ^ wrong
+    raise AssertionError("no set")
+
+
+def onto_discs(force: Array, bound: Array) -> Array:
+    """Forces (2, a) cut to the bounds (a,)."""
+    length = np.hypot(*force)
+    return force * np.where(length > bound, bound / np.where(length > 0, length, 1.0), 1.0)
+
+
+def sliding(matrix: Array, constant: Array, bound: Array, force: Array) -> Array:
+    """B t + c = 0 within the bounds, against the slip on them, (2, a): semismooth Newton with dense matrices."""
+    a = len(bound)
+    if not a:
+        return force
+    rate = 1.0 / np.diag(matrix).reshape(2, a).mean(axis=0)
+    force = onto_discs(force, bound)
+    for _ in range(100):
+        trial = force - rate * ((matrix @ force.ravel()).reshape(2, a) + constant)
+        off = force - onto_discs(trial, bound)
+        if np.abs(off).max() <= 1e-13 * max(np.abs(force).max(), 1e-30):
+            break
+        length = np.hypot(*trial)
+        slips = length > bound
+        n = np.where(slips, trial / np.where(slips, length, 1.0), 0.0)
+        share = np.where(slips, bound / np.where(slips, length, 1.0), 1.0)
+        moved = np.tile(rate, 2)[:, None] * matrix - np.eye(2 * a)
+        along = np.vstack([np.diag(n[0]), np.diag(n[1])])
+        moved -= along @ (along.T @ moved)
+        force = force - np.linalg.solve(np.eye(2 * a) + np.tile(share, 2)[:, None] * moved, off.ravel()).reshape(2, a)
+    return onto_discs(force, bound)
+
+
+class Bristles:
+    """The brush of contact.tread.brush by its equations: rolling, of stiffness K (c,), slip (2, c) m a step."""
+
+    def __init__(self, upstream: Array, ahead: Array, pitches: Array, slip: Array, stiffness: Array) -> None:
+        self.upstream, self.ahead, self.pitches = upstream, ahead, pitches
+        self.slip, self.stiffness = slip, stiffness
+        self.deflection = self.moved = np.zeros_like(slip)
+        self.touched = np.zeros(len(ahead), bool)
+
+    def offer(self) -> tuple[Array, Array]:
+        """share (c,) and past (2, c) of e = share u + past."""
+        share = self.upstream @ self.touched.astype(float)
+        past = (self.upstream @ np.where(self.touched, self.deflection - self.moved, 0.0).T).T + share * self.slip
+        some = np.flatnonzero(self.touched & ~self.touched[self.ahead] & (self.pitches <= 1 + 1e-9))
+        inside = np.minimum(2 * self.pitches[some], 1.0)
+        edge = 0.5 * (self.moved[:, some] + self.moved[:, self.ahead[some]])
+        own = self.deflection[:, some] - self.moved[:, some]
+        share[some] = 1.0
+        travelled = np.minimum(0.5 / self.pitches[some], 1.0)
+        past[:, some] = (1 - inside) * own - inside * edge + travelled * self.slip[:, some]
+        return share, past
+
+
+class PlainLoop:
+    """`response` of p nodes in z, x, y (or z alone), W (c, p), tread C (c or 3 c, ...) in z, x, y; friction mu or None.
+
+    `at_rest` (c,) N and `gap` (c,) m of the static state.
+    """
+
+    def __init__(
+        self, response: Response, step: float, scheme: str, weights_: Array, tread: Array, at_rest: Array, gap: Array,
+        bristles: Bristles | None = None, friction: float | None = None,
+    ) -> None:  # fmt: skip
+        self.response, self.parts = response, EARLIER[scheme]
+        self.decay = np.exp(response.eigenvalue * step)
+        self.old, self.new = weights(response.eigenvalue * step, step, scheme)
+        late = late_answers(response, step, scheme)
+        c, p = weights_.shape
+        self.late = np.zeros((len(response.residual), response.residual.shape[1])) if late is None else late.toarray()[:-3]
+        direct = ((response.output * self.new) @ response.input).real + response.residual - self.late
+        self.w, self.c = weights_, c
+        forces, rows = response.residual.shape[1] // p, len(response.residual) // p
+        self.up, self.down = np.kron(np.eye(rows), weights_), np.kron(np.eye(forces), weights_.T)
+        self.answer = self.up @ direct @ self.down
+        self.whole = self.answer[:, : rows * c] + tread
+        self.at_rest, self.gap, self.bristles, self.friction = at_rest, gap, bristles, friction
+        self.state = np.zeros(len(self.decay), complex)
+        self.push = self.before = np.zeros(len(self.decay), complex)
+        self.force = np.zeros(response.residual.shape[1])
+        self.touching, self.tangential, self.normal = at_rest > 0, np.zeros((2, c)), np.zeros(c)
+
+    def step(self, road: Array, slope: Array | None = None) -> tuple[Array, Array]:
+        """Normal (c,) and bristle forces (2, c) at the end of the next step."""
+        c, response = self.c, self.response
+        earlier = self.parts[0] * self.push + self.parts[1] * self.before
+        moved = self.decay * self.state + self.old * earlier
+        nodes = (response.output @ moved).real + self.late @ self.force
+        free = self.up @ nodes
+        if slope is not None:
+            free = free + self.answer @ self._added(slope, self.normal, self.tangential)
+        force, t = self._solve(self.gap + free[:c] - road, free[c:])
+        change = np.zeros(self.down.shape[1])
+        change[:c] = force - self.at_rest
+        if len(change) > c:
+            change[c:] = t.ravel()
+        if slope is not None:
+            change = change + self._added(slope, force, t)
+        self.normal, self.tangential = force, t
+        self.force = self.down @ change
+        self.before, self.push = self.push, response.input @ self.force
+        self.state = moved + self.new * self.push
+        return force, t
+
+    @staticmethod
+    def _added(slope: Array, force: Array, t: Array) -> Array:
+        return np.concatenate([(t * slope.T).sum(axis=0), *(-force * slope.T)])
+
+    def _solve(self, q: Array, free: Array) -> tuple[Array, Array]:
+        c, whole = self.c, self.whole
+        zz, t = whole[:c, :c], self.tangential
+        start = -zz @ self.at_rest
+        if self.bristles is None:
+            force = unilateral(zz, q + start, self.touching)
+            self.touching = force > 0
+            return force, np.zeros((2, c))
+        share, past = self.bristles.offer()
+        for _ in range(500):
+            force = unilateral(zz, q + start + whole[:c, c:] @ t.ravel(), self.touching)
+            self.touching = force > 0
+            moved = free.reshape(2, c) + (whole[c:, :c] @ (force - self.at_rest)).reshape(2, c)
+            some = np.flatnonzero((force > 0) & (share > 1e-9))
+            both = np.concatenate([some, c + some])
+            spring = 1.0 / (self.bristles.stiffness * share)[some]
+            matrix = whole[c:, c:][np.ix_(both, both)] + np.diag(np.tile(spring, 2))
+            new = np.zeros((2, c))
+            constant = moved[:, some] + past[:, some] / share[some]
+            new[:, some] = sliding(matrix, constant, self.friction * force[some], t[:, some])
+            done, t = np.abs(new - t).max() <= 1e-12 * max(np.abs(new).max(), 1e-30), new
+            if done:
+                break
+        self.bristles.moved = moved + (whole[c:, c:] @ t.ravel()).reshape(2, c)
+        self.bristles.deflection, self.bristles.touched = -t / self.bristles.stiffness, force > 0
+        return force, t
