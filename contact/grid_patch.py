@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import product
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from scipy import sparse

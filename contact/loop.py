@@ -18,7 +18,7 @@ from scipy import sparse
 
 from tireroad.contact.patch import Patch
 from tireroad.contact.solver.active_set import COMPILED
-from tireroad.contact.solver.conditions import Array, ContactSolver
+from tireroad.contact.solver.conditions import Array, ContactSolver, Mask
 from tireroad.contact.solver.stick_slip import BrushFriction, CompressedRows
 from tireroad.contact.tread.memory import TreadMemory
 from tireroad.fem.errors import ConvergenceError, InputError
@@ -154,8 +154,6 @@ class LinearTire(Protocol):
     comm: MPI.Comm
     same_step: np.ndarray
 
-    def start(self, force: np.ndarray) -> None: ...
-
     def predict(self) -> np.ndarray: ...
 
     def advance(self, force: np.ndarray) -> None: ...
@@ -165,6 +163,12 @@ class LinearTire(Protocol):
     def snapshot(self) -> dict[str, np.ndarray]: ...
 
     def restore(self, state: dict[str, np.ndarray]) -> None: ...
+
+
+class PushedTire(LinearTire, Protocol):
+    """A tire that may begin with a force that is there at t = 0."""
+
+    def start(self, force: np.ndarray) -> None: ...
 
 
 @runtime_checkable
@@ -227,8 +231,21 @@ class Block:
     def instants(self) -> Iterator[Instant]:
         """The steps one by one."""
         displacement = self.displacement
-        parts = self.time.tolist(), self.force, self.horizontal, self.gap, displacement, self.axle_force
-        more = self.residual.tolist(), self.penetration.tolist(), self.active.tolist(), self.followed, self.moved
+        parts = (
+            self.time.tolist(),
+            self.force,
+            self.horizontal,
+            self.gap,
+            displacement,
+            self.axle_force,
+        )
+        more = (
+            self.residual.tolist(),
+            self.penetration.tolist(),
+            self.active.tolist(),
+            self.followed,
+            self.moved,
+        )
         for values in zip(*parts, *more, strict=True):
             yield Instant(*values)
 
@@ -289,7 +306,11 @@ class ContactProblem:
     """
 
     def __init__(
-        self, patch: Patch, same_step: Array, solver: ContactSolver, friction: BrushFriction | None = None
+        self,
+        patch: Patch,
+        same_step: Array,
+        solver: ContactSolver,
+        friction: BrushFriction | None = None,
     ) -> None:
         self.patch, self._solver, self._friction = patch, solver, friction
         c = len(patch.points)
@@ -301,7 +322,7 @@ class ContactProblem:
         weights = sparse.identity(p, format="csr") if patch.weights is None else patch.weights
         up, down = CompressedRows(weights), CompressedRows(weights.T)
         self._q, self._free = np.zeros(c), np.zeros((2, c))
-        self._touching: Array | None = patch.force > 0
+        self._touching: Mask | None = patch.force > 0
         self.vertical, self.horizontal, self.resultant = np.zeros(c), np.zeros((2, c)), np.zeros(3)
         # Changes of the forces from the static state, on the nodes and on the points.
         self.change, self.at_points = np.zeros(pushed * p), np.zeros(pushed * c)
@@ -316,7 +337,9 @@ class ContactProblem:
         self._at_rest = doubles["at_rest"]
         if patch.pull is not None and friction is None:
             doubles["rest"] = np.ascontiguousarray(patch.pull.T)
-        self._held: dict[str, Any] = {name: COMPILED.doubles(values) for name, values in doubles.items()}
+        self._held: dict[str, Any] = {
+            name: COMPILED.doubles(values) for name, values in doubles.items()
+        }
         self._held |= {
             "points": c, "nodes": p, "seen": 3 if friction and followed == 3 else 1, "pushed": pushed,
             "leans": self.leans, "answer_rows": same_step.shape[0], "which": COMPILED.ints(np.empty(3 * p, np.int32)),
@@ -337,7 +360,9 @@ class ContactProblem:
         if self._friction is None:
             force, tangential = solver.solve(self._q, touching, reference=self._at_rest), _NO_FORCE
         else:
-            force, plane = self._friction.solve(solver, self._q, touching, self._at_rest, self._free)
+            force, plane = self._friction.solve(
+                solver, self._q, touching, self._at_rest, self._free
+            )
             tangential = plane.T
         return Solved(force, solver.gap, tangential, solver.residual, solver.penetration)
 
@@ -357,13 +382,20 @@ class ContactProblem:
     @property
     def largest_unique(self) -> float | None:
         """Friction coefficient up to which the points that touch at rest have one solution; None without friction."""
-        return self._friction.largest_unique(self.patch.force > 0, self._solver) if self._friction else None
+        return (
+            self._friction.largest_unique(self.patch.force > 0, self._solver)
+            if self._friction
+            else None
+        )
 
     def state(self) -> dict[str, Array]:
         """The state that a checkpoint keeps."""
         kept = self._solver.state() | (self._friction.state() if self._friction else {})
         if self.leans:
-            kept |= {"normal_force_before": self._force.copy(), "normal_tangential": self._tangential.T.copy()}
+            kept |= {
+                "normal_force_before": self._force.copy(),
+                "normal_tangential": self._tangential.T.copy(),
+            }
         return kept
 
     def set_state(self, state: dict[str, Array]) -> None:
@@ -373,7 +405,10 @@ class ContactProblem:
         if self._friction:
             self._friction.set_state(state)
         if self.leans:
-            self._force[:], self._tangential[:] = state["normal_force_before"], state["normal_tangential"].T
+            self._force[:], self._tangential[:] = (
+                state["normal_force_before"],
+                state["normal_tangential"].T,
+            )
 
 
 _NO_FORCE = np.zeros((2, 0))
@@ -400,7 +435,9 @@ class Loop:
         stay unchanged, while tire and `memory` (of a viscoelastic tread, whose response within the step is part of
         the solver) advance on each.
         """
-        for times, roads, slopes in _roads(drive, self.contact.patch, step, steps, done, self.contact.leans):
+        for times, roads, slopes in _roads(
+            drive, self.contact.patch, step, steps, done, self.contact.leans
+        ):
             yield self._block(times, roads, slopes)
 
     def _block(self, times: Array, roads: Array, slopes: Array | None) -> Block:
@@ -481,7 +518,7 @@ def looking_ahead(tire: object) -> Ahead | None:
 
 def _roads(
     drive: Drive, patch: Patch, step: float, steps: int, done: int, leans: bool
-) -> Iterator[tuple[Array, Array, Array | None]]:
+) -> Iterator[tuple[Any, Any, Any]]:
     """Times (n,) s, road (n, c) m under the points and, if it `leans`, its slope (n, c, 2), for the steps
     after `done`, block by block.
 
@@ -491,7 +528,7 @@ def _roads(
     x, y = patch.points[:, 0], patch.points[:, 1]
     block = block_size(len(x))
     for first in range(done - done % block, steps, block):
-        times = step * np.arange(first + 1, min(first + block, steps) + 1)
+        times = step * np.arange(first + 1.0, min(first + block, steps) + 1.0)
         along = x + drive.speed * times[:, None]
         across = np.broadcast_to(y, along.shape)
         heights = drive.height(along, across)
@@ -515,7 +552,7 @@ class DrivenTire:
 
     def __init__(
         self,
-        tire: LinearTire,
+        tire: PushedTire,
         history: np.ndarray,
         directions: np.ndarray,
         scheme: str = "linear",

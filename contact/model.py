@@ -1,7 +1,7 @@
 """A scene's tread law and contact solver on a patch, from which the time loop obtains forces."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ STEEPEST = 0.25
 
 
 class ContactSpec(Protocol):
-    """How tread and road meet: the table [contact] of a scene, or `NormalContact`."""
+    """How tread and road meet: the table [contact] of a scene, or `TreadContact`."""
 
     @property
     def law(self) -> TreadLaw:
@@ -36,8 +36,24 @@ class ContactSpec(Protocol):
         """Its name, or "auto"."""
 
     @property
+    def friction(self) -> float | None:
+        """Coefficient of friction; None: bristles never slip."""
+
+    @property
+    def brush(self) -> str:
+        """The bristles' kind, "rolling" or "spring"."""
+
+    @property
+    def brush_stiffness(self) -> float | None:
+        """Tangential stiffness of the bristle of a point, N/m; None: rigid."""
+
+    @property
+    def brush_stiffness_per_area(self) -> float | None:
+        """The same by area, N/m3."""
+
+    @property
     def has_friction(self) -> bool:
-        """Whether the road exerts horizontal forces."""
+        """Whether the road holds the tread by friction or bristles."""
 
     @property
     def has_shear(self) -> bool:
@@ -45,13 +61,25 @@ class ContactSpec(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True)
-class NormalContact:
-    """A `ContactSpec` whose forces are all normal to the road."""
+class TreadContact:
+    """A `ContactSpec` of a tread that touches the road itself, with `friction` or without (0)."""
 
     law: TreadLaw
     solver: str = "auto"
-    has_friction: bool = False
-    has_shear: bool = False
+    friction: float = 0.0
+    brush: ClassVar[str] = "rolling"
+    brush_stiffness: ClassVar[float | None] = None
+    brush_stiffness_per_area: ClassVar[float | None] = None
+
+    @property
+    def has_friction(self) -> bool:
+        """Whether the road holds the tread by friction."""
+        return self.friction > 0.0 and self.law.shears
+
+    @property
+    def has_shear(self) -> bool:
+        """Whether the tread deforms under horizontal forces."""
+        return self.has_friction
 
 
 def solver_name(spec: ContactSpec, patch: Patch) -> str:

@@ -122,7 +122,15 @@ def _built(source: Path, code: str) -> Path:
         atexit.register(shutil.rmtree, folder, ignore_errors=True)
         part = folder / f"{name}.part"
     try:
-        run = [*shlex.split(command), *FLAGS, f"-I{INCLUDED.parent}", str(source), "-o", str(part), "-lm"]
+        run = [
+            *shlex.split(command),
+            *FLAGS,
+            f"-I{INCLUDED.parent}",
+            str(source),
+            "-o",
+            str(part),
+            "-lm",
+        ]
         done = subprocess.run(run, capture_output=True, text=True)
         if done.returncode:
             raise InputError(
@@ -143,7 +151,10 @@ def _built(source: Path, code: str) -> Path:
 def _address(capsule: Any) -> int:
     """The address of a function that a Cython module exports."""
     api = ctypes.pythonapi
-    api.PyCapsule_GetName.restype, api.PyCapsule_GetName.argtypes = ctypes.c_char_p, [ctypes.py_object]
+    api.PyCapsule_GetName.restype, api.PyCapsule_GetName.argtypes = (
+        ctypes.c_char_p,
+        [ctypes.py_object],
+    )
     api.PyCapsule_GetPointer.restype = ctypes.c_void_p
     api.PyCapsule_GetPointer.argtypes = [ctypes.py_object, ctypes.c_char_p]
     return int(api.PyCapsule_GetPointer(capsule, api.PyCapsule_GetName(capsule)))

@@ -266,6 +266,7 @@ def at_once(response: Response) -> np.ndarray:
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
+
 class SharedRows:
     """This process's share `mine` of `count` rows, and their collection by `gathered`."""
 
@@ -298,7 +299,11 @@ class LoadedColumns:
         self.rows = SharedRows(len(matrix), comm)
         self._own = np.ascontiguousarray(self.columns[:, self.rows.mine])
         count = len(self.columns)
-        self._pointers = _C.doubles(self._own), _C.ints(np.empty(count, np.int32)), _C.doubles(np.empty(count))
+        self._pointers = (
+            _C.doubles(self._own),
+            _C.ints(np.empty(count, np.int32)),
+            _C.doubles(np.empty(count)),
+        )
 
     @staticmethod
     def of(matrix: Array | LinearOperator, comm: MPI.Comm) -> LoadedColumns | LinearOperator:
@@ -313,7 +318,13 @@ class LoadedColumns:
         """This process's rows of A f for f (k,)."""
         out = np.zeros(self._own.shape[1])
         force = np.ascontiguousarray(force, dtype=float)
-        _C.lib.add_loaded(*self._own.shape, self._pointers[0], _C.doubles(force), *self._pointers[1:], _C.doubles(out))
+        _C.lib.add_loaded(
+            *self._own.shape,
+            self._pointers[0],
+            _C.doubles(force),
+            *self._pointers[1:],
+            _C.doubles(out),
+        )
         return out
 
 
@@ -350,7 +361,11 @@ class Recursion:
         mine = self._spread.mine(np.arange(len(response.eigenvalue)))
         s = response.eigenvalue[mine]
         old, new = weights(s * step, step, scheme)
-        self._decay, self._old, self._new = np.exp(s * step), old.astype(complex), new.astype(complex)
+        self._decay, self._old, self._new = (
+            np.exp(s * step),
+            old.astype(complex),
+            new.astype(complex),
+        )
         self._parts = EARLIER[scheme]
         # Real arithmetic on adjacent (re, im), as the states lie in memory.
         output = np.vstack([response.output[:, mine], response.inertia[0][:, mine]])
@@ -368,6 +383,7 @@ class Recursion:
         self._taken = True  # whether `_state` includes the last force
         self._samples: list[tuple[np.ndarray, ...]] | None = None
         self._begun = response.direct_momentum_rate()
+        self._into_rate = np.zeros((3, forces))
         self._add_same_step(response, into)
         self.ahead = self if self._idle else None
         self._next = self._answers_next(into) if self._idle else None

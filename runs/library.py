@@ -28,11 +28,12 @@ from scipy import sparse
 
 from tireroad.contact.choices import LEAST_STEPS, TURN
 from tireroad.contact.loop import Block, Steps, check_times, equal_steps
-from tireroad.contact.model import ContactSpec, NormalContact
+from tireroad.contact.model import ContactSpec, TreadContact
 from tireroad.contact.patch import Patch
 from tireroad.contact.results.chatter import choose, oscillation
 from tireroad.contact.results.spectra import Limit, amplitudes, limits, lowest, pitch, third_octaves
 from tireroad.contact.roads.under_tire import RoadUnderTire
+from tireroad.contact.rolling import bristles, make_loop
 from tireroad.contact.setup import ContactSetup, Rolled, contact_setup
 from tireroad.contact.tread.law import TREADS, TreadLaw
 from tireroad.fem.errors import ConvergenceError, InputError
@@ -56,8 +57,9 @@ from tireroad.modal.standing import standing_modes
 from tireroad.runs.scene.rules import barred_from_contact
 from tireroad.runs.scene.sections.radial import RadialSection, built
 from tireroad.runs.scene.sections.torus import TorusSection
+from tireroad.runs.scene.tables.contact import DRY_ASPHALT
 from tireroad.runs.scene.tables.tire import NEAR_ROAD, TireTable
-from tireroad.runs.stages.rolling import grown, make_loop
+from tireroad.runs.stages.rolling import grown
 from tireroad.runs.stages.stage import make_tire, rolling_shape
 
 P = ParamSpec("P")
@@ -428,12 +430,15 @@ def drive(
     tread: TreadLaw | None = None,
     spacing: float | tuple[float, float] | None = None,
     residual: str = "static",
+    friction: float = DRY_ASPHALT,
 ) -> History:
     """Roll the tire over the road for `duration` s.
 
     `step` s: time step, by default small enough for the fastest mode. `tread`: a law of
     contact.tread.laws, by default a half-space of 10 MPa. `spacing` (m, or m, m along and across) of
-    a grid of contact points, by default the nodes of the mesh. Frictionless.
+    a grid of contact points, by default the nodes of the mesh. `friction`: coefficient between tread and road,
+    where the tread shears (half-space, layer, viscoelastic); 0: none, and horizontal forces come from the road's
+    slope alone.
 
     Raises InputError for arguments of the wrong kind, times that are not positive and finite, a tire
     that is off the road, modes with a free rim or a held road, and a `spacing` with less than two
@@ -449,11 +454,18 @@ def drive(
         _check_pitches(pitches, static.footprint())
     rolled = Rolled(speed=turning.speed * static.rolling_radius(), duration=duration)
     setup = contact_setup(static, motions.lattice, road, rolled, spacing=pitches)
-    along, across, loads = (
+    if not (math.isfinite(friction) and friction >= 0.0):
+        raise InputError(f"drive: friction = {friction!r} must be a number of 0 or more")
+    spec = TreadContact(law=law, friction=friction)
+    along, across, down = (
         probe.nodes(setup.patch.index, len(static.points), part) for part in range(3)
     )
-    response = tire.respond(loads, loads, residual, sparse.vstack([along, across], "csr"))
-    spec = NormalContact(law=law)
+    aside = sparse.vstack([along, across], "csr")
+    if spec.has_friction:
+        every = sparse.vstack([down, aside], "csr")
+        response = tire.respond(every, every, residual)
+    else:
+        response = tire.respond(down, down, residual, aside)
     setup, _ = setup.equilibrated(response, static.force, spec)
     fastest = np.abs(response.eigenvalue).max(initial=1.0 / duration)
     largest = min(duration / LEAST_STEPS, TURN / fastest) if step is None else step
@@ -514,7 +526,9 @@ def _blocks(
 ) -> list[Block]:
     """Run the time loop with the integration scheme that suits the contact. Collective."""
     kept = response.resolved(chosen.size)
-    scheme = choose(oscillation(spec, setup.patch, kept, chosen.size)).scheme
+    scheme = choose(
+        oscillation(spec, setup.patch, kept, chosen.size, bristles(spec, setup.patch))
+    ).scheme
     recursion = Recursion(response=kept, step=chosen.size, scheme=scheme, comm=comm)
     loop = make_loop(spec, setup, recursion, chosen.size)
     return list(loop.roll(setup.drive, chosen.size, chosen.count))

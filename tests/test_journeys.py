@@ -64,7 +64,7 @@ tire = tr.torus(segments=12, elements_arc=6, order=2, youngs_modulus=48e6)
 static = tr.press(tire, inflation=2e5, load=300.0)
 turning = tr.roll(tr.modes(tire, static, count=20), tr.Turning(speed=50.0, damping=(500.0, 0.0)))
 road = tr.make_road(kind="sine", amplitude=5e-4, wavelength=0.2)
-follow(lambda: tr.drive(turning, road, duration=0.01, spacing=0.004), every="_contact")
+follow(lambda: tr.drive(turning, road, duration=0.01, spacing=0.004), every="predict")
 """
 SCENE = """
 [tire]
@@ -102,6 +102,6 @@ def test_from_the_library_to_the_modes(launch) -> None:
 
 @pytest.mark.slow
 def test_one_time_step(launch) -> None:
-    """Without friction, on a grid of points; it was 11 files."""
+    """With friction, on a grid of points; it was 13 files."""
     files, _ = journey(launch, STEP)
     assert 2 < files <= 6

@@ -141,10 +141,14 @@ class Circulation:
         """Count n steps: forces (n, k) N at their ends."""
         whole = np.concatenate([self._forces, forces])
         path, ahead = whole[1:], ahead_of_mean(self._scheme, whole)
+        # Of many nodes few carry points that touch: products of these alone.
+        loaded = np.flatnonzero(whole.any(axis=0))
+        some = np.ix_(loaded, loaded)
+        path, ahead = path[:, loaded], ahead[:, loaded]
         # f_a . G_a (f_b - f_a) = f_a . G_a f_b, since f . G_a f = 0.
         jump = np.diff(path, axis=0)
-        turned = np.einsum("ni,ni->n", path[:-1], path[1:] @ self._skew.T)
-        jumped = np.einsum("ni,ni->n", ahead, jump @ self._even)
+        turned = np.einsum("ni,ni->n", path[:-1], path[1:] @ self._skew[some].T)
+        jumped = np.einsum("ni,ni->n", ahead, jump @ self._even[some])
         for work, more in zip(turned.tolist(), jumped.tolist(), strict=True):
             self.work += work
             self.lead += more

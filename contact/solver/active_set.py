@@ -74,7 +74,9 @@ class ActiveSet:
             "rows": rows, "columns": columns, "diagonal": self._diagonal, "gap": self.gap,
             "signs": self._signs, "signs_before": self._before,
         }  # fmt: skip
-        self._held: dict[str, Any] = {name: COMPILED.doubles(array) for name, array in doubles.items()}
+        self._held: dict[str, Any] = {
+            name: COMPILED.doubles(array) for name, array in doubles.items()
+        }
         self._held |= {"active": COMPILED.flags(self.active), "base": COMPILED.flags(self._base)}
         self.compiled = _FFI.new("active_set *", {"n": n} | self._held)
         _C.active_set_begin(self.compiled)
@@ -94,7 +96,9 @@ class ActiveSet:
         force, self.compiled.again = np.empty(len(self.active)), False
         given = (
             COMPILED.doubles(np.ascontiguousarray(q)),
-            _FFI.NULL if guess_active is None else COMPILED.flags(np.ascontiguousarray(guess_active, dtype=bool)),
+            _FFI.NULL
+            if guess_active is None
+            else COMPILED.flags(np.ascontiguousarray(guess_active, dtype=bool)),
             _FFI.NULL if reference is None else COMPILED.doubles(np.ascontiguousarray(reference)),
         )
         self.check(_C.active_set_solve(self.compiled, *given, COMPILED.doubles(force)))

@@ -4,7 +4,7 @@
 
 // for Python
 typedef struct {
-    void *dgetrf, *dgetrs;
+    void *dgemv, *dgetrf, *dgetrs;
 } blas;
 extern blas linked;
 
@@ -37,8 +37,10 @@ typedef struct {
     int tread;                            /* RIGID, GRID or MATRIX */
     int coupled;                          /* whether pressure shears it */
     const double *kernel[5];              /* xx, xy, yy, zx, zy: (2 nx - 1, 2 ny - 1) of the grid, or (c, c) */
-    int nx, ny;
+    int nx, ny, near;                     /* of the grid; cells up to which a Newton step reads the kernels */
     const int *row, *column;              /* (c,) of each point in the grid */
+    const double *lift, *beside;          /* all of it between the points, by columns: A_zt (2c, c), [A_tz A_tt]
+                                             (3c, 2c); or 0 where that is too much */
     struct plane_work *work;
 } plane;
 
@@ -50,6 +52,8 @@ void plane_shear(plane *s, const double *force, double *moved);
 void plane_lift(plane *s, const double *force, double *moved);
 void plane_drag(plane *s, const double *force, double *moved);
 void tread_drag(plane *s, const double *force, double *moved);
+int plane_held(const plane *s, int *index);
+void plane_hold(plane *s, int count, const int *index);
 
 /* Tangential forces t: B t + c = 0 within the bounds, against the slip on them, at `count` of the points. */
 typedef struct {
@@ -62,11 +66,11 @@ typedef struct {
     double *force;                        /* (2, count) N: guess, then solution */
     double off, largest;                  /* residual, and the largest bound or force, N */
     double norm;                          /* an upper bound of the largest singular value of B, m/N */
+    active_set *normal;                   /* whose forces follow the tangential ones in a Newton step, or 0 */
+    double friction;                      /* of the bounds that follow with them */
     long products;
 } stick_slip;
 
-int stick_slip_take(stick_slip *s);
-int stick_slip_improve(stick_slip *s);
 int stick_slip_solve(stick_slip *s, double tolerance);
 int krylov(int n, int (*apply)(void *, const double *, double *), void *of, const double *right, double tolerance,
            double *x);
@@ -83,7 +87,7 @@ typedef struct {
     const double *own;                    /* (c,) m/N: the compliance's diagonal, mean of both directions */
     const int *u_begin, *u_column, *ahead;  /* what lies one step upstream, and the next point ahead */
     const double *u_value, *pitches;
-    const double *pressed;                /* (c,) N: normal forces from which pressure shears the tread, or 0 */
+    const double *dragged;                /* (2, c) m: displacements in the plane under the static normal forces */
     double norm;
     double *deflection, *moved;           /* (2, c) m of the bristles and their bases, one step ago */
     uint8_t *touched;
@@ -119,6 +123,8 @@ void meeting_prepare(meeting *s, const double *moved, const double *road, const 
 void meeting_conclude(meeting *s, const double *force, const double *tangential, const double *slope);
 // end
 
+typedef void (*gemv)(char *, int *, int *, double *, const double *, int *, const double *, int *, double *, double *,
+                     int *);
 typedef void (*getrf)(int *, int *, double *, int *, int *, int *);
 typedef void (*getrs)(char *, int *, int *, const double *, int *, const int *, double *, int *, int *);
 blas linked;
@@ -363,6 +369,9 @@ struct plane_work {
     int *which, *first, *last, *some, *carried;
     uint8_t *bears, *kept;
     int carriers;                         /* nodes between which `compact` (2m, 2m) has hh */
+    /* Of a dense compliance: the part between the points in `slots`, by columns; components x, y side by side. */
+    int slots, *slot, *point;
+    double *tt, *zt, *tz, *t, *z, *u;     /* (2s, 2s), (2s, s), (s, 2s) of leading dimensions 2c, c, 2c; vectors */
 };
 
 int plane_begin(plane *s) {
@@ -372,14 +381,93 @@ int plane_begin(plane *s) {
     w->field = DOUBLES(2 * (size_t)s->nx * s->ny), w->compact = DOUBLES(4 * (size_t)p * p);
     w->which = INTS(2 * most), w->first = INTS(s->nx), w->last = INTS(s->nx), w->some = INTS(c);
     w->carried = INTS(p), w->bears = room(p, 1), w->kept = room(p, 1);
+    if (s->lift) {
+        w->slot = INTS(c), w->point = INTS(c);
+        w->tt = DOUBLES(4 * (size_t)c * c), w->zt = DOUBLES(2 * (size_t)c * c), w->tz = DOUBLES(2 * (size_t)c * c);
+        w->t = DOUBLES(2 * c), w->z = DOUBLES(c), w->u = DOUBLES(2 * c);
+        for (int i = 0; i < c; i++) w->slot[i] = -1;
+    }
     return SOLVED;
 }
 
 void plane_end(plane *s) {
     struct plane_work *w = s->work;
     void *all[] = {w->nodal, w->nodes, w->value, w->given, w->field, w->compact, w->which, w->first, w->last, w->some,
-                   w->carried, w->bears, w->kept, w};
+                   w->carried, w->bears, w->kept, w->slot, w->point, w->tt, w->zt, w->tz, w->t, w->z, w->u, w};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) free(all[i]);
+}
+
+static void enter(plane *s, int point) {
+    struct plane_work *w = s->work;
+    const int c = s->points, k = w->slots++, j = point;
+    w->slot[point] = k, w->point[k] = point;
+    for (int m = 0; m <= k; m++) {
+        const int i = w->point[m];
+        for (int e = 0; e < 2; e++) {
+            const double *own = s->beside + (size_t)(c + e * c + j) * 2 * c, *other = s->beside + (size_t)(c + e * c + i) * 2 * c;
+            for (int d = 0; d < 2; d++) {
+                w->tt[(size_t)(2 * k + e) * 2 * c + 2 * m + d] = own[d * c + i];
+                w->tt[(size_t)(2 * m + e) * 2 * c + 2 * k + d] = other[d * c + j];
+            }
+            w->zt[(size_t)(2 * k + e) * c + m] = s->lift[(size_t)(e * c + j) * c + i];
+            w->zt[(size_t)(2 * m + e) * c + k] = s->lift[(size_t)(e * c + i) * c + j];
+            w->tz[(size_t)k * 2 * c + 2 * m + e] = s->beside[(size_t)j * 2 * c + e * c + i];
+            w->tz[(size_t)m * 2 * c + 2 * k + e] = s->beside[(size_t)i * 2 * c + e * c + j];
+        }
+    }
+}
+
+/* Hold the compliance between these points, with at most half as many others that touched before. */
+static void hold(plane *s, int count, const int *index) {
+    struct plane_work *w = s->work;
+    int more = 0;
+    for (int a = 0; a < count; a++) more += w->slot[index[a]] < 0;
+    if (w->slots + more > count + count / 2 + 8) {
+        for (int k = 0; k < w->slots; k++) w->slot[w->point[k]] = -1;
+        w->slots = 0;
+    }
+    for (int a = 0; a < count; a++)
+        if (w->slot[index[a]] < 0) enter(s, index[a]);
+}
+
+/* The points held (c,), in the order of their slots; returns how many. */
+int plane_held(const plane *s, int *index) {
+    if (!s->lift) return 0;
+    memcpy(index, s->work->point, s->work->slots * sizeof(int));
+    return s->work->slots;
+}
+
+/* Hold these points and no others. */
+void plane_hold(plane *s, int count, const int *index) {
+    struct plane_work *w = s->work;
+    if (!s->lift) return;
+    for (int k = 0; k < w->slots; k++) w->slot[w->point[k]] = -1;
+    w->slots = 0;
+    hold(s, count, index);
+}
+
+static void product(int rows, int columns, const double *a, int leading, const double *x, double keep, double *y) {
+    int one = 1;
+    double unit = 1.0;
+    if (rows && columns) ((gemv)linked.dgemv)("N", &rows, &columns, &unit, a, &leading, x, &one, &keep, y, &one);
+}
+
+/* Forces (2, count) of some points side by side in the slots; and displacements back from `u`. */
+static void to_slots(plane *s, int count, const int *index, const double *force) {
+    struct plane_work *w = s->work;
+    memset(w->t, 0, 2 * w->slots * sizeof(double));
+    for (int a = 0; a < count; a++) {
+        const int k = w->slot[index[a]];
+        w->t[2 * k] = force[a], w->t[2 * k + 1] = force[count + a];
+    }
+}
+
+static void from_slots(plane *s, int count, const int *index, double *moved) {
+    struct plane_work *w = s->work;
+    for (int a = 0; a < count; a++) {
+        const int k = w->slot[index[a]];
+        moved[a] = w->u[2 * k], moved[count + a] = w->u[2 * k + 1];
+    }
 }
 
 static void to_nodes(const plane *s, const double *points, double *nodes) {
@@ -403,41 +491,68 @@ static void bounds(const plane *s, int count, const int *index) {
     }
 }
 
-/* On the grid, between `bounds`: out (m, nx, ny) += sum over forces of kernel times force; k kernels in pairs. */
-static void spread(const plane *s, int count, const int *index, const double *fx, const double *fy,
+/* On the grid, between `bounds` and at least `reach` cells from each force: ux, uy (nx, ny) += kernels times forces. With
+   three kernels both components of both, with two and fy one of both, else both of one. Forces of one row of the grid
+   are taken by fours, so that displacements are read and written once for them. */
+static void spread(const plane *s, int reach, int count, const int *index, const double *fx, const double *fy,
                    const double *kernel0, const double *kernel1, const double *kernel2, double *ux, double *uy) {
+    enum { TOGETHER = 4 };
     const struct plane_work *w = s->work;
     const int wide = 2 * s->ny - 1;
-    for (int i = 0; i < s->nx; i++) {
-        const int low = w->first[i], n = w->last[i] - low + 1;
-        if (n <= 0) continue;
-        double *restrict x = ux + (size_t)i * s->ny + low, *restrict y = uy ? uy + (size_t)i * s->ny + low : 0;
-        for (int a = 0; a < count; a++) {
-            const int point = index[a];
-            const double p = fx[a], q = fy ? fy[a] : 0.0;
-            if (p == 0.0 && q == 0.0) continue;
-            const size_t at = (size_t)(i - s->row[point] + s->nx - 1) * wide + (s->ny - 1 - s->column[point] + low);
-            const double *restrict k0 = kernel0 + at, *restrict k1 = kernel1 ? kernel1 + at : 0;
-            const double *restrict k2 = kernel2 ? kernel2 + at : 0;
-            if (k2) /* both components of both */
-                for (int j = 0; j < n; j++) x[j] += k0[j] * p + k1[j] * q, y[j] += k1[j] * p + k2[j] * q;
-            else if (fy) /* one of both */
-                for (int j = 0; j < n; j++) x[j] += k0[j] * p + k1[j] * q;
-            else /* both of one */
-                for (int j = 0; j < n; j++) x[j] += k0[j] * p, y[j] += k1[j] * p;
+    for (int a = 0, some; a < count; a += some) {
+        const int row = s->row[index[a]], begin = s->column[index[a]];
+        for (some = 1; some < TOGETHER && a + some < count && s->row[index[a + some]] == row; some++);
+        const int end = s->column[index[a + some - 1]];
+        double p[TOGETHER] = {0.0}, q[TOGETHER] = {0.0};
+        for (int k = 0; k < some; k++) p[k] = fx[a + k], q[k] = fy ? fy[a + k] : 0.0;
+        const int top = row - reach > 0 ? row - reach : 0, bottom = row + reach < s->nx - 1 ? row + reach : s->nx - 1;
+        for (int i = top; i <= bottom; i++) {
+            const int low = w->first[i] > begin - reach ? w->first[i] : begin - reach;
+            const int n = (w->last[i] < end + reach ? w->last[i] : end + reach) - low + 1;
+            if (n <= 0) continue;
+            double *restrict x = ux + (size_t)i * s->ny + low, *restrict y = uy ? uy + (size_t)i * s->ny + low : 0;
+            size_t at[TOGETHER];
+            for (int k = 0; k < TOGETHER; k++) /* those beyond `some` read the first one's kernel, times nothing */
+                at[k] = (size_t)(i - row + s->nx - 1) * wide + (s->ny - 1 - s->column[index[a + (k < some ? k : 0)]] + low);
+            const double *restrict a0 = kernel0 + at[0], *restrict a1 = kernel0 + at[1], *restrict a2 = kernel0 + at[2];
+            const double *restrict a3 = kernel0 + at[3], *restrict b0 = kernel1 + at[0], *restrict b1 = kernel1 + at[1];
+            const double *restrict b2 = kernel1 + at[2], *restrict b3 = kernel1 + at[3];
+            if (kernel2) {
+                const double *restrict c0 = kernel2 + at[0], *restrict c1 = kernel2 + at[1], *restrict c2 = kernel2 + at[2];
+                const double *restrict c3 = kernel2 + at[3];
+#pragma GCC ivdep
+                for (int j = 0; j < n; j++) {
+                    x[j] += a0[j] * p[0] + a1[j] * p[1] + a2[j] * p[2] + a3[j] * p[3] + b0[j] * q[0] + b1[j] * q[1] +
+                            b2[j] * q[2] + b3[j] * q[3];
+                    y[j] += b0[j] * p[0] + b1[j] * p[1] + b2[j] * p[2] + b3[j] * p[3] + c0[j] * q[0] + c1[j] * q[1] +
+                            c2[j] * q[2] + c3[j] * q[3];
+                }
+            } else if (fy)
+#pragma GCC ivdep
+                for (int j = 0; j < n; j++)
+                    x[j] += a0[j] * p[0] + a1[j] * p[1] + a2[j] * p[2] + a3[j] * p[3] + b0[j] * q[0] + b1[j] * q[1] +
+                            b2[j] * q[2] + b3[j] * q[3];
+            else
+#pragma GCC ivdep
+                for (int j = 0; j < n; j++) {
+                    x[j] += a0[j] * p[0] + a1[j] * p[1] + a2[j] * p[2] + a3[j] * p[3];
+                    y[j] += b0[j] * p[0] + b1[j] * p[1] + b2[j] * p[2] + b3[j] * p[3];
+                }
         }
     }
 }
 
+static int everywhere(const plane *s) { return s->nx > s->ny ? s->nx : s->ny; }
+
 /* moved (2, count) += the tread's displacements in the plane under forces (2, count), between the points `index`. */
-static void shear_tread(plane *s, int count, const int *index, const double *force, double *moved) {
+static void shear_tread(plane *s, int reach, int count, const int *index, const double *force, double *moved) {
     struct plane_work *w = s->work;
     const double *x = force, *y = force + count;
     if (s->tread == GRID) {
         const size_t cells = (size_t)s->nx * s->ny;
         bounds(s, count, index);
         memset(w->field, 0, 2 * cells * sizeof(double));
-        spread(s, count, index, x, y, s->kernel[0], s->kernel[1], s->kernel[2], w->field, w->field + cells);
+        spread(s, reach, count, index, x, y, s->kernel[0], s->kernel[1], s->kernel[2], w->field, w->field + cells);
         for (int a = 0; a < count; a++) {
             const size_t at = (size_t)s->row[index[a]] * s->ny + s->column[index[a]];
             moved[a] += w->field[at], moved[count + a] += w->field[cells + at];
@@ -477,10 +592,17 @@ static void carry(plane *s, int count, const int *index) {
     }
 }
 
-/* moved (2, count) = the displacements in the plane between some points; after `carry` of these. */
-static void shear_some(plane *s, int count, const int *index, const double *force, double *moved) {
+/* moved (2, count) = the displacements in the plane between some points, those of the tread within `reach` cells; after
+   `carry` of these. */
+static void shear_some(plane *s, int reach, int count, const int *index, const double *force, double *moved) {
     struct plane_work *w = s->work;
-    const int m = w->carriers, p = s->nodes;
+    const int m = w->carriers, p = s->nodes, c = s->points;
+    if (s->lift) {
+        to_slots(s, count, index, force);
+        product(2 * w->slots, 2 * w->slots, w->tt, 2 * c, w->t, 0.0, w->u);
+        from_slots(s, count, index, moved);
+        return;
+    }
     double *down = w->nodal, *up = w->nodes;
     for (int d = 0; d < 2; d++) { /* to all nodes, then side by side to those that carry */
         double *full = w->value;
@@ -502,7 +624,7 @@ static void shear_some(plane *s, int count, const int *index, const double *forc
             moved[d * count + a] = sum;
         }
     }
-    shear_tread(s, count, index, force, moved);
+    shear_tread(s, reach, count, index, force, moved);
 }
 
 /* The points with a force, and their forces side by side in `given`. */
@@ -535,7 +657,7 @@ void plane_shear(plane *s, const double *force, double *moved) {
         const size_t cells = (size_t)s->nx * s->ny;
         every_cell(s);
         memset(w->field, 0, 2 * cells * sizeof(double));
-        spread(s, count, w->some, w->given, w->given + count, s->kernel[0], s->kernel[1], s->kernel[2], w->field,
+        spread(s, everywhere(s), count, w->some, w->given, w->given + count, s->kernel[0], s->kernel[1], s->kernel[2], w->field,
                w->field + cells);
         for (int i = 0; i < c; i++) {
             const size_t at = (size_t)s->row[i] * s->ny + s->column[i];
@@ -555,6 +677,11 @@ void plane_shear(plane *s, const double *force, double *moved) {
 void plane_lift(plane *s, const double *force, double *moved) {
     struct plane_work *w = s->work;
     const int c = s->points, p = s->nodes;
+    if (s->lift) {
+        memset(moved, 0, c * sizeof(double));
+        add_columns(c, s->lift, nonzero(2 * c, force, w->which, w->value), w->which, w->value, moved);
+        return;
+    }
     for (int d = 0; d < 2; d++) to_nodes(s, force + d * c, w->nodal + d * p);
     memset(w->nodes, 0, p * sizeof(double));
     if (s->zh) add_columns(p, s->zh, nonzero(2 * p, w->nodal, w->which, w->value), w->which, w->value, w->nodes);
@@ -564,7 +691,7 @@ void plane_lift(plane *s, const double *force, double *moved) {
     if (s->tread == GRID) {
         every_cell(s);
         memset(w->field, 0, (size_t)s->nx * s->ny * sizeof(double));
-        spread(s, count, w->some, w->given, w->given + count, s->kernel[3], s->kernel[4], 0, w->field, 0);
+        spread(s, everywhere(s), count, w->some, w->given, w->given + count, s->kernel[3], s->kernel[4], 0, w->field, 0);
         for (int i = 0; i < c; i++) moved[i] += w->field[(size_t)s->row[i] * s->ny + s->column[i]];
     } else
         for (int i = 0; i < c; i++)
@@ -574,17 +701,16 @@ void plane_lift(plane *s, const double *force, double *moved) {
             }
 }
 
-/* moved (2, c) += the tread's displacements in the plane under normal forces (c,). */
-void tread_drag(plane *s, const double *force, double *moved) {
+/* moved (2, c) += the tread's displacements in the plane under normal forces (c,), at the points within `bounds`. */
+static void tread_drag_within(plane *s, const double *force, double *moved) {
     struct plane_work *w = s->work;
     const int c = s->points;
     if (s->tread == RIGID || !s->coupled) return;
     const int count = loaded(s, force, 1);
     if (s->tread == GRID) {
         const size_t cells = (size_t)s->nx * s->ny;
-        every_cell(s);
         memset(w->field, 0, 2 * cells * sizeof(double));
-        spread(s, count, w->some, w->given, 0, s->kernel[3], s->kernel[4], 0, w->field, w->field + cells);
+        spread(s, everywhere(s), count, w->some, w->given, 0, s->kernel[3], s->kernel[4], 0, w->field, w->field + cells);
         for (int i = 0; i < c; i++) {
             const size_t at = (size_t)s->row[i] * s->ny + s->column[i];
             moved[i] -= w->field[at], moved[c + i] -= w->field[cells + at];
@@ -595,6 +721,11 @@ void tread_drag(plane *s, const double *force, double *moved) {
                 const size_t at = (size_t)i * c + w->some[a];
                 moved[i] -= s->kernel[3][at] * w->given[a], moved[c + i] -= s->kernel[4][at] * w->given[a];
             }
+}
+
+void tread_drag(plane *s, const double *force, double *moved) {
+    every_cell(s);
+    tread_drag_within(s, force, moved);
 }
 
 /* moved (2, c) = the tire's displacements in the plane under normal forces (c,). */
@@ -609,71 +740,65 @@ void plane_drag(plane *s, const double *force, double *moved) {
 
 /* ---- Stick and slip ---------------------------------------------------------------------------------------------- */
 
-enum { NEWTON_STEPS = 30, GRADIENT_STEPS = 5000, SHORT = 40 };
+enum { NEWTON_STEPS = 30, GRADIENT_STEPS = 5000, FEW = 200, SHORT = 40 };
 static const double INNER = 5e-2; /* residual reduction in a Newton step; which points slip is known no better */
 
-/* x (n,) with |A x - b| <= tolerance |b| by GMRES, in cycles of SHORT steps, at most n steps in all. */
+/* One cycle of GMRES of at most `most` steps from x = 0: x (n,) with |A x - b| <= tolerance |b| if that is enough. */
+static int cycle(int n, int most, int (*apply)(void *, const double *, double *), void *of, const double *right,
+                 double tolerance, double *x, int *done) {
+    const int lead = most + 1;
+    double *basis = malloc((size_t)lead * n * sizeof(double)), *h = malloc((size_t)lead * most * sizeof(double));
+    double *e = DOUBLES(lead), *cosine = DOUBLES(most), *sine = DOUBLES(most);
+    if (!basis || !h) abort();
+    const double size = e[0] = sqrt(dot(n, right, right));
+    memset(x, 0, n * sizeof(double));
+    *done = !(size > 0.0);
+    int k = 0;
+    for (int i = 0; i < n && !*done; i++) basis[i] = right[i] / size;
+    for (; k < most && !*done; k++) {
+        double *v = basis + (size_t)k * n, *restrict w = v + n, *column = h + (size_t)k * lead;
+        apply(of, v, w);
+        for (int l = 0; l <= k; l++) {
+            const double *restrict u = basis + (size_t)l * n, part = column[l] = dot(n, u, w);
+            for (int i = 0; i < n; i++) w[i] -= part * u[i];
+        }
+        const double length = sqrt(dot(n, w, w));
+        if (length > 0.0)
+            for (int i = 0; i < n; i++) w[i] /= length;
+        for (int l = 0; l < k; l++) {
+            const double a = column[l], b = column[l + 1];
+            column[l] = cosine[l] * a + sine[l] * b, column[l + 1] = -sine[l] * a + cosine[l] * b;
+        }
+        const double radius = hypot(column[k], length);
+        cosine[k] = radius > 0.0 ? column[k] / radius : 1.0, sine[k] = radius > 0.0 ? length / radius : 0.0;
+        column[k] = radius;
+        e[k + 1] = -sine[k] * e[k], e[k] *= cosine[k];
+        *done = !(fabs(e[k + 1]) > tolerance * size) || !(length > 0.0);
+    }
+    for (int l = k - 1; l >= 0; l--) {
+        for (int m = l + 1; m < k; m++) e[l] -= h[(size_t)m * lead + l] * e[m];
+        e[l] = h[(size_t)l * lead + l] != 0.0 ? e[l] / h[(size_t)l * lead + l] : 0.0;
+    }
+    for (int l = 0; l < k; l++)
+        for (int i = 0; i < n; i++) x[i] += e[l] * basis[(size_t)l * n + i];
+    free(basis), free(h), free(e), free(cosine), free(sine);
+    return k;
+}
+
+/* x (n,) by GMRES. A cycle of n steps yields the solution for any A and the rest is rounding, so x is returned; with
+   many unknowns a short cycle, which takes less memory, is tried first. Returns the products taken. */
 int krylov(int n, int (*apply)(void *, const double *, double *), void *of, const double *right, double tolerance,
            double *x) {
-    const int most = n < SHORT ? n : SHORT;
-    double *basis = DOUBLES((size_t)(most + 1) * n), *h = DOUBLES((size_t)(most + 1) * most), *e = DOUBLES(most + 1);
-    double *cosine = DOUBLES(most), *sine = DOUBLES(most);
-    const double size = sqrt(dot(n, right, right));
-    memset(x, 0, n * sizeof(double));
-    int taken = 0, first = 1;
-    while (size > 0.0 && taken < 2 * n + SHORT) {
-        double *r = basis;
-        if (first) memcpy(r, right, n * sizeof(double));
-        else {
-            apply(of, x, r);
-            for (int i = 0; i < n; i++) r[i] = right[i] - r[i];
-        }
-        first = 0;
-        const double begun = sqrt(dot(n, r, r));
-        if (!(begun > tolerance * size)) break;
-        for (int i = 0; i < n; i++) r[i] /= begun;
-        memset(e, 0, (most + 1) * sizeof(double));
-        e[0] = begun;
-        int k = 0, done = 0;
-        for (; k < most && !done; k++) {
-            double *v = basis + (size_t)k * n, *w = v + n, *column = h + (size_t)k * (most + 1);
-            apply(of, v, w);
-            taken++;
-            for (int l = 0; l <= k; l++) {
-                const double *u = basis + (size_t)l * n, part = column[l] = dot(n, u, w);
-                for (int i = 0; i < n; i++) w[i] -= part * u[i];
-            }
-            const double length = column[k + 1] = sqrt(dot(n, w, w));
-            if (length > 0.0)
-                for (int i = 0; i < n; i++) w[i] /= length;
-            for (int l = 0; l < k; l++) {
-                const double a = column[l], b = column[l + 1];
-                column[l] = cosine[l] * a + sine[l] * b, column[l + 1] = -sine[l] * a + cosine[l] * b;
-            }
-            const double a = column[k], b = column[k + 1], radius = hypot(a, b);
-            cosine[k] = radius > 0.0 ? a / radius : 1.0, sine[k] = radius > 0.0 ? b / radius : 0.0;
-            column[k] = radius, column[k + 1] = 0.0;
-            e[k + 1] = -sine[k] * e[k], e[k] *= cosine[k];
-            done = !(fabs(e[k + 1]) > tolerance * size) || length == 0.0;
-        }
-        for (int l = k - 1; l >= 0; l--) {
-            double sum = e[l];
-            for (int m = l + 1; m < k; m++) sum -= h[(size_t)m * (most + 1) + l] * e[m];
-            e[l] = h[(size_t)l * (most + 1) + l] != 0.0 ? sum / h[(size_t)l * (most + 1) + l] : 0.0;
-        }
-        for (int l = 0; l < k; l++)
-            for (int i = 0; i < n; i++) x[i] += e[l] * basis[(size_t)l * n + i];
-        if (done) break;
-    }
-    free(basis), free(h), free(e), free(cosine), free(sine);
+    int done, taken = cycle(n, n > FEW ? SHORT : n, apply, of, right, tolerance, x, &done);
+    if (!done && n > FEW) taken += cycle(n, n, apply, of, right, tolerance, x, &done);
     return taken;
 }
 
 /* B t (2, a) m for t (2, a) N. */
-static void stiffness(stick_slip *s, const double *force, double *moved) {
+static void stiffness(stick_slip *s, int reach, const double *force, double *moved) {
     const int a = s->count;
     s->products++;
-    shear_some(s->compliance, a, s->index, force, moved);
+    shear_some(s->compliance, reach, a, s->index, force, moved);
     for (int d = 0; d < 2; d++)
         for (int i = 0; i < a; i++) moved[d * a + i] += s->spring[i] * force[d * a + i];
 }
@@ -694,12 +819,14 @@ static double most_force(const stick_slip *s) {
     return most;
 }
 
-/* The trial forces t - r (B t + c) and the residual t - P(trial) of the present forces. */
+/* The trial forces t - r (B t + c) and the residual t - P(trial) of the present forces; returns its largest. */
 static double residual(stick_slip *s, double *trial, double *off) {
     const int a = s->count;
     double worst = 0.0;
-    stiffness(s, s->force, trial);
-    for (int i = 0; i < 2 * a; i++) trial[i] = s->force[i] - s->inverse[i % a] * (trial[i] + s->constant[i]);
+    stiffness(s, everywhere(s->compliance), s->force, trial);
+    for (int d = 0; d < 2 * a; d += a)
+        for (int i = 0; i < a; i++)
+            trial[d + i] = s->force[d + i] - s->inverse[i] * (trial[d + i] + s->constant[d + i]);
     memcpy(off, trial, 2 * a * sizeof(double));
     onto_discs(a, s->bound, off);
     for (int i = 0; i < 2 * a; i++) off[i] = s->force[i] - off[i];
@@ -707,37 +834,56 @@ static double residual(stick_slip *s, double *trial, double *off) {
     return worst;
 }
 
-/* Take the guess, cut to the bounds: its residual is in `off`. */
-int stick_slip_take(stick_slip *s) {
-    double *trial = DOUBLES(2 * s->count), *off = DOUBLES(2 * s->count);
-    onto_discs(s->count, s->bound, s->force);
-    s->off = residual(s, trial, off);
-    s->largest = most_force(s);
-    free(trial), free(off);
-    return isfinite(s->off) ? SOLVED : NOT_FINITE;
-}
-
 struct newton {
     stick_slip *problem;
     double *normal, *share;               /* (2, a), (a,): the projection's derivative b/|t| (I - n n^T) */
 };
 
+/* moved (2, a) = B t, and with the normal forces that follow t, f' = -A_NN^-1 A_Nt t, also A_tN f'; `follows` (n,). */
+static void followed(stick_slip *s, const double *step, double *moved, double *follows) {
+    plane *c = s->compliance;
+    struct plane_work *w = c->work;
+    const struct factor *f = s->normal->factor;
+    const int a = s->count, n = c->points;
+    s->products++;
+    to_slots(c, a, s->index, step);
+    product(w->slots, 2 * w->slots, w->zt, n, w->t, 0.0, w->z);
+    for (int k = 0; k < f->count; k++) { /* a point that touches without a force is in no slot */
+        const int at = w->slot[f->index[k]];
+        follows[f->index[k]] = at < 0 ? 0.0 : -w->z[at];
+    }
+    solve_factor(s->normal->factor, follows);
+    product(2 * w->slots, 2 * w->slots, w->tt, 2 * n, w->t, 0.0, w->u);
+    memset(w->z, 0, w->slots * sizeof(double));
+    for (int k = 0; k < f->count; k++)
+        if (w->slot[f->index[k]] >= 0) w->z[w->slot[f->index[k]]] = follows[f->index[k]];
+    product(2 * w->slots, w->slots, w->tz, 2 * n, w->z, 1.0, w->u);
+    from_slots(c, a, s->index, moved);
+    for (int d = 0; d < 2; d++)
+        for (int i = 0; i < a; i++) moved[d * a + i] += s->spring[i] * step[d * a + i];
+}
+
 static int derivative(void *of, const double *step, double *out) {
     struct newton *s = of;
-    const int a = s->problem->count;
-    const double *inverse = s->problem->inverse, *n = s->normal;
-    stiffness(s->problem, step, out);
+    stick_slip *problem = s->problem;
+    const int a = problem->count;
+    const double *inverse = problem->inverse, *n = s->normal;
+    double *follows = problem->normal ? problem->normal->factor->right : 0;
+    if (follows) followed(problem, step, out, follows);
+    else stiffness(problem, problem->compliance->near, step, out);
     for (int i = 0; i < a; i++) {
         double x = inverse[i] * out[i] - step[i], y = inverse[i] * out[a + i] - step[a + i];
         const double along = n[i] * x + n[a + i] * y;
-        x -= n[i] * along, y -= n[a + i] * along;
-        out[i] = step[i] + s->share[i] * x, out[a + i] = step[a + i] + s->share[i] * y;
+        x = s->share[i] * (x - n[i] * along), y = s->share[i] * (y - n[a + i] * along);
+        if (follows) /* the bound of a point that slips follows its normal force */
+            x -= n[i] * problem->friction * follows[problem->index[i]], y -= n[a + i] * problem->friction * follows[problem->index[i]];
+        out[i] = step[i] + x, out[a + i] = step[a + i] + y;
     }
     return 0;
 }
 
 /* A semismooth Newton step from the trial forces and their residual: d + P' (r B d - d) = -residual. */
-static void newton_step(stick_slip *s, const double *trial, double *off) {
+static void newton_step(stick_slip *s, const double *trial, double *off, double tolerance) {
     const int a = s->count;
     double *normal = DOUBLES(2 * a), *share = DOUBLES(a), *step = DOUBLES(2 * a);
     for (int i = 0; i < a; i++) {
@@ -748,19 +894,9 @@ static void newton_step(stick_slip *s, const double *trial, double *off) {
     }
     for (int i = 0; i < 2 * a; i++) off[i] = -off[i];
     struct newton given = {s, normal, share};
-    krylov(2 * a, derivative, &given, off, INNER, step);
+    krylov(2 * a, derivative, &given, off, tolerance, step);
     for (int i = 0; i < 2 * a; i++) s->force[i] += step[i];
     free(normal), free(share), free(step);
-}
-
-/* The forces after one Newton step, within the bounds. */
-int stick_slip_improve(stick_slip *s) {
-    double *trial = DOUBLES(2 * s->count), *off = DOUBLES(2 * s->count);
-    residual(s, trial, off);
-    newton_step(s, trial, off);
-    onto_discs(s->count, s->bound, s->force);
-    free(trial), free(off);
-    return SOLVED;
 }
 
 /* Projected gradients with Nesterov's momentum, restarted where it points uphill: slow but safe for symmetric B. */
@@ -771,7 +907,7 @@ static int gradients(stick_slip *s, double tolerance) {
     int found = UNSOLVED;
     memcpy(ahead, s->force, 2 * a * sizeof(double));
     for (int step = 0; step < GRADIENT_STEPS && found != SOLVED; step++) {
-        stiffness(s, ahead, moved);
+        stiffness(s, everywhere(s->compliance), ahead, moved);
         for (int i = 0; i < 2 * a; i++) new[i] = ahead[i] - rate * (moved[i] + s->constant[i]);
         onto_discs(a, s->bound, new);
         double worst = 0.0, uphill = 0.0;
@@ -795,7 +931,9 @@ int stick_slip_solve(stick_slip *s, double tolerance) {
     const int a = s->count;
     double *trial = DOUBLES(2 * a), *off = DOUBLES(2 * a), *begun = DOUBLES(2 * a);
     int found = UNSOLVED;
+    if (!s->compliance->lift) carry(s->compliance, a, s->index);
     memcpy(begun, s->force, 2 * a * sizeof(double));
+    onto_discs(a, s->bound, s->force);
     for (int step = 0; step < NEWTON_STEPS; step++) {
         s->off = residual(s, trial, off);
         s->largest = most_force(s);
@@ -803,7 +941,7 @@ int stick_slip_solve(stick_slip *s, double tolerance) {
             found = SOLVED;
             break;
         }
-        newton_step(s, trial, off);
+        newton_step(s, trial, off, INNER);
     }
     if (found != SOLVED) {
         memcpy(s->force, begun, 2 * a * sizeof(double));
@@ -816,12 +954,13 @@ int stick_slip_solve(stick_slip *s, double tolerance) {
 
 /* ---- Both in turn -------------------------------------------------------------------------------------------------- */
 
-enum { TURNS = 100, FLAT = 30, MIXED = 4, LIFT_PATIENCE = 10 };
+/* Turns: at most; in which the normal forces follow in a Newton step; after which stick and slip are solved in each. */
+enum { TURNS = 100, FOLLOWED = 10, FLAT = 30, MIXED = 4, LIFT_PATIENCE = 10 };
 static const double SLIDING_TOLERANCE = 1e-10;
 
 struct brush_work {
     double *share, *past, *trial, *given, *moved, *lift, *found, *q, *mixed;
-    double *spring, *inverse, *constant, *bound, *force;
+    double *spring, *inverse, *constant, *bound, *force, *ahead, *off;
     double *results[MIXED], *residuals[MIXED];
     int *index;
     uint8_t *lifted, *touching, *set;
@@ -831,8 +970,9 @@ int brush_begin(brush *s) {
     const int c = s->compliance->points;
     struct brush_work *w = s->work = room(1, sizeof *w);
     double **doubles[] = {&w->share, &w->past, &w->trial, &w->given, &w->moved, &w->lift, &w->found, &w->q,
-                          &w->mixed, &w->spring, &w->inverse, &w->constant, &w->bound, &w->force};
-    for (int i = 0; i < 14; i++) *doubles[i] = DOUBLES(2 * c);
+                          &w->mixed, &w->spring, &w->inverse, &w->constant, &w->bound, &w->force,
+                          &w->ahead, &w->off};
+    for (int i = 0; i < 16; i++) *doubles[i] = DOUBLES(2 * c);
     for (int i = 0; i < MIXED; i++) w->results[i] = DOUBLES(2 * c), w->residuals[i] = DOUBLES(2 * c);
     w->index = INTS(c), w->lifted = room(c, 1), w->touching = room(c, 1), w->set = room(c, 1);
     return SOLVED;
@@ -842,7 +982,7 @@ void brush_end(brush *s) {
     struct brush_work *w = s->work;
     for (int i = 0; i < MIXED; i++) free(w->results[i]), free(w->residuals[i]);
     void *all[] = {w->share, w->past, w->trial, w->given, w->moved, w->lift, w->found, w->q, w->mixed, w->spring,
-                   w->inverse, w->constant, w->bound, w->force, w->index, w->lifted, w->touching, w->set, w};
+                   w->inverse, w->constant, w->bound, w->force, w->ahead, w->off, w->index, w->lifted, w->touching, w->set, w};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) free(all[i]);
 }
 
@@ -946,17 +1086,95 @@ static stick_slip sticking(brush *s, const double *force) {
         w->bound[k] = s->friction < 0.0 ? INFINITY : s->friction * force[i];
         for (int d = 0; d < 2; d++) w->constant[d * a + k] = w->moved[d * c + i] + w->past[d * c + i] / w->share[i];
     }
-    carry(s->compliance, a, w->index);
+    if (!s->compliance->lift) carry(s->compliance, a, w->index);
     stick_slip problem = {s->compliance, a, w->index, w->spring, w->inverse, w->constant, w->bound, w->force};
     problem.norm = s->norm + (a ? largest(a, w->spring) : 0.0);
     return problem;
+}
+
+/* moved (2, c) = the displacements in the plane under normal forces (c,), where the kernel reads them. */
+static void drag(brush *s, const double *force, const double *free, double *moved) {
+    plane *compliance = s->compliance;
+    struct plane_work *w = compliance->work;
+    const int c = compliance->points;
+    if (compliance->lift) { /* between the points that touch: the others are read once, in `finish` */
+        int count = 0;
+        for (int i = 0; i < c; i++)
+            if (force[i] > 0.0) w->some[count++] = i;
+        hold(compliance, count, w->some);
+        memset(w->z, 0, w->slots * sizeof(double));
+        for (int a = 0; a < count; a++) w->z[w->slot[w->some[a]]] = force[w->some[a]];
+        product(2 * w->slots, w->slots, w->tz, 2 * c, w->z, 0.0, w->u);
+        for (int a = 0; a < count; a++) {
+            const int i = w->some[a], k = w->slot[i];
+            moved[i] = w->u[2 * k], moved[c + i] = w->u[2 * k + 1];
+            for (int d = 0; d < 2 * c; d += c) moved[d + i] += free[d + i] - s->dragged[d + i];
+        }
+        return;
+    }
+    plane_drag(compliance, force, moved);
+    int count = 0; /* read where points touch and at those next ahead of them */
+    for (int i = 0; i < c; i++)
+        if (force[i] > 0.0) w->some[count++] = i;
+    if (compliance->tread == GRID) bounds(compliance, count, w->some);
+    for (int a = 0; a < count && compliance->tread == GRID; a++) {
+        const int next = s->ahead[w->some[a]], row = compliance->row[next], column = compliance->column[next];
+        if (column < w->first[row]) w->first[row] = column;
+        if (column > w->last[row]) w->last[row] = column;
+    }
+    tread_drag_within(compliance, force, moved);
+    for (int i = 0; i < 2 * c; i++) moved[i] += free[i] - s->dragged[i];
+}
+
+/* Set the state of the bristles: their deflections, the displacements of their bases, which points touched. */
+static void finish(brush *s, const double *force, const double *free) {
+    struct brush_work *w = s->work;
+    plane *compliance = s->compliance;
+    const int c = compliance->points;
+    memcpy(s->before, s->horizontal, 2 * c * sizeof(double));
+    memcpy(s->horizontal, w->found, 2 * c * sizeof(double));
+    if (compliance->lift) { /* at the points that touch and those next ahead, on the rows between the first and the last */
+        struct plane_work *p = compliance->work;
+        int low = c, high = 0;
+        for (int i = 0; i < c; i++)
+            if (force[i] > 0.0) {
+                const int next = s->ahead[i];
+                low = i < low ? i : low, high = i > high ? i : high;
+                low = next < low ? next : low, high = next > high ? next : high;
+            }
+        memcpy(w->lift, force, c * sizeof(double));
+        for (int half = 0; half < 2 && low <= high; half++) {
+            double *moved = s->moved + half * c + low;
+            for (int i = low; i <= high; i++) moved[i - low] = free[half * c + i] - s->dragged[half * c + i];
+            int count = nonzero(c, force, p->which, p->value);
+            for (int k = 0; k < 2 * c; k++)
+                if (w->found[k] != 0.0) p->which[count] = c + k, p->value[count++] = w->found[k];
+            const double *from = compliance->beside + half * c + low;
+            const int n = high - low + 1;
+            int k = 0;
+            for (; k + 4 <= count; k += 4) {
+                const double *restrict a0 = from + (size_t)p->which[k] * 2 * c, *restrict a1 = from + (size_t)p->which[k + 1] * 2 * c;
+                const double *restrict a2 = from + (size_t)p->which[k + 2] * 2 * c, *restrict a3 = from + (size_t)p->which[k + 3] * 2 * c;
+                const double v0 = p->value[k], v1 = p->value[k + 1], v2 = p->value[k + 2], v3 = p->value[k + 3];
+                for (int i = 0; i < n; i++) moved[i] += v0 * a0[i] + v1 * a1[i] + v2 * a2[i] + v3 * a3[i];
+            }
+            for (; k < count; k++)
+                for (int i = 0; i < n; i++) moved[i] += p->value[k] * from[(size_t)p->which[k] * 2 * c + i];
+        }
+    } else {
+        plane_shear(compliance, w->found, w->lift);
+        for (int i = 0; i < 2 * c; i++) s->moved[i] = w->moved[i] + w->lift[i];
+    }
+    for (int d = 0; d < 2 * c; d += c)
+        for (int i = 0; i < c; i++) s->deflection[d + i] = -w->found[d + i] / s->stiffness[i];
+    for (int i = 0; i < c; i++) s->touched[i] = force[i] > 0.0;
 }
 
 int brush_solve(brush *s, normal_solver solve, void *of, const double *q, const uint8_t *guess, const double *at_rest,
                 const double *free, double *force) {
     struct brush_work *w = s->work;
     plane *compliance = s->compliance;
-    const int c = compliance->points, unbounded = s->friction < 0.0;
+    const int c = compliance->points, unbounded = s->friction < 0.0, own = solve == active_set_normal;
     int held = 0, failed;
     offer(s, w->share, w->past);
     memset(w->lifted, 0, c);
@@ -964,26 +1182,24 @@ int brush_solve(brush *s, normal_solver solve, void *of, const double *q, const 
     for (s->turns = 1; s->turns <= TURNS; s->turns++) {
         plane_lift(compliance, w->trial, w->lift);
         for (int i = 0; i < c; i++) w->q[i] = q[i] + w->lift[i];
-        if (solve == active_set_normal) ((active_set *)of)->again = s->turns > 1;
+        if (own) ((active_set *)of)->again = s->turns > 1;
         if ((failed = solve(of, w->q, guess, at_rest, force))) return failed;
         for (int i = 0; i < c; i++) w->set[i] = force[i] > 0.0;
         guess = w->set;
-        for (int i = 0; i < c; i++) w->given[i] = force[i] - at_rest[i];
-        plane_drag(compliance, w->given, w->moved);
-        for (int i = 0; i < c; i++) w->given[i] = force[i] - (s->pressed ? s->pressed[i] : at_rest[i]);
-        tread_drag(compliance, w->given, w->moved);
-        for (int i = 0; i < 2 * c; i++) w->moved[i] += free[i];
+        drag(s, force, free, w->moved);
         if (unbounded) /* a point that comes and goes: its own bristle lifts it off */
             for (int i = 0; i < c; i++) {
-                const uint8_t now = force[i] > 0.0;
-                if (s->turns > LIFT_PATIENCE && now != w->touching[i]) w->lifted[i] = 1;
-                w->touching[i] = now;
+                if (s->turns > LIFT_PATIENCE && w->set[i] != w->touching[i]) w->lifted[i] = 1;
+                w->touching[i] = w->set[i];
             }
         stick_slip problem = sticking(s, force);
-        const int a = problem.count;
+        const int a = problem.count, follows = own && compliance->lift && s->turns <= FOLLOWED;
         for (int d = 0; d < 2; d++)
             for (int k = 0; k < a; k++) w->force[d * a + k] = w->trial[d * c + w->index[k]];
-        if ((failed = stick_slip_take(&problem))) return failed;
+        onto_discs(a, w->bound, w->force);
+        problem.off = residual(&problem, w->ahead, w->off);
+        problem.largest = most_force(&problem);
+        if (!isfinite(problem.off)) return NOT_FINITE;
         const double limit = s->tolerance * problem.largest;
         double cut = 0.0; /* what the bounds have cut off still acted on the normal forces */
         memset(w->found, 0, 2 * c * sizeof(double));
@@ -992,22 +1208,21 @@ int brush_solve(brush *s, normal_solver solve, void *of, const double *q, const 
         for (int i = 0; i < 2 * c; i++) cut = fmax(cut, fabs(w->found[i] - w->trial[i]));
         if (fmax(problem.off, cut) <= limit) {
             s->products += problem.products, s->all_turns += s->turns;
-            memcpy(s->before, s->horizontal, 2 * c * sizeof(double));
-            memcpy(s->horizontal, w->found, 2 * c * sizeof(double));
-            plane_shear(compliance, w->found, w->lift);
-            for (int i = 0; i < 2 * c; i++) {
-                s->moved[i] = w->moved[i] + w->lift[i];
-                s->deflection[i] = -w->found[i] / s->stiffness[i % c];
-            }
-            for (int i = 0; i < c; i++) s->touched[i] = force[i] > 0.0;
+            finish(s, force, free);
             return SOLVED;
         }
-        failed = s->turns <= FLAT ? stick_slip_improve(&problem) : stick_slip_solve(&problem, SLIDING_TOLERANCE);
+        if (s->turns > FLAT) failed = stick_slip_solve(&problem, SLIDING_TOLERANCE);
+        else {
+            if (follows) problem.normal = of, problem.friction = unbounded ? 0.0 : s->friction;
+            newton_step(&problem, w->ahead, w->off, INNER);
+            onto_discs(a, w->bound, w->force);
+        }
         s->products += problem.products;
         if (failed) return failed;
         for (int d = 0; d < 2; d++)
             for (int k = 0; k < a; k++) w->found[d * c + w->index[k]] = w->force[d * a + k];
-        held = mix(s, held, w->trial, w->found, w->trial);
+        if (follows) memcpy(w->trial, w->found, 2 * c * sizeof(double));
+        else held = mix(s, held, w->trial, w->found, w->trial);
     }
     return UNSOLVED;
 }

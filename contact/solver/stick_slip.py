@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from tireroad.contact.choices import DENSE_POINTS
 from tireroad.contact.solver.active_set import COMPILED, ActiveSet
 from tireroad.contact.solver.conditions import Array, ContactSolver, Mask
 from tireroad.contact.tread.brush import Brush
@@ -29,7 +30,9 @@ class CompressedRows:
     def __init__(self, matrix: sparse.spmatrix) -> None:
         rows = sparse.csr_matrix(matrix)
         rows.sort_indices()
-        self.begin, self.column = (COMPILED.ints(part.astype(np.int32)) for part in (rows.indptr, rows.indices))
+        self.begin, self.column = (
+            COMPILED.ints(part.astype(np.int32)) for part in (rows.indptr, rows.indices)
+        )
         self.value = COMPILED.doubles(rows.data.astype(float))
 
 
@@ -71,9 +74,45 @@ class PlaneCompliance:
             self._held["hz"] = COMPILED.doubles(np.ascontiguousarray(tire[p:, :p].T))
         if shear is not None:
             self._held |= shear.compiled(COMPILED)
+        if first and c <= DENSE_POINTS:
+            lift, beside = self._dense(first)
+            self._held |= {"lift": COMPILED.doubles(lift), "beside": COMPILED.doubles(beside)}
         self.compiled = _FFI.new("plane *", self._held)
         _C.plane_begin(self.compiled)
         self._freed = _FFI.gc(self.compiled, _C.plane_end)
+
+    def _dense(self, first: int) -> tuple[Array, Array]:
+        """A_zt (2c, c) and [A_tz A_tt] (3c, 2c) between the points, by columns."""
+        w, c = self.weights, self.weights.shape[0]
+
+        def between(rows: slice, columns: slice) -> Array:
+            block = self.tire[rows, columns]
+            parts = [[w @ (w @ part.T).T for part in np.split(row, row.shape[1] // first, axis=1)]
+                     for row in np.split(block, len(block) // first)]  # fmt: skip
+            return np.block(parts)
+
+        down, beside = slice(0, first), slice(first, None)
+        lift, drag, plane = between(down, beside), between(beside, down), between(beside, beside)
+        if self.shear is not None:
+            every = np.arange(c)
+            plane += self.shear.matrix(every)
+            if self.shear.coupled:
+                lifted = self.shear.lifted(every)
+                lift += lifted
+                drag += lifted.T
+        return np.ascontiguousarray(lift.T), np.ascontiguousarray(np.hstack([drag, plane]).T)
+
+    def drag(self, force: Array, pressed: Array) -> Array:
+        """Displacements (2, c) m in the plane: the tire's under normal forces `force` and the tread's under
+        `pressed` (c,) N."""
+        moved, given = (
+            np.zeros((2, len(force))),
+            (np.ascontiguousarray(each, float) for each in (force, pressed)),
+        )
+        tire, tread = (COMPILED.doubles(each) for each in given)
+        _C.plane_drag(self.compiled, tire, COMPILED.doubles(moved))
+        _C.tread_drag(self.compiled, tread, COMPILED.doubles(moved))
+        return moved
 
     @property
     def bound(self) -> float:
@@ -82,12 +121,18 @@ class PlaneCompliance:
             count = 2 * self.weights.shape[1]
             size = float(np.linalg.norm(self.tire[-count:, -count:], 2))
             spread = sparse.linalg.norm(self.weights, 1) * sparse.linalg.norm(self.weights, np.inf)
-            self._bound = size * float(spread) + (self.shear.bound if self.shear is not None else 0.0)
+            self._bound = size * float(spread) + (
+                self.shear.bound if self.shear is not None else 0.0
+            )
         return self._bound
 
 
 def stick_slip(
-    compliance: PlaneCompliance, constant: Array, bound: Array, guess: Array, spring: float | Array = 0.0
+    compliance: PlaneCompliance,
+    constant: Array,
+    bound: Array,
+    guess: Array,
+    spring: float | Array = 0.0,
 ) -> Array:
     """Tangential forces t (c, 2) N: B t + c = 0 within the bounds, against the slip on them, to 1e-10 of the largest.
 
@@ -112,7 +157,9 @@ def stick_slip(
     held = {name: COMPILED.doubles(values) for name, values in given.items()}
     held["index"] = COMPILED.ints(np.arange(count, dtype=np.int32))
     norm = compliance.bound + float(springs.max(initial=0.0))
-    problem = _FFI.new("stick_slip *", held | {"compliance": compliance.compiled, "count": count, "norm": norm})
+    problem = _FFI.new(
+        "stick_slip *", held | {"compliance": compliance.compiled, "count": count, "norm": norm}
+    )
     if _C.stick_slip_solve(problem, SLIDING_TOLERANCE):
         raise _no_equilibrium()
     return force.T.copy()
@@ -170,9 +217,12 @@ class BrushFriction:
             "pitches": brush.pitches, "deflection": brush.deflected, "moved": brush.moved,
             "horizontal": self._horizontal, "before": self._before,
         }  # fmt: skip
-        if pressed is not None:
-            doubles["pressed"] = np.ascontiguousarray(pressed, dtype=float)
-        self._held: dict[str, Any] = {name: COMPILED.doubles(values) for name, values in doubles.items()}
+        self._pressed, self._dragged = pressed, np.zeros((2, c))
+        self._static: Array | None = None
+        doubles["dragged"] = self._dragged
+        self._held: dict[str, Any] = {
+            name: COMPILED.doubles(values) for name, values in doubles.items()
+        }
         self._held |= {
             "compliance": plane.compiled, "spring_kind": law.kind == "spring", "tolerance": tolerance,
             "friction": -1.0 if law.friction is None else law.friction, "way": brush.way, "norm": plane.bound,
@@ -206,13 +256,22 @@ class BrushFriction:
         return 1.0 / max(float(np.linalg.norm(coupling, 2)), 1e-300)
 
     def state(self) -> dict[str, Array]:
-        """The state that a checkpoint keeps."""
-        return self._brush.state() | {"horizontal": self.horizontal, "horizontal_before": self._before.T.copy()}
+        """The state that a checkpoint keeps; the order of points `held` decides how sums are rounded."""
+        held = np.empty(len(self._touched), np.int32)
+        held = held[: _C.plane_held(self._plane.compiled, COMPILED.ints(held))]
+        kept = {
+            "horizontal": self.horizontal,
+            "horizontal_before": self._before.T.copy(),
+            "held": held,
+        }
+        return self._brush.state() | kept
 
     def set_state(self, state: dict[str, Array]) -> None:
         """Continue from `state`."""
         self._horizontal[:], self._before[:] = state["horizontal"].T, state["horizontal_before"].T
         self._brush.set_state(state)
+        held = np.ascontiguousarray(state["held"], np.int32)
+        _C.plane_hold(self._plane.compiled, len(held), COMPILED.ints(held))
 
     def solve(
         self, normal: ContactSolver, q: Array, guess: Mask | None, static: Array, free: Array
@@ -222,6 +281,11 @@ class BrushFriction:
         `guess`: the points that touch, by default those of the last step. ConvergenceError after 100 turns without
         convergence.
         """
+        if static is not self._static:
+            self._static = static
+            self._dragged[:] = self._plane.drag(
+                static, static if self._pressed is None else self._pressed
+            )
         called: list[BaseException] = []
         solve, of = self._normal(normal, static, called)
         given = (
@@ -239,14 +303,19 @@ class BrushFriction:
             normal.check(failed)
         return force, self._horizontal.T
 
-    def _normal(self, normal: ContactSolver, static: Array, called: list[BaseException]) -> tuple[Any, Any]:
+    def _normal(
+        self, normal: ContactSolver, static: Array, called: list[BaseException]
+    ) -> tuple[Any, Any]:
         """The function that solves for normal forces, and its object; what it raises is kept in `called`."""
         if isinstance(normal, ActiveSet):
             return _C.active_set_normal, normal.compiled
         size = len(static)
 
         def solve(of: Any, q: Any, guess: Any, reference: Any, force: Any) -> int:
-            found = _array(q, size).copy(), None if guess == _FFI.NULL else _array(guess, size, bool).copy()
+            found = (
+                _array(q, size).copy(),
+                None if guess == _FFI.NULL else _array(guess, size, bool).copy(),
+            )
             try:
                 _array(force, size)[:] = normal.solve(*found, reference=static)
             except BaseException as error:  # carried over the kernel
@@ -258,7 +327,9 @@ class BrushFriction:
 
     def _unsolved(self) -> ConvergenceError:
         unbounded = self._brush.law.friction is None
-        key = "give contact.friction, which bounds them," if unbounded else "lower contact.friction,"
+        key = (
+            "give contact.friction, which bounds them," if unbounded else "lower contact.friction,"
+        )
         return ConvergenceError(
             f"contact: normal and horizontal forces do not converge in {TURNS} iterations; the horizontal forces "
             f"are too large for this step: {key} the brush's stiffness or time.step"

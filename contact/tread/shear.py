@@ -35,6 +35,9 @@ Plane = NDArray[np.complex128]  # x + iy
 Index = NDArray[np.intp]
 
 
+_UNREAD = 0.03  # share of the sum of a kernel that a Newton step leaves out
+
+
 class ShearConvolution:
     """Convolution by FFT over twice a grid of `shape`, with kernels (5, ...) on it; `place` (a,): flat
     indices of the points on the grid.
@@ -140,7 +143,7 @@ class Shear(Protocol):
 
     count: int
     coupled: bool
-    own: float | Array
+    own: Any  # a number, or (c,)
     bound: float
 
     def spread(self, force: Plane) -> Plane:
@@ -217,7 +220,8 @@ class KernelShear:
         self.coupled = bool(self._kernels[3:].any())
         self._whole = ShearConvolution(self._kernels, grid.shape, grid.place)
         far = (np.arange(1 - n, n) for n in grid.shape)  # behind, in the layout of `doubled`
-        self._around = np.ascontiguousarray(self._kernels[:, *np.ix_(*far)])
+        i, j = np.ix_(*far)
+        self._around = np.ascontiguousarray(self._kernels[:, i, j])
         self.own = float(self._kernels[0, 0, 0] + self._kernels[2, 0, 0]) / 2
         # Upper bound of the row sums of both components of `spread`.
         self.bound = float(np.abs(self._around[:3]).sum())
@@ -233,12 +237,21 @@ class KernelShear:
         return np.block([[xx, xy], [xy, yy]])
 
     def compiled(self, library: Library) -> dict[str, Any]:
-        """The five kernels over the offsets from one end of the grid to the other, and the points on it."""
+        """The five kernels over the offsets from one end of the grid to the other, and the points on it.
+
+        A Newton step is solved to 5 % only, so it reads the kernels as far as they have all but that of their sum.
+        """
+        size, (nx, ny) = np.abs(self._around[[0, 2]]).max(axis=0), self._grid.shape
+        apart = np.maximum(
+            *np.meshgrid(*(abs(np.arange(1 - n, n)) for n in (nx, ny)), indexing="ij")
+        )
+        within = np.bincount(apart.ravel(), weights=size.ravel()).cumsum()
+        near = int(np.searchsorted(within, (1.0 - _UNREAD) * within[-1]))
         row, column = np.divmod(self._grid.place, self._grid.shape[1])
         return {
             "tread": library.lib.GRID, "coupled": self.coupled,
             "kernel": [library.doubles(kernel) for kernel in self._around],
-            "nx": self._grid.shape[0], "ny": self._grid.shape[1],
+            "nx": nx, "ny": ny, "near": near,
             "row": library.ints(row.astype(np.int32)), "column": library.ints(column.astype(np.int32)),
         }  # fmt: skip
 

@@ -162,3 +162,11 @@ def attributes(results: Results, name: str, wanted: tuple[tuple[str, str], ...])
     """Facts from those attributes (key, unit) that the file has."""
     found = [(key, unit, results.attribute(name, key)) for key, unit in wanted]
     return [(key.replace("_", " "), quantity(v, unit)) for key, unit, v in found if v is not None]
+
+
+def without_friction(results: Results) -> bool:
+    """Whether the loop of a run had no friction, so that its horizontal forces come from the road's slope alone."""
+    try:
+        return float(results.attribute("contact.h5", "friction")) == 0.0
+    except (Absent, InputError, TypeError):  # a file that is damaged is told of by its own section
+        return False

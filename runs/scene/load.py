@@ -41,7 +41,14 @@ from tireroad.runs.scene.schema import (
     table_of,
     variant_of,
 )
-from tireroad.runs.scene.tables.scene import DampingTable, ModalTable, RoadTable, Scene, filled
+from tireroad.runs.scene.tables.scene import (
+    DampingTable,
+    ModalTable,
+    RoadTable,
+    Scene,
+    filled,
+    rubbed,
+)
 from tireroad.runs.scene.tables.tire import SECTIONS, check_series
 
 LARGEST = 1_000_000
@@ -236,19 +243,12 @@ def _by_band(scene: Scene, raw: dict[str, Any]) -> bool:
 def with_points(scene: Scene, raw: dict[str, Any], say: Say) -> Scene:
     """`ON_A_WAVE` contact points on the shortest wave, where that is closer than `CLOSE`.
 
-    Not with friction, whose steps cost too much more with many points. `contact.points = "auto"`
-    else (contact.patch).
+    `contact.points = "auto"` else (contact.patch).
     """
     contact, rotation = scene.contact, scene.rotation
     if not _by_band(scene, raw) or "points" in _keys_in(raw, "contact"):
         return scene
-    if (
-        contact is None
-        or contact.on_nodes
-        or contact.has_friction
-        or rotation is None
-        or not rotation.speed
-    ):
+    if contact is None or contact.on_nodes or rotation is None or not rotation.speed:
         return scene
     speed = rotation.speed * scene.tire.proportions().outer_radius
     wave = speed / scene.accuracy.up_to
@@ -384,7 +384,7 @@ def load(
         source.add(
             ("name",), f"must be letters, digits, '.', '_', '-', not {described(scene.name)}"
         )
-    scene = with_band(filled(scene), raw, say)
+    scene = with_band(rubbed(filled(scene)), raw, say)
     scene = replace(scene, tire=scene.tire.with_elements(scene.static.on_road))
     if "tire" not in source.broken():
         check_series(scene.tire, source)

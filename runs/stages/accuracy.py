@@ -12,7 +12,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from tireroad.contact.grid_patch import MOST, finer_touching, halved, ratio, thinned
-from tireroad.contact.model import NormalContact
+from tireroad.contact.model import TreadContact
 from tireroad.contact.results.chatter import choose, oscillation
 from tireroad.contact.results.error_bars import (
     CAUSES,
@@ -26,6 +26,7 @@ from tireroad.contact.results.error_bars import (
     total,
 )
 from tireroad.contact.results.spectra import Limit, limits, lowest, pitch
+from tireroad.contact.rolling import bristles
 from tireroad.contact.setup import ContactSetup, on_shape
 from tireroad.contact.tread.between_nodes import (
     Backed,
@@ -53,7 +54,7 @@ from tireroad.runs.stages.cavity import AirColumn
 from tireroad.runs.stages.contact_file import ContactHistory
 from tireroad.runs.stages.greens import GreensStage, Responses
 from tireroad.runs.stages.modes import Fields, ModesStage, Motions
-from tireroad.runs.stages.rolling import ContactForces, bristles, first_step, forces, recursive
+from tireroad.runs.stages.rolling import ContactForces, first_step, forces, recursive
 from tireroad.runs.stages.rotating import FullMatrices, RotatingStage
 from tireroad.runs.stages.setup import Setup, points_of, tread_surface
 from tireroad.runs.stages.stage import (
@@ -71,7 +72,7 @@ _WHOLE = 0.9  # share of the wall from which a compound counts as all of it
 class Backing(NamedTuple):
     """Replacements for the run's own contact, setup (not settled) and response."""
 
-    contact: NormalContact
+    contact: TreadContact
     setup: ContactSetup
     response: Response
 
@@ -81,17 +82,17 @@ def backed(job: Job, static: StaticState, setup: ContactSetup, response: Respons
 
     The tread is backed by all of that rubber; the nodes' residual loses the part that the mesh
     already has. Raises InputError where this is not known: points at nodes, a road that is not a
-    plane, horizontal forces, a tread that creeps.
+    plane, bristles, a tread that creeps.
     """
     contact, patch = job.scene.contact, setup.patch
     if (
         patch.weights is None
         or patch.frames is not None
-        or contact.has_friction
+        or contact.has_bristles
         or contact.law.creep
     ):
         raise InputError(
-            "the compliance of the wall between nodes is known only for a grid of points on a plane road and normal forces"
+            "the compliance of the wall between nodes is known only for a grid of points on a plane road without bristles"
         )
     wall = over_rectangles(_outer(job.scene.tire, job.tire.section))
     known = on_nodes(patch, static.area, wall)
@@ -99,7 +100,7 @@ def backed(job: Job, static: StaticState, setup: ContactSetup, response: Respons
     residual = response.residual.copy()
     residual[:count, :count] -= known
     patch = before_equilibrium(patch, known, static.normal_force[patch.index])
-    spec = NormalContact(law=Backed(law=contact.law, wall=wall), solver=contact.solver)
+    spec = TreadContact(law=Backed(law=contact.law, wall=wall), solver=contact.solver)
     return Backing(spec, replace(setup, patch=patch), replace(response, residual=residual))
 
 
@@ -198,7 +199,7 @@ class Given:
         setup: ContactSetup,
         response: Response,
         coarser: int | None = None,
-        contact: NormalContact | None = None,
+        contact: TreadContact | None = None,
     ) -> ContactForces:
         """Repeat the loop with another setup (settled), response or `contact`.
 
@@ -426,16 +427,22 @@ def coarser_mesh(given: Given) -> ContactForces:
     return given.of(job).repeated(setup, response)
 
 
-def finer_wall(given: Given) -> ContactForces:
-    """With the local flexibility of the wall between nodes below the contact points added.
+def finer_wall(given: Given) -> tuple[ContactForces, ContactForces | None]:
+    """With the local flexibility of the wall between nodes below the contact points added, and its reference.
 
     A coarser mesh does not show this part: halving the elements changes the far field of a point
-    eight times and more, but its near field only twice. Collective.
+    eight times and more, but its near field only twice. It is known for forces normal to the road: with friction,
+    both runs are repeated without. Collective.
     """
     force = given.static.product.normal_force
     made = backed(given.job, given.static.product, given.setup, given.response)
     setup = made.setup.equilibrated(made.response, force, made.contact)[0]
-    return given.repeated(setup, made.response, contact=made.contact)
+    found = given.repeated(setup, made.response, contact=made.contact)
+    contact = given.job.scene.contact
+    if not contact.has_friction:
+        return found, given.base
+    plain = TreadContact(law=contact.law, solver=contact.solver)
+    return found, given.repeated(given.equilibrated, given.response, contact=plain)
 
 
 COMPANIONS: dict[str, Callable[[Given], ContactForces]] = {
@@ -486,7 +493,7 @@ def companions(cause: str, given: Given) -> list[Companion]:
         found = [Companion(COMPANIONS[cause](given), beside, _share(cause, given))]
         if cause == "mesh":
             with suppress(InputError, ConvergenceError):
-                found.append(Companion(finer_wall(given), beside, 1.0))
+                found.append(Companion(*finer_wall(given), 1.0))
     return found
 
 

@@ -222,7 +222,8 @@ class ContactHistory:
     """The contact over n steps of `step` s ending at `time` (n,) s: `total_force` (n, 3) N;
     `axle_force` (n, 3) N if stored; `driven` (n, k, 3) m: displacement at driven points, if any;
     `wheel`: hub moments, and motions of a moving wheel, by the names of
-    runs.stages.corner; `free_slip`: slip added so that the wheel rolls freely."""
+    runs.stages.corner; `free_slip`: slip added so that the wheel rolls freely; `friction`: coefficient of
+    the loop, 0 without."""
 
     step: float
     scheme: str
@@ -232,6 +233,7 @@ class ContactHistory:
     driven: np.ndarray | None = None
     wheel: dict[str, np.ndarray] = field(default_factory=dict)
     free_slip: float = 0.0
+    friction: float = 0.0
 
     @staticmethod
     def of(file: h5py.File) -> ContactHistory:
@@ -245,6 +247,7 @@ class ContactHistory:
             **{name: file[stored][:] for name, stored in kept.items() if stored in file},
             wheel={name: file[name][:] for name in corner.UNITS if name in file},
             free_slip=float(file.attrs["free_slip"]),
+            friction=float(file.attrs["friction"]),
         )
 
 

@@ -11,14 +11,12 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from tireroad.contact.choices import LEAST_STEPS, TURN
-from tireroad.contact.loop import ContactProblem, DrivenTire, Loop, equal_steps, steps_of
-from tireroad.contact.model import step_solver, tread_memory, tread_shear
+from tireroad.contact.loop import DrivenTire, LinearTire, equal_steps, steps_of
 from tireroad.contact.patch import Patch
 from tireroad.contact.results.chatter import Chosen, choose, oscillation
 from tireroad.contact.roads.under_tire import is_level
+from tireroad.contact.rolling import bristles, make_loop
 from tireroad.contact.setup import ContactSetup
-from tireroad.contact.solver.stick_slip import BrushFriction
-from tireroad.contact.tread.brush import Brush, BrushLaw, free_slip
 from tireroad.greens.recursion import Convolution, Recursion, sharers
 from tireroad.greens.response import Response
 from tireroad.runs.process import console
@@ -177,69 +175,6 @@ def driven_tire(job: Job, chosen: Integration, patch: Patch) -> DrivenTire | Non
     return DrivenTire(chosen.tire, histories(forces, time), directions(forces), chosen.scheme, seen)
 
 
-def make_loop(spec, setup: ContactSetup, tire, step: float) -> Loop:
-    """The loop of tire, normal solver and friction, from the table [contact].
-
-    A tire whose forces have three components meets the road's slope too.
-    """
-    patch = setup.patch
-    p = len(patch.index)
-    memory = tread_memory(spec, patch, setup.rolled.speed, step)
-    at_once = memory.at_once if memory else 1.0
-    solver = step_solver(spec, patch, tire.same_step[:p, :p], at_once)
-    friction = None
-    if spec.has_friction:
-        friction = _friction(spec, setup, tire, step, at_once)
-    return Loop(tire, ContactProblem(patch, tire.same_step, solver, friction), memory)
-
-
-def bristles(spec, patch: Patch):
-    """Bristle stiffness (N/m) per point, or (c,); inf if rigid, None without horizontal forces."""
-    if not spec.has_friction:
-        return None
-    if spec.brush_stiffness_per_area is not None:
-        return spec.brush_stiffness_per_area * patch.area
-    return spec.brush_stiffness or np.inf
-
-
-def _friction(spec, setup: ContactSetup, tire, step: float, at_once: float) -> BrushFriction:
-    """The brush of the scene, at rest.
-
-    Shear of the tread by pressure counts from the static state, like all motion. If the slip of the
-    static shape counts (free rolling), the shear of its tread does too, except for a tread that
-    creeps.
-    """
-    patch, stiffness = setup.patch, bristles(spec, setup.patch)
-    shear, pressed, moved = tread_shear(spec, patch, at_once), None, None
-    if shear is not None and setup.shape_slip is not None and spec.law.creep is None:
-        drag = shear.drag(patch.force)
-        pressed, moved = np.zeros(len(patch.points)), np.stack([drag.real, drag.imag], axis=-1)
-    law = BrushLaw(stiffness, spec.friction, setup.slips, spec.brush)
-    brush = Brush(law, patch.points[:, 0], patch.line, setup.rolled.speed, step)
-    brush.begin(patch.force > 0, moved)
-    return BrushFriction(brush, tire.same_step, patch.weights, shear, pressed)
-
-
-def freely_rolling(
-    job: Job, setup: ContactSetup, response: Response, step: float, scheme: str
-) -> tuple[ContactSetup, float]:
-    """The setup (settled) with the slip of free rolling on a smooth road, and that slip.
-
-    Found with the time loop itself, over six passages of the patch. Raises ConvergenceError if
-    there is none. Collective.
-    """
-    x0, x1, _, _ = setup.patch.extent
-    steps = max(int(np.ceil(6 * (x1 - x0) / setup.rolled.speed / step)), 20)
-    smooth, load = setup.smooth(steps * step), float(setup.patch.force.sum())
-
-    def drag(slip: float) -> float:
-        found = forces(job, smooth.with_slip(slip), response, step, steps, scheme).contact
-        return float(found[-max(steps // 6, 1) :, 0].mean())
-
-    slip = free_slip(drag, load)
-    return setup.with_slip(slip), slip
-
-
 class ContactForces(NamedTuple):
     """Forces (n, 3) N of the road on the tire (`contact`) and of the tire on the axle (`axle`).
 
@@ -270,12 +205,14 @@ def forces(
     tire = Recursion(response=kept, step=step, scheme=scheme, comm=comm, look_ahead=True)
     spec = contact or job.scene.contact
     driven = driven_tire(job, Integration(tire, step, steps, scheme), setup.patch)
-    loop = make_loop(spec, setup, driven or tire, step)
+    chosen: LinearTire = driven or tire
+    loop = make_loop(spec, setup, chosen, step)
     with threadpool_limits(1, "blas"):
         total, axle = [], []
         for block in loop.roll(setup.drive, step, steps):
             setup.patch.check_edge(block.force, block.time, setup.reach)
-            total.append(block.total_force), axle.append(block.axle_force)
+            total.append(block.total_force)
+            axle.append(block.axle_force)
     return ContactForces(np.concatenate(total), np.concatenate(axle), step)
 
 

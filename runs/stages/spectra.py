@@ -146,11 +146,12 @@ def describe(
 def extremes(record: Record, history: ContactHistory, start: int, up_to: float) -> None:
     """Record the least and largest forces after the run-in, of what lies below `up_to` Hz."""
     forces = {"contact": history.total_force, "axle": history.axle_force}
+    along = "longitudinal" if history.friction else "longitudinal (without friction)"
     for what, values in forces.items():
         if values is None or start == len(values):
             continue
         low = in_band(values, history.step, up_to)[start:]
-        for axis, name in ((2, "vertical"), (0, "longitudinal")):
+        for axis, name in ((2, "vertical"), (0, along)):
             for how, found in (("least", low.min(axis=0)), ("largest", low.max(axis=0))):
                 record.headline[f"{how} {name} {what} force"] = (float(found[axis]), "N")
 

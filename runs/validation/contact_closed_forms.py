@@ -139,7 +139,9 @@ def _cattaneo_mindlin() -> Iterator[tuple]:
     x, y, normal = x[on], y[on], pressure[on] * pitch**2
     half = np.float64(pitch / 2)
     potential = rectangle_potential(x[:, None] - x, y[:, None] - y, half, half)
-    matrix = PlaneCompliance(np.kron(np.eye(2), potential / (2 * np.pi * pitch**2)))
+    matrix = PlaneCompliance(
+        np.asarray(np.kron(np.eye(2), potential / (2 * np.pi * pitch**2)), dtype=float)
+    )
     total = normal.sum()
     for share in (0.3, 0.7):
         shift = 3 * friction * total / 8 * (1 - (1 - share) ** (2 / 3))

@@ -4,9 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 
-from tireroad.contact import grid_patch, model
+from tireroad.contact import model
 from tireroad.contact.grid_patch import (
     equilibrate,
     halved,
@@ -14,8 +13,8 @@ from tireroad.contact.grid_patch import (
     spread_pull,
     thinned,
 )
-from tireroad.contact.model import step_solver
 from tireroad.contact.loop import ContactProblem
+from tireroad.contact.model import step_solver
 from tireroad.contact.patch import make_patch
 from tireroad.contact.solver.active_set import ActiveSet, UsualSet
 from tireroad.contact.solver.projected_cg import ProjectedCG

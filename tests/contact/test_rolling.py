@@ -128,7 +128,11 @@ def test_road_heights_do_not_depend_on_where_a_loop_goes_on() -> None:
     drive = Drive(height, lambda t: 0.0, 20.0)
     for done in (0, 37, 99):
         blocks = list(_roads(drive, PATCH, 1e-4, 100, done, False))
-        roads = [(time, road) for times, heights, _ in blocks for time, road in zip(times.tolist(), heights, strict=True)]
+        roads = [
+            (time, road)
+            for times, heights, _ in blocks
+            for time, road in zip(times.tolist(), heights, strict=True)
+        ]
         assert [time for time, _ in roads] == [i.time for i in whole[done:]]
         for (time, road), alone in zip(roads, whole[done:], strict=True):
             here = wavy(PATCH.points[:, 0] + 20.0 * time, PATCH.points[:, 1])

@@ -15,7 +15,9 @@ def unilateral(matrix: Array, q: Array, touching: NDArray[np.bool_]) -> Array:
         force = np.zeros(len(q))
         force[touching] = np.linalg.solve(matrix[np.ix_(touching, touching)], -q[touching])
         gap = matrix @ force + q
-        wrong = np.where(touching, force < -1e-11 * np.abs(force).max(), gap < -1e-12 * np.abs(q).max())
+        wrong = np.where(
+            touching, force < -1e-11 * np.abs(force).max(), gap < -1e-12 * np.abs(q).max()
+        )
         if not wrong.any():
             return np.maximum(force, 0.0)
         touching = touching ^ wrong
@@ -47,14 +49,18 @@ def sliding(matrix: Array, constant: Array, bound: Array, force: Array) -> Array
         moved = np.tile(rate, 2)[:, None] * matrix - np.eye(2 * a)
         along = np.vstack([np.diag(n[0]), np.diag(n[1])])
         moved -= along @ (along.T @ moved)
-        force = force - np.linalg.solve(np.eye(2 * a) + np.tile(share, 2)[:, None] * moved, off.ravel()).reshape(2, a)
+        force = force - np.linalg.solve(
+            np.eye(2 * a) + np.tile(share, 2)[:, None] * moved, off.ravel()
+        ).reshape(2, a)
     return onto_discs(force, bound)
 
 
 class Bristles:
     """The brush of contact.tread.brush by its equations: rolling, of stiffness K (c,), slip (2, c) m a step."""
 
-    def __init__(self, upstream: Array, ahead: Array, pitches: Array, slip: Array, stiffness: Array) -> None:
+    def __init__(
+        self, upstream: Array, ahead: Array, pitches: Array, slip: Array, stiffness: Array
+    ) -> None:
         self.upstream, self.ahead, self.pitches = upstream, ahead, pitches
         self.slip, self.stiffness = slip, stiffness
         self.deflection = self.moved = np.zeros_like(slip)
@@ -63,7 +69,9 @@ class Bristles:
     def offer(self) -> tuple[Array, Array]:
         """share (c,) and past (2, c) of e = share u + past."""
         share = self.upstream @ self.touched.astype(float)
-        past = (self.upstream @ np.where(self.touched, self.deflection - self.moved, 0.0).T).T + share * self.slip
+        past = (
+            self.upstream @ np.where(self.touched, self.deflection - self.moved, 0.0).T
+        ).T + share * self.slip
         some = np.flatnonzero(self.touched & ~self.touched[self.ahead] & (self.pitches <= 1 + 1e-9))
         inside = np.minimum(2 * self.pitches[some], 1.0)
         edge = 0.5 * (self.moved[:, some] + self.moved[:, self.ahead[some]])
@@ -89,8 +97,14 @@ class PlainLoop:
         self.old, self.new = weights(response.eigenvalue * step, step, scheme)
         late = late_answers(response, step, scheme)
         c, p = weights_.shape
-        self.late = np.zeros((len(response.residual), response.residual.shape[1])) if late is None else late.toarray()[:-3]
-        direct = ((response.output * self.new) @ response.input).real + response.residual - self.late
+        self.late = (
+            np.zeros((len(response.residual), response.residual.shape[1]))
+            if late is None
+            else late.toarray()[:-3]
+        )
+        direct = (
+            ((response.output * self.new) @ response.input).real + response.residual - self.late
+        )
         self.w, self.c = weights_, c
         forces, rows = response.residual.shape[1] // p, len(response.residual) // p
         self.up, self.down = np.kron(np.eye(rows), weights_), np.kron(np.eye(forces), weights_.T)

@@ -13,7 +13,14 @@ from tireroad.contact.results.spectra import in_band
 from tireroad.fem.errors import InputError
 from tireroad.runs.report import figures, live, realism, surface_figures
 from tireroad.runs.report.figures import COLOURS, COMPONENTS, WIDE, canvas, encode, envelope, styled
-from tireroad.runs.report.read import Absent, Results, Section, attributes, quantity
+from tireroad.runs.report.read import (
+    Absent,
+    Results,
+    Section,
+    attributes,
+    quantity,
+    without_friction,
+)
 from tireroad.runs.report.sections.tire import pressure
 
 _AXES = "xyz"
@@ -270,8 +277,9 @@ def _valid(results: Results, given: Mapping[str, NDArray | None]) -> _Valid:
     facts = []
     if words or after:
         facts.append(("forces here", f"those{words}{',' if words and after else ''}{after}"))
+    along = "longitudinal (without friction)" if without_friction(results) else "longitudinal"
     for name, values in forces.items():
-        for axis, component in ((2, "vertical"), (0, "longitudinal")):
+        for axis, component in ((2, "vertical"), (0, along)):
             some = values[start:, axis]
             for how, value in (
                 ("least", some.min()),

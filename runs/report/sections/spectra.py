@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tireroad.contact.results.spectra import FEW, SILENT, heard, nominal
 from tireroad.runs.report import figures, live
-from tireroad.runs.report.read import Results, Section, TextTable, quantity
+from tireroad.runs.report.read import Results, Section, TextTable, quantity, without_friction
 from tireroad.runs.scene.tables.scene import AccuracyTable
 from tireroad.runs.search.journal import CAUSES, NAME, Trial, read_trials, worst
 from tireroad.runs.search.settings import MARGIN, aim
@@ -89,7 +89,10 @@ def spectra(results: Results) -> Section:
     of = "contact force" if force is None else "axle force"
     contact = results.array(_FILE, "contact_force")
     force = contact if force is None else force
-    section = Section(f"Spectra of the {of}", "Of its variation about the mean, by component.")
+    about = "Of its variation about the mean, by component."
+    if without_friction(results):
+        about += " Without friction: x and y come from the road's slope alone."
+    section = Section(f"Spectra of the {of}", about)
     if len(frequency) < 2:
         section.notes.append("A run of one step has no spectrum.")
         return section

@@ -740,6 +740,13 @@ def filled(scene: Scene) -> Scene:
     return replace(scene, tire=replace(tire, cavity=CavityTable()))
 
 
+def rubbed(scene: Scene) -> Scene:
+    """The scene with the friction of a dry road by default, unless the static state has its own."""
+    if scene.contact is None or scene.static.friction is not None:
+        return scene
+    return replace(scene, contact=scene.contact.by_default())
+
+
 def has_air(scene: Scene) -> bool:
     """Whether the air in the tire is modelled."""
     return scene.tire.cavity is not None and scene.tire.cavity.gas != "none"

@@ -11,7 +11,7 @@ import numpy as np
 from scipy import sparse
 
 from tireroad.contact.roads.kinds.texture import TextureRoad
-from tireroad.contact.solver.active_set import ActiveSet
+from tireroad.contact.solver.active_set import make_solver
 from tireroad.contact.solver.projected_cg import ProjectedCG, SpreadCompliance
 from tireroad.contact.tread.compliance import half_space_influence
 from tireroad.contact.tread.kernel import GridPlaces, KernelTread
@@ -53,7 +53,7 @@ def large() -> Table:
         tire = 1e-6 * (np.exp(-away / 0.0018) + 0.01 * np.eye(len(nodes)))
         road = TextureRoad(seed=1).make()
         for solver in (
-            ActiveSet(SpreadCompliance(tire, weights, kernel)),
+            make_solver("active-set", SpreadCompliance(tire, weights, kernel)),
             ProjectedCG(SpreadCompliance(tire, weights, kernel)),
         ):
             seconds, most = [], 0

@@ -10,7 +10,6 @@ import numpy as np
 from mpi4py import MPI
 from scipy import sparse
 
-from tireroad.contact.grid_patch import PointTire
 from tireroad.contact.loop import Drive, roll
 from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.solver.projected_cg import SpreadCompliance
@@ -27,7 +26,7 @@ STEP = 1e-4
 ELASTIC = 5e6, 0.45
 NODES, STATES, FINER = (12, 9), 200, 4
 BRUSH = 3e4  # N/m per point
-BLOCKS, STEPS = 7, 20
+BLOCKS, STEPS = 7, 64  # as many steps as the loop takes at once
 
 
 def parts_of(shape: tuple[int, int], modes: int, horizontal: bool = False):
@@ -78,7 +77,9 @@ def on_a_grid(brush: float | None, has_shear: bool = False):
     )
     kernel = KernelTread(places, pressed)
     normal = tire.same_step[:count, :count]
-    solver = ActiveSet(SpreadCompliance(normal, weights, kernel))
+    every = np.arange(len(points.points))
+    solver = ActiveSet(SpreadCompliance(normal, weights, kernel).block(every, every))
+    points = replace(points, weights=weights)
     drive = Drive(wavy, lambda t: 0.0, 20.0)
     if brush is None:
         tire = Recursion(
@@ -87,14 +88,14 @@ def on_a_grid(brush: float | None, has_shear: bool = False):
             scheme="linear",
             comm=MPI.COMM_SELF,
         )
-        return roll(PointTire(tire, weights), solver, points, drive, STEP, 10**6), None
+        return roll(tire, solver, points, drive, STEP, 10**6), None
     bristles = Brush(
         BrushLaw(brush, 0.8, (0.02, 0.01)), points.points[:, 0], points.line, 20.0, STEP
     )
     bristles.begin(points.force > 0)
     shear = KernelShear(places, dragged) if has_shear else None
     coupling = BrushFriction(bristles, tire.same_step, weights, shear)
-    loop = roll(PointTire(tire, weights, 3), solver, points, drive, STEP, 1000, coupling)
+    loop = roll(tire, solver, points, drive, STEP, 1024, coupling)
     return loop, coupling
 
 

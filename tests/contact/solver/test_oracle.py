@@ -39,7 +39,8 @@ def slope(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 def carried() -> sparse.csr_matrix:
     """Bilinear weights of the nodes' grid at the points."""
     both = [
-        np.maximum(1 - np.abs(np.arange(c)[:, None] / 2 - np.arange(n)), 0.0) for c, n in zip(COUNTS, (7, 5), strict=True)
+        np.maximum(1 - np.abs(np.arange(c)[:, None] / 2 - np.arange(n)), 0.0)
+        for c, n in zip(COUNTS, (7, 5), strict=True)
     ]
     return sparse.csr_matrix(np.kron(*both))
 
@@ -64,13 +65,17 @@ def tread_of(patch, nu: float, shears: bool):
 @pytest.mark.parametrize("on_grid", [False, True])
 @pytest.mark.parametrize("leans", [False, True])
 @pytest.mark.parametrize("friction", [None, 0.0, 0.4, 2.0])
-def test_forces_are_those_of_plain_numpy(scheme: str, on_grid: bool, leans: bool, friction: float | None) -> None:
+def test_forces_are_those_of_plain_numpy(
+    scheme: str, on_grid: bool, leans: bool, friction: float | None
+) -> None:
     weights = carried() if on_grid else None
     patch = replace(POINTS, weights=weights) if on_grid else NODES
     c, p = len(patch.points), len(NODES.points)
     response = RollingStrip(speed=SPEED).horizontal_response(NODES.points, 3, 2, 1e2)
     away = ((NODES.points[:, None] - NODES.points[None]) ** 2).sum(axis=-1)
-    local = np.kron([[1.0, 0.1, 0.0], [0.1, 0.5, 0.0], [0.0, 0.0, 0.5]], 1e-6 * np.exp(-away / 4e-4))
+    local = np.kron(
+        [[1.0, 0.1, 0.0], [0.1, 0.5, 0.0], [0.0, 0.0, 0.5]], 1e-6 * np.exp(-away / 4e-4)
+    )
     response = replace(response, residual=local, pulse=p if leans else 0)
     if friction is None:
         response = response.between(slice(0, p), slice(None))
@@ -90,10 +95,14 @@ def test_forces_are_those_of_plain_numpy(scheme: str, on_grid: bool, leans: bool
             shear = MatrixShear(patch.points[:, :2], patch.half_sizes, given)
         coupling = BrushFriction(brush, tire.same_step, weights, shear, tolerance=1e-12)
         slip = np.broadcast_to(brush.slip[:, None], (2, c))
-        plain = Bristles(brush.upstream.toarray(), brush.ahead, brush.pitches, slip, np.full(c, 2e5))
+        plain = Bristles(
+            brush.upstream.toarray(), brush.ahead, brush.pitches, slip, np.full(c, 2e5)
+        )
         plain.touched = patch.force > 0
     rows = slice(0, c) if friction is None else slice(None)
-    loop = PlainLoop(response, STEP, scheme, dense, tread[rows, rows], patch.force, patch.gap, plain, friction)
+    loop = PlainLoop(
+        response, STEP, scheme, dense, tread[rows, rows], patch.force, patch.gap, plain, friction
+    )
     drive = Drive(height, lambda t: 0.0, SPEED, slope if leans else None)
     largest, slips = 0.0, 0
     for instant in roll(tire, solver, patch, drive, STEP, STEPS, coupling):
@@ -102,7 +111,9 @@ def test_forces_are_those_of_plain_numpy(scheme: str, on_grid: bool, leans: bool
         force, t = loop.step(height(x, patch.points[:, 1]), lean)
         added = loop._added(lean, force, t).reshape(3, c) if leans else np.zeros((3, c))
         largest = max(largest, np.abs(force).max())
-        slips += np.count_nonzero(np.hypot(*t)[force > 0] >= 0.999 * (friction or 0.0) * force[force > 0])
+        slips += np.count_nonzero(
+            np.hypot(*t)[force > 0] >= 0.999 * (friction or 0.0) * force[force > 0]
+        )
         limit = 1e-10 * largest * (1 if friction is None else 10)
         assert np.abs(instant.force - force - added[0]).max() < limit
         assert np.abs(instant.horizontal.T - t - added[1:]).max() < limit

@@ -28,7 +28,7 @@ def test_gmres_solves_what_is_far_from_symmetric(skew: float, n: int) -> None:
 
     rough = solved(right, 1e-2)
     assert np.linalg.norm(matrix @ found - right) <= 1.01e-2 * np.linalg.norm(right)
-    assert solved(right, 1e-10) > rough or n == 1
+    assert solved(right, 1e-10) >= rough
     assert np.linalg.norm(matrix @ found - right) < 1e-9 * np.linalg.norm(right)
     assert solved(0 * right, 1e-2) == 0 and not found.any()
 
@@ -40,7 +40,11 @@ def case(rng: np.random.Generator, points: int, nodes: int):
     weights, spring = rng.random((points, nodes)), 0.1 + rng.random(points)
     weights /= weights.sum(axis=1, keepdims=True)
     lift = np.kron(np.eye(2), weights)
-    return PlaneCompliance(matrix, sparse.csr_matrix(weights)), PlaneCompliance(lift @ matrix @ lift.T), spring
+    return (
+        PlaneCompliance(matrix, sparse.csr_matrix(weights)),
+        PlaneCompliance(lift @ matrix @ lift.T),
+        spring,
+    )
 
 
 def test_the_compliance_through_nodes_is_the_matrix() -> None:
