@@ -426,19 +426,24 @@ class Loop:
     contact: ContactProblem
     memory: TreadMemory | None = None
 
-    def roll(self, drive: Drive, step: float, steps: int, *, done: int = 0) -> Iterator[Block]:
-        """Yield the states after each of `steps` steps of `step` seconds, in blocks. Collective if the tire is.
+    def roll(
+        self, drive: Drive, step: float, steps: int, *, done: int = 0, at_once: int = _STEPS_AHEAD
+    ) -> Iterator[Block]:
+        """Yield the states after each of `steps` steps of `step` s, in blocks. Collective if the tire is.
 
         A step predicts the tire's motion without its forces, solves the contact and advances the tire.
         `done` steps have been taken before, and all parts are as they were then. The root of
         `tire.comm` solves the contact problem and sends the result; solver and friction of other processes
         stay unchanged, while tire and `memory` (of a viscoelastic tread, whose response within the step is part of
-        the solver) advance on each.
+        the solver) advance on each. A block has at most `at_once` steps; 1: the parts are read after each step.
         """
-        for times, roads, slopes in _roads(
-            drive, self.contact.patch, step, steps, done, self.contact.leans
-        ):
-            yield self._block(times, roads, slopes)
+        leans, patch = self.contact.leans, self.contact.patch
+        for times, roads, slopes in _roads(drive, patch, step, steps, done, leans):
+            for k in range(0, len(times), at_once):
+                some = slice(k, k + at_once)
+                yield self._block(
+                    times[some], roads[some], None if slopes is None else slopes[some]
+                )
 
     def _block(self, times: Array, roads: Array, slopes: Array | None) -> Block:
         tire, contact, memory = self.tire, self.contact, self.memory
@@ -504,9 +509,12 @@ def roll(
     done: int = 0,
     memory: TreadMemory | None = None,
 ) -> Iterator[Instant]:
-    """Yield the state after each of `steps` steps of a loop of these parts; see Loop.roll. Collective if the tire is."""
+    """Yield the state after each of `steps` steps of `step` s of a loop of these parts, which are then as after that step.
+
+    See Loop.roll. Collective if the tire is.
+    """
     loop = Loop(tire, ContactProblem(patch, tire.same_step, solver, friction), memory)
-    for block in loop.roll(drive, step, steps, done=done):
+    for block in loop.roll(drive, step, steps, done=done, at_once=1):
         yield from block.instants()
 
 

@@ -377,9 +377,9 @@ struct plane_work {
 int plane_begin(plane *s) {
     const int p = s->nodes, c = s->points, most = p > c ? p : c;
     struct plane_work *w = s->work = room(1, sizeof *w);
-    w->nodal = DOUBLES(2 * p), w->nodes = DOUBLES(2 * p), w->value = DOUBLES(2 * most), w->given = DOUBLES(2 * c);
+    w->nodal = DOUBLES(2 * p), w->nodes = DOUBLES(2 * p), w->value = DOUBLES(3 * most), w->given = DOUBLES(2 * c);
     w->field = DOUBLES(2 * (size_t)s->nx * s->ny), w->compact = DOUBLES(4 * (size_t)p * p);
-    w->which = INTS(2 * most), w->first = INTS(s->nx), w->last = INTS(s->nx), w->some = INTS(c);
+    w->which = INTS(3 * most), w->first = INTS(s->nx), w->last = INTS(s->nx), w->some = INTS(c);
     w->carried = INTS(p), w->bears = room(p, 1), w->kept = room(p, 1);
     if (s->lift) {
         w->slot = INTS(c), w->point = INTS(c);
@@ -500,9 +500,12 @@ static void spread(const plane *s, int reach, int count, const int *index, const
     const struct plane_work *w = s->work;
     const int wide = 2 * s->ny - 1;
     for (int a = 0, some; a < count; a += some) {
-        const int row = s->row[index[a]], begin = s->column[index[a]];
-        for (some = 1; some < TOGETHER && a + some < count && s->row[index[a + some]] == row; some++);
-        const int end = s->column[index[a + some - 1]];
+        const int row = s->row[index[a]];
+        int begin = s->column[index[a]], end = begin;
+        for (some = 1; some < TOGETHER && a + some < count && s->row[index[a + some]] == row; some++) {
+            const int column = s->column[index[a + some]];
+            begin = column < begin ? column : begin, end = column > end ? column : end;
+        }
         double p[TOGETHER] = {0.0}, q[TOGETHER] = {0.0};
         for (int k = 0; k < some; k++) p[k] = fx[a + k], q[k] = fy ? fy[a + k] : 0.0;
         const int top = row - reach > 0 ? row - reach : 0, bottom = row + reach < s->nx - 1 ? row + reach : s->nx - 1;

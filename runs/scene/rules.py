@@ -391,6 +391,11 @@ def _contact(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     has_friction = static.friction is not None
     check_tread(contact, standing, error, has_friction)
     rotation = scene.rotation
+    if rotation is not None and rotation.free_rolling and contact.friction == 0:
+        raise error(
+            ("rotation", "free_rolling"),
+            "does not exist with contact.friction = 0: any slip is free",
+        )
     for key, pulls in (
         ("free_rolling", contact.has_friction),
         ("slip_angle", contact.has_friction or has_friction),
@@ -401,11 +406,6 @@ def _contact(scene: Scene, raw: dict[str, Any], error: Where) -> None:
                 "needs contact.friction or contact.brush_stiffness_per_area (N/m³), without which no road pulls on the "
                 "tire, and a wheel that turns",
             )
-    if rotation is not None and rotation.free_rolling and contact.friction == 0:
-        raise error(
-            ("rotation", "free_rolling"),
-            "does not exist with contact.friction = 0: any slip is free",
-        )
 
 
 def _time(scene: Scene, raw: dict[str, Any], error: Where) -> None:

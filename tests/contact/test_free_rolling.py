@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from tireroad.contact.solver.active_set import ActiveSet
+from tireroad.contact.solver.stick_slip import BrushFriction
 from tireroad.contact.tread.brush import Brush, BrushLaw, free_slip, shape_slip
 from tireroad.fem.errors import ConvergenceError
 
@@ -51,9 +53,10 @@ def test_bristles_sum_up_the_slip_of_their_way() -> None:
     slip = np.stack([c * x, 0 * x], axis=-1)
     brush = Brush(BrushLaw(1.0, None, slip), x, np.zeros(201, int), way, 1.0)
     brush.begin(np.ones(201, bool))
+    friction = BrushFriction(brush, np.zeros((603, 603)), None)
+    solver, pressed, none = ActiveSet(np.eye(201)), np.ones(201), np.zeros(402)
     for _ in range(450):
-        share, past = brush.offer()
-        brush.take(-past, np.zeros((201, 2)), share >= 0)
+        friction.solve(solver, 0 * pressed, None, pressed, none)
     expected = -c * (a**2 - x**2) / 2
     assert brush.deflection[:, 0] == pytest.approx(expected, abs=0.03 * np.abs(expected).max())
 

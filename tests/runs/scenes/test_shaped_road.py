@@ -114,7 +114,11 @@ def test_a_freely_rolling_wheel_is_not_dragged(tmp_path, launch) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "named"),
     [
-        ("brush_stiffness_per_area = 1e8\nfriction = 0.8", "", "brush_stiffness_per_area"),
+        (
+            "brush_stiffness_per_area = 1e8\nfriction = 0.8",
+            "shear = false",
+            "brush_stiffness_per_area",
+        ),
         ("friction = 0.8", "friction = 0.0", "any slip is free"),
         ("speed = 40.0", "speed = 0.0", "a wheel that turns"),
     ],
