@@ -7,16 +7,13 @@ other file of the program may ask which. Importing it checks that the libraries 
 from __future__ import annotations
 
 import functools
-import hashlib
 import importlib.machinery
 import importlib.util
 import inspect
 import logging
 import os
-import platform
 import re
 import shlex
-import subprocess
 import sys
 import sysconfig
 import types
@@ -38,6 +35,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from tireroad.fem import form_cache
+from tireroad.fem.compiled import cpu
 from tireroad.fem.errors import InputError
 
 _FAMILIES = {
@@ -83,20 +81,6 @@ def _check_libraries() -> None:
 _check_libraries()
 
 
-def _cpu() -> str:
-    """Hash of the processor type, passed as a compiler flag.
-
-    It separates compiled forms of different processors that share a cache, such as the nodes of a
-    cluster.
-    """
-    try:
-        with open("/proc/cpuinfo") as file:
-            kind = {line for line in file if line.startswith(("model name", "flags", "Features"))}
-    except OSError:
-        kind = {platform.processor()}
-    return hashlib.sha256("".join(sorted(kind)).encode()).hexdigest()[:12]
-
-
 def _quietly(function: Callable) -> Callable:
     """Wrap a compiling function: no compiler log, no warnings of FFCx's unclosed lock files."""
 
@@ -122,18 +106,24 @@ else:
     HAS_BASIX_UFL = hasattr(basix.ufl, "element")
 
 # Newer FFCx vectorises better by itself. In both cases -O3 and the native instruction set halve the
-# assembly time of a hyperelastic tangent on 27-node hexahedra.
+# assembly time of a hyperelastic tangent on 27-node hexahedra. Nothing of how Python was compiled: its
+# flags have -g, which takes a third of the compiler's time.
 JIT = {
-    "cffi_extra_compile_args": ["-O3", "-march=native", "-fno-math-errno", f"-DCPU_{_cpu()}"],
-}
+    "cffi_extra_compile_args": [
+        "-O3", "-march=native", "-fno-math-errno", "-shared", "-fPIC", f"-DCPU_{cpu()}",
+    ],
+}  # fmt: skip
 _JIT_KEY = (
     "jit_options" if "jit_options" in inspect.signature(fem.form).parameters else "jit_params"
 )
 
 
 class _PlainBuilder(cffi.FFI):
-    """Builds a form's C code into a plain shared library, for pythons without their C headers
-    (python3-dev), which FFCx's extension modules need."""
+    """Builds a form's C code into a plain shared library, where FFCx makes extension modules.
+
+    These need the C headers of Python (python3-dev) and take its flags, and their compiler cannot be
+    left at work for later.
+    """
 
     def set_source(self, module_name: str, source: str, **options: Any) -> None:
         self._name, self._code, self._compile_options = module_name, source, options
@@ -145,23 +135,20 @@ class _PlainBuilder(cffi.FFI):
         self._declared = re.sub(r"\b(float|double) _Complex\b", "void", csource)
 
     def compile(self, tmpdir: Path, **_: Any) -> None:
-        """Compile with the compiler that cffi would take; cffi.VerificationError where that fails."""
-        source, options = Path(tmpdir) / f"{self._name}.c", self._compile_options
+        """Compile with the compiler that cffi would take; cffi.VerificationError where that fails.
+
+        Or, asked for ahead of its use, begin to: form_cache.Begun.
+        """
+        options = self._compile_options
         text = ",".join(str(byte) for byte in self._declared.encode() + b"\0")
         code = f"#include <ufcx.h>\n{self._code}\nconst char {_DECLARED}[] = {{{text}}};\n"
-        source.write_text(code, encoding="utf-8")
         command = os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc"
         include = [f"-I{folder}" for folder in options["include_dirs"]]
         libraries = [f"-l{name}" for name in options["libraries"] or []]
-        library = source.with_name(self._name + EXTENSION_SUFFIXES[0])
-        flags = ["-shared", "-fPIC", *options["extra_compile_args"], *include]
-        done = subprocess.run(
-            [*shlex.split(command), *flags, str(source), "-o", str(library), *libraries],
-            capture_output=True,
-            text=True,
-        )
-        if done.returncode:
-            raise cffi.VerificationError(f"{command}: {done.stderr.strip()[-500:]}")
+        run = [*shlex.split(command), *options["extra_compile_args"], *include]
+        failed = form_cache.build(Path(tmpdir), self._name, code, run, libraries)
+        if failed is not None:
+            raise cffi.VerificationError(f"{command}: {failed.strip()[-500:]}")
 
 
 class _PlainLoader(importlib.machinery.ExtensionFileLoader):
@@ -183,8 +170,8 @@ _LOADED: list = []  # a library is unloaded with its last reference, and forms p
 _DECLARED = "tireroad_declarations"  # the C declarations of a plain library, kept inside it
 
 
-def _compile_without_headers() -> None:
-    """Let FFCx build plain libraries. Its module of compilation is changed in this process only."""
+def _build_plain_libraries() -> None:
+    """Let FFCx build and load plain libraries. Its module of compilation is changed in this process only."""
     machinery = types.SimpleNamespace(
         FileFinder=importlib.machinery.FileFinder,
         ExtensionFileLoader=_PlainLoader,
@@ -195,16 +182,14 @@ def _compile_without_headers() -> None:
     jit.importlib = types.SimpleNamespace(machinery=machinery, util=importlib.util)
 
 
-HAS_HEADERS = (Path(sysconfig.get_path("include")) / "Python.h").exists()
-if not HAS_HEADERS:
-    _compile_without_headers()
+_build_plain_libraries()
 
 
-def _options(folder: Path, **more: Any) -> dict:
+def _options(folder: Path) -> dict:
     """Keyword argument with dolfinx's compiler options, `folder` being the cache (form_cache).
 
     The timeout allows for file systems on which another node sees new files some seconds later."""
-    return {_JIT_KEY: {**more, "cache_dir": str(folder), "timeout": 120}}
+    return {_JIT_KEY: {**JIT, "cache_dir": str(folder), "timeout": 120}}
 
 
 def geometry_nodes(degree: int) -> np.ndarray:
@@ -268,7 +253,14 @@ def _space(mesh: dmesh.Mesh, element: Any) -> fem.FunctionSpace:
 def form(expression: ufl.Form) -> Any:
     """Compile a UFL form with the program's compiler flags. Collective."""
     comm = expression.ufl_domain().ufl_cargo().comm
-    return form_cache.compiled(comm, lambda folder: fem.form(expression, **_options(folder, **JIT)))
+    return form_cache.compiled(comm, lambda folder: fem.form(expression, **_options(folder)))
+
+
+@_quietly
+def begin_form(expression: ufl.Form) -> None:
+    """Begin to compile a form that `form` will be asked for, while other work goes on. Collective."""
+    comm = expression.ufl_domain().ufl_cargo().comm
+    form_cache.begin(comm, lambda folder: fem.form(expression, **_options(folder)))
 
 
 @_quietly
@@ -278,7 +270,7 @@ def evaluate(
     """A scalar UFL expression (cells, points) in this process's cells at reference `points` (p, 3).
     Collective."""
     made = form_cache.compiled(
-        mesh.comm, lambda folder: fem.Expression(expression, points, **_options(folder, **JIT))
+        mesh.comm, lambda folder: fem.Expression(expression, points, **_options(folder))
     )
     own = cells.astype(np.int32)
     asks_mesh = "mesh" in inspect.signature(made.eval).parameters

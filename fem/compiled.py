@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cython_blas, cython_lapack
 
 from tireroad.fem.errors import InputError
+from tireroad.fem.form_cache import user_folder
 
 # Sums may be reordered, for vector instructions; infinities and numbers that are none keep their meaning.
 FLAGS = ("-O3", "-march=native", "-std=gnu11", "-fno-math-errno", "-fno-trapping-math", "-fassociative-math",
@@ -52,12 +53,6 @@ def cpu() -> str:
     except OSError:
         kind = {platform.processor()}
     return hashlib.sha256("".join(sorted(kind)).encode()).hexdigest()[:12]
-
-
-def user_folder() -> Path:
-    """The program's folder in the user's cache, `$XDG_CACHE_HOME` or `~/.cache`."""
-    base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
-    return Path(base) / "tireroad"
 
 
 class Library:

@@ -5,6 +5,9 @@ that process is killed, the file remains and every process that needs the form w
 vain. Therefore each process compiles in a folder of its own, which starts with links to all cached
 forms, and complete new forms are copied to the cache afterwards. Folders of dead processes are
 removed by the next run.
+
+A form can be begun ahead of its use: FFCx writes its code, and the compiler goes on beside the program,
+in files of other names. Whoever asks for the form finds it ready, or waits for that compiler.
 """
 
 from __future__ import annotations
@@ -16,11 +19,12 @@ import os
 import shutil
 import signal
 import socket
+import subprocess
 import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import cache
 from importlib.machinery import EXTENSION_SUFFIXES
@@ -34,6 +38,8 @@ _LOCK = "in-use"
 _ABANDONED = 3600.0  # s after which another machine's folder without a lock is abandoned
 _PATIENCE = 2.0  # s of compilation after which it is announced
 _LIBRARY = tuple(EXTENSION_SUFFIXES)
+_SUFFIX = EXTENSION_SUFFIXES[0]  # of the libraries that are built here
+_AHEAD = "ahead-"  # before the names of what is built ahead of its use
 
 _LOG = logging.getLogger(__name__)  # tells the user that forms are being compiled
 
@@ -55,8 +61,7 @@ def compiled(comm: Any, make: Callable[[Path], Any]) -> Any:
     Raises InputError when forms cannot be compiled or loaded: the cause is then a compiler or a
     folder that the user can change, not the scene.
     """
-    folder = Path(comm.bcast(str(_workshop()) if comm.rank == 0 else None))
-    _pass_over_options(folder)
+    folder = _shared_workshop(comm)
     try:
         with _announced(folder):
             made = make(folder)
@@ -72,6 +77,89 @@ def compiled(comm: Any, make: Callable[[Path], Any]) -> Any:
     if comm.rank == 0:
         _keep(folder)
     return made
+
+
+def begin(comm: Any, make: Callable[[Path], Any]) -> None:
+    """Begin what `compiled(comm, make)` will be asked for, unless it is there. Collective.
+
+    Does nothing where as many compilers are at work as there are processors. What fails now fails
+    again, and is told, when it is asked for.
+    """
+    folder = _shared_workshop(comm)
+    working = sum(process.poll() is None for process in _begun.values())
+    if not comm.bcast(working < len(os.sched_getaffinity(0))):
+        return
+    _ahead.append(True)
+    try:
+        # FFCx takes `Begun` for a failure; on several processes dolfinx raises RuntimeError on all.
+        with suppress(OSError, ImportError, RuntimeError, _cffi_error()):
+            make(folder)
+    finally:
+        _ahead.pop()
+
+
+class Begun(RuntimeError):
+    """A form's compiler is at work."""
+
+
+_ahead: list[bool] = []  # whether forms are asked for ahead of their use
+_begun: dict[
+    Path, subprocess.Popen
+] = {}  # compilers at work for libraries of this process's folder
+
+
+def build(
+    folder: Path, name: str, code: str, command: Sequence[str], libraries: Sequence[str]
+) -> str | None:
+    """Build the library of a form from its C code in FFCx's cache `folder`; what the compiler said if it failed.
+
+    Raises Begun ahead of its use, with the compiler at work.
+    """
+    library = folder / f"{name}{_SUFFIX}"
+    if not _ahead:
+        if _taken(library):
+            return None
+        source = folder / f"{name}.c"
+        source.write_text(code, encoding="utf-8")
+        run = [*command, str(source), "-o", str(library), *libraries]
+        done = subprocess.run(run, capture_output=True, text=True)
+        return done.stderr if done.returncode else None
+    if library not in _begun:
+        source = folder / f"{_AHEAD}{name}.c"
+        source.write_text(code, encoding="utf-8")
+        run = [*command, str(source), "-o", str(folder / f"{_AHEAD}{library.name}"), *libraries]
+        nowhere = subprocess.DEVNULL
+        _begun[library] = subprocess.Popen(run, stdin=nowhere, stdout=nowhere, stderr=nowhere)
+    raise Begun(name)
+
+
+def _taken(library: Path) -> bool:
+    """Whether a compiler begun ahead has made the library, once it has ended; its files get their names."""
+    process = _begun.pop(library, None)
+    if process is None or process.wait():
+        return False
+    folder, name = library.parent, library.name.removesuffix(_SUFFIX)
+    os.replace(folder / f"{_AHEAD}{library.name}", library)
+    os.replace(folder / f"{_AHEAD}{name}.c", folder / f"{name}.c")
+    return True
+
+
+def _take_finished() -> None:
+    """Let FFCx find the forms whose compilers have ended."""
+    for library in [library for library, process in _begun.items() if process.poll() is not None]:
+        if _taken(library):
+            form = library.with_name(library.name.removesuffix(_SUFFIX))
+            form.with_name(f"{form.name}.c.failed").unlink(missing_ok=True)  # so FFCx called it
+            form.with_name(f"{form.name}{DONE}").touch()
+
+
+def _shared_workshop(comm: Any) -> Path:
+    """The root process's folder. Collective."""
+    if comm.rank == 0:
+        _take_finished()
+    folder = Path(comm.bcast(str(_workshop()) if comm.rank == 0 else None))
+    _pass_over_options(folder)
+    return folder
 
 
 def _pass_over_options(folder: Path) -> None:
@@ -112,8 +200,14 @@ def _workshop() -> Path:
         folder = Path(tempfile.mkdtemp(prefix="tireroad-forms-"))
         # The compiler of the wheels keeps its own beside ours.
         os.environ.setdefault("ZIG_GLOBAL_CACHE_DIR", str(folder / "zig"))
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    atexit.register(_leave, folder)
     return folder
+
+
+def _leave(folder: Path) -> None:
+    if any(process.poll() is None for process in _begun.values()):
+        end_compilers(folder)
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 _held: list[int] = []  # locks of this process's folders, released however it ends

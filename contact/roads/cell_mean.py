@@ -10,13 +10,19 @@ second-order part of that: it loses 1 % of waves of four rectangles, 15 % of tho
 
 from __future__ import annotations
 
-from typing import Protocol
+from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tireroad.contact.roads.under_tire import lattice_of
+from tireroad.fem.compiled import library
+
 Array = NDArray[np.float64]
+COMPILED = library(Path(__file__).with_suffix(".c"))
 MOST = 32  # samples along a rectangle, and across it
+_SAME = 1e-12  # of the widest rectangle: strips of lines beside each other that lie so near are one
 
 
 class Strip(Protocol):
@@ -37,108 +43,110 @@ class CellMean:
     rectangle. Between the positions of samples the result is a cubic through four of them, with a
     continuous slope (Catmull and Rom 1974): straight lines have steps in their slope, which all
     points pass together and the time steps fold into the band (12 dB of the longitudinal force at
-    800 Hz). Across, samples are means of equal strips.
+    800 Hz). Across, samples are means of equal strips, shared by lines of points beside each other.
+    Compiled (cell_mean.c). Not collective.
     """
 
     def __init__(self, road: Strip, y: Array, half: Array) -> None:
         self._road = road
-        rows, self._row = np.unique(np.column_stack([y, half]), axis=0, return_inverse=True)
-        self._row = self._row.reshape(-1)
+        rows, row = np.unique(np.column_stack([y, half]), axis=0, return_inverse=True)
         widest, broadest = half.max(axis=0)
         self._step = min(max(road.spacing, 2 * widest / MOST), widest / 4)
         self._reach = reach = int(np.ceil(2 * widest / self._step + 0.5))
         offset = self._step * np.arange(-reach, reach + 1)
         parts = [_parts(offset, self._step, share * rows[:, 1:2]) for share in (1, 2)]
-        # Weights (2, r, 2 reach + 1) of samples within the rectangle's width, and twice that.
-        self._weight = np.stack([4 / 3 * parts[0], -1 / 3 * parts[1]])
+        # Weights (2, 2 reach + 1, r) of samples within the rectangle's width, and twice that.
+        along = np.stack([4 / 3 * parts[0].T, -1 / 3 * parts[1].T])
         count = 4 * int(np.clip(np.ceil(broadest / road.spacing), 2, MOST // 2))
         middles = (np.arange(count) + 0.5) / count * 4 - 2
-        self._within = np.abs(middles) < 1
-        self._y = rows[:, 0, None] + rows[:, 2, None] * middles  # (r, m)
-        # Weights (2, r, m) of the slope across, by least squares over the width and twice that.
-        self._across = np.zeros((2, *self._y.shape))
-        for across, used in zip(self._across, (self._within, np.full(count, True)), strict=True):
-            offset = np.where(used, self._y - rows[:, :1], 0.0)
-            across[:] = offset / (offset**2).sum(axis=1, keepdims=True)
-        self._begin, self._mean = 0, np.empty((2, len(rows), 0))
+        lines = rows[:, 0] + rows[:, 2] * middles[:, None]  # (m, r)
+        self._y, column = _distinct(lines, _SAME * float(broadest))
+        across = _across(lines - rows[:, 0], np.abs(middles) < 1)
+        arrays = {"along": np.ascontiguousarray(along), "across": across}
+        indices = {"column": column.astype(np.int32), "line": row.reshape(-1).astype(np.int32)}
+        self._held: dict[str, Any] = {name: COMPILED.doubles(of) for name, of in arrays.items()}
+        self._held |= {name: COMPILED.ints(of) for name, of in indices.items()}
+        sizes = {"lines": len(rows), "strips": count, "reach": reach, "step": self._step}
+        self._rectangles = COMPILED.ffi.new("rectangles *", self._held | sizes)
+        # What is known: sums over the strips at the positions from begin - reach on, and means from begin on.
+        self._begin, self._sums, self._means = 0, *_nothing(len(rows))
 
     def height(self, x: Array, _: Array) -> Array:
         """Heights (n, c) m with the points at x (n, c) m; y is known."""
-        share, (mean, _across), here = self._at(x)
-        return sum(w * mean[self._row, here + k] for k, w in enumerate(_cubic(share), -1))
+        return self._at(x, COMPILED.lib.heights_at, ())
 
     def slope(self, x: Array, _: Array) -> Array:
         """Slopes (n, c, 2) along and across; that along is the derivative of `height`."""
-        share, (mean, across), here = self._at(x)
-        along = sum(w * mean[self._row, here + k] for k, w in enumerate(_steepness(share), -1))
-        near, far = across[self._row, here], across[self._row, here + 1]
-        return np.stack([along / self._step, near + share * (far - near)], axis=-1)
+        return self._at(x, COMPILED.lib.slopes_at, (2,))
 
-    def _at(self, x: Array) -> tuple[Array, Array, NDArray[np.intp]]:
-        """For x (n, c) m: the part of the way between two positions, means and slopes across
-        (2, r, ...) at the positions, and the first one's index (n, c)."""
-        place = np.asarray(x) / self._step
-        first = np.floor(place).astype(int)
-        begin = int(first.min(initial=0)) - 1
-        known = self._known(begin, int(first.max(initial=0)) + 3)
-        return place - first, known, first - self._begin
+    def _at(self, x: Array, function: Any, more: tuple[int, ...]) -> Array:
+        """What the compiled `function` finds at x (n, c) m, of shape (n, c, *more)."""
+        x = np.ascontiguousarray(x, dtype=float)
+        out = np.empty(x.shape + more)
+        if x.size:
+            self._know(*(int(np.floor(end / self._step)) for end in (x.min(), x.max())))
+            known = self._begin, COMPILED.doubles(self._means)
+            function(self._rectangles, *x.shape, COMPILED.doubles(x), *known, COMPILED.doubles(out))
+        return out
 
-    def _known(self, begin: int, end: int) -> Array:
-        """Means and slopes across (2, r, ...) at the positions from `_begin` * step to `end` * step
-        at least.
+    def _know(self, first: int, last: int) -> None:
+        """Know the means at the positions from one before `first` * step to two behind `last` * step.
 
         Those under the footprint are kept as it rolls on: nine of ten positions were evaluated
         before.
         """
-        known = self._begin + self._mean.shape[2]
-        if not self._begin <= begin <= known:
-            self._mean, known = np.empty((2, len(self._y), 0)), begin
+        begin, end = first - 1, last + 3
+        passed, known = begin - self._begin, len(self._means)
+        if 0 <= passed <= known:
+            self._sums, self._means = self._sums[passed:], self._means[passed:]
         else:
-            self._mean = self._mean[:, :, begin - self._begin :]
+            self._sums, self._means = _nothing(self._means.shape[2])
         self._begin = begin
-        if end > known:
-            self._mean = np.concatenate([self._mean, self._means(known, end)], axis=2)
-        return self._mean
+        if len(self._means) < end - begin:
+            self._add(end)
 
-    def _means(self, begin: int, end: int) -> Array:
-        """Means (m) and slopes across (2, r, end - begin) at the positions begin * step, ..."""
-        places = self._step * np.arange(begin - self._reach, end + self._reach)
-        x = np.minimum(places, self._road.end)
-        # Over the width and twice that; heights, and their slope across.
-        sample = np.zeros((2, 2, len(self._y), len(x)))
-        for k, (column, within) in enumerate(zip(self._y.T, self._within, strict=True)):
-            here = self._road.height(*np.broadcast_arrays(x, column[:, None]))
-            sample[1, 0] += here
-            sample[1, 1] += self._across[1, :, k, None] * here
-            if within:
-                sample[0, 0] += here
-                sample[0, 1] += self._across[0, :, k, None] * here
-        sample[:, 0] /= np.array([self._within.sum(), len(self._within)])[:, None, None]
-        found = np.zeros((2, len(self._y), end - begin))
-        for k in range(self._weight.shape[2]):
-            part = sample[:, :, :, k : k + end - begin]
-            found += (self._weight[:, None, :, k, None] * part).sum(axis=0)
-        return found
+    def _add(self, end: int) -> None:
+        """Means at the positions up to `end` * step, excluded."""
+        summed, known = self._begin - self._reach + len(self._sums), len(self._means)
+        self._sums = np.concatenate([self._sums, self._sums_at(summed, end + self._reach)])
+        means = np.empty((end - self._begin - known, *self._means.shape[1:]))
+        given = COMPILED.doubles(self._sums[known:]), COMPILED.doubles(means)
+        COMPILED.lib.mean_along(self._rectangles, len(means), *given)
+        self._means = np.concatenate([self._means, means])
+
+    def _sums_at(self, begin: int, end: int) -> Array:
+        """Means and slopes across (end - begin, 4, r) over one and two widths, at begin * step, ..."""
+        x = np.minimum(self._step * np.arange(begin, end), self._road.end)
+        height = np.ascontiguousarray(lattice_of(self._road, x, self._y))
+        sums = np.empty((len(x), *self._sums.shape[1:]))
+        given = COMPILED.doubles(height), COMPILED.doubles(sums)
+        COMPILED.lib.sum_across(self._rectangles, *height.shape, *given)
+        return sums
 
 
-def _cubic(t: Array) -> tuple[Array, ...]:
-    """Weights of the positions before, at, after and beyond, at a part t of the way from one to the next."""
-    return (
-        t * (t * (2 - t) - 1) / 2,
-        (t * t * (3 * t - 5) + 2) / 2,
-        t * (t * (4 - 3 * t) + 1) / 2,
-        t * t * (t - 1) / 2,
-    )
+def _nothing(lines: int) -> tuple[Array, Array]:
+    return np.empty((0, 4, lines)), np.empty((0, 2, lines))
 
 
-def _steepness(t: Array) -> tuple[Array, ...]:
-    """Derivatives of those weights by t."""
-    return (
-        (t * (4 - 3 * t) - 1) / 2,
-        t * (9 * t - 10) / 2,
-        (t * (8 - 9 * t) + 1) / 2,
-        t * (3 * t - 2) / 2,
-    )
+def _distinct(values: Array, apart: float) -> tuple[Array, NDArray[np.intp]]:
+    """Values (m,) of an array, ascending, one for all that lie less than `apart` from the next; their indices."""
+    order = np.argsort(values, axis=None)
+    ascending = values.ravel()[order]
+    new = np.concatenate([[True], np.diff(ascending) > apart])
+    index = np.empty(values.size, dtype=np.intp)
+    index[order] = np.cumsum(new) - 1
+    return ascending[new], index.reshape(values.shape)
+
+
+def _across(offset: Array, within: NDArray[np.bool_]) -> Array:
+    """Weights (4, m, r) of strips at offsets (m, r) m: of the mean `within` the width, of the slope by least
+    squares there, and of both over twice the width."""
+    found = []
+    for used in (within, np.ones(len(within), dtype=bool)):
+        inside = np.where(used[:, None], offset, 0.0)
+        mean = np.broadcast_to(used[:, None] / used.sum(), offset.shape)
+        found += [mean, inside / (inside**2).sum(axis=0)]
+    return np.stack(found)
 
 
 def _parts(offset: Array, step: float, half: Array) -> Array:

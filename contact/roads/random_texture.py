@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.contact.roads.under_tire import Road
+from tireroad.contact.roads.under_tire import Road, lattice_of
 from tireroad.fem.errors import InputError
 
 Array = NDArray[np.float64]
@@ -72,7 +72,9 @@ PER_WAVE = 4  # points of a tile per shortest wave
 WAVES = (16, 6)  # longest waves in a tile, along and across
 WIDEST = 0.6  # m, smallest width of a tile, which repeats across; no tire is wider
 MOST_PLACES = 16_000_000  # points of a tile: 128 MB
-KEPT = 3, 2_000_000  # fewest blended halves in memory, and points up to which more are kept (16 MB)
+# Fewest blended halves in memory, and points up to which more are kept (64 MB): a run passes over its road several
+# times, to level it, for its bounds and in the loop, and drawing it takes as long as the rest of the road under the points.
+KEPT = 3, 8_000_000
 
 
 def tile_size(longest: float) -> tuple[float, float]:
@@ -205,6 +207,27 @@ class Tiles:
         far = z[i + 1, j] + t * (z[i + 1, next_j] - z[i + 1, j])
         return near + s * (far - near)
 
+    def lattice(self, x: Array, y: Array) -> Array:
+        """Heights (n, m) m at every x (n,) with every y (m,): across first, at each row once."""
+        half = self._shape[0] // 2
+        u, v = (np.asarray(a, dtype=float) / self._pitch for a in (x, y))
+        number = np.floor(u / half).astype(np.int64)
+        floor = np.floor(v).astype(np.int64)
+        j, t = floor % self._shape[1], v - floor
+        next_j = (j + 1) % self._shape[1]
+        out = np.empty((len(u), len(v)))
+        for one in np.unique(number).tolist():
+            here = number == one
+            local = u[here] - one * half
+            i = np.minimum(local.astype(np.int64), half - 1)
+            rows, place = np.unique(np.concatenate([i, i + 1]), return_inverse=True)
+            z = self._half(one)[rows]
+            left = z.take(j, axis=1)
+            left += t * (z.take(next_j, axis=1) - left)
+            near, far = left[place[: len(i)]], left[place[len(i) :]]
+            out[here] = near + (local - i)[:, None] * (far - near)
+        return out
+
     def highest(self, x0: float, x1: float, y0: float, y1: float) -> float:
         """The highest point from x0 to x1, m."""
         return max(high for _, high in self._strip(x0, x1))
@@ -271,9 +294,16 @@ class Layered:
 
     def height(self, x: Array, y: Array) -> Array:
         """Heights (m) at x, y (m) of equal shape."""
-        texture = np.sum([field.height(x, y) for field in self._fields], axis=0)
-        z = self._rms * self._skew(texture / self._rms)
+        z = self._skewed([field.height(x, y) for field in self._fields])
         return z if self._base is None else z + self._base.height(x, y)
+
+    def lattice(self, x: Array, y: Array) -> Array:
+        """Heights (n, m) m at every x (n,) with every y (m,) m."""
+        z = self._skewed([field.lattice(x, y) for field in self._fields])
+        return z if self._base is None else z + lattice_of(self._base, x, y)
+
+    def _skewed(self, fields: list[Array]) -> Array:
+        return self._rms * self._skew(np.sum(fields, axis=0) / self._rms)
 
     def highest(self, x0: float, x1: float, y0: float, y1: float) -> float:
         """Upper bound of the heights in a strip, m."""

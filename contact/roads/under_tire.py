@@ -393,6 +393,24 @@ class Road(Bounded, Protocol):
     def prepare(self, x0: float, x1: float, y0: float, y1: float) -> Road: ...
 
 
+class Heights(Protocol):
+    """Heights (m) at x along and y to the left (m)."""
+
+    def height(self, x: Array, y: Array) -> Array: ...
+
+
+def lattice_of(road: Heights, x: Array, y: Array) -> Array:
+    """Heights (n, m) m of a road at every x (n,) with every y (m,), m.
+
+    By the road's own `lattice(x, y)` if it has one, which computes once what depends on x or y
+    alone, to the bits of its `height`.
+    """
+    lattice: Callable[[Array, Array], Array] | None = getattr(road, "lattice", None)
+    if lattice is not None:
+        return lattice(x, y)
+    return road.height(*np.broadcast_arrays(x, y[:, None])).T
+
+
 def is_level(road: Bounded, x0: float, x1: float, y0: float, y1: float) -> bool:
     """Whether a strip of road has one height, by its own bounds."""
     strip = x0, x1, y0, y1
@@ -505,13 +523,31 @@ class PreparedRoad:
 
         ValueError for x beyond the prepared strip, where the border would be mistaken for the road.
         """
+        ahead = self._ahead(x)
+        along = self._along(ahead)
+        return self._placed(self._road.height(along, np.asarray(y) + self._shift[1]), ahead, along)
+
+    def lattice(self, x: Array, y: Array) -> Array:
+        """Heights (n, m) m at every x (n,) with every y (m,), as `height`."""
+        ahead = self._ahead(x)[:, None]
+        along = self._along(ahead)
+        z = lattice_of(self._road, along[:, 0], np.asarray(y) + self._shift[1])
+        return self._placed(z, ahead, along)
+
+    def _ahead(self, x: Array) -> Array:
+        """Distances (m) behind the foremost point at t = 0."""
         ahead = np.asarray(x) - self._lead
         farthest = ahead.max(initial=0.0)
         if farthest > self._span:
             raise ValueError(f"x = {farthest + self._lead:g} m lies beyond the prepared strip")
-        first = self._lead + self._shift[0]
-        along = np.maximum(ahead, 0.0) + first
-        z = self._road.height(along, np.asarray(y) + self._shift[1])
+        return ahead
+
+    def _along(self, ahead: Array) -> Array:
+        """Those places in the road's own x, m."""
+        return np.maximum(ahead, 0.0) + (self._lead + self._shift[0])
+
+    def _placed(self, z: Array, ahead: Array, along: Array) -> Array:
+        """The road's own heights z (m), offset, levelled and grown over the run-in."""
         if self._offset != 0.0:
             z = z + self._offset
         if self._level is not None:

@@ -292,7 +292,7 @@ class Operators:
         self.body = body
         self.unknowns = Unknowns(body, support)
         self.mass, self.carried = self.unknowns.mass, self.unknowns.carried
-        self.stiffness = self._assemble(self._tangent(inflation))
+        self.stiffness = self._assemble(_stiffness(body, inflation))
         if self.unknowns.rim:
             self._add_turning(self.unknowns.rim, inflation, rolling)
         self.stiffness.setOption(PETSc.Mat.Option.SYMMETRIC, True)
@@ -310,22 +310,10 @@ class Operators:
             self.stiffness.setValues(six, six, turning, PETSc.InsertMode.ADD)
         self.stiffness.assemble()
 
-    def _tangent(self, inflation: float) -> ufl.Form:
-        pressure = fem.Constant(self.body.mesh, inflation)
-        static = tangent(self.body, static_residual(self.body, pressure, AT_REST))
-        wall = self.body.wall
-        return static + self._material(wall.stiffening()) if wall.stiffens else static
-
-    def _material(self, share: Expr) -> ufl.Form:
-        """A share (constant in each cell) of the rubber's material tangent, in UFL."""
-        here = fem.Function(self.body.space)
-        here.x.array[:] = self.body.u.x.array
-        return tangent(self.body, added_stress(self.body, share, here))
-
     def compounds(self) -> list[Compound]:
         """The compounds' own part of the stiffness, by kind. Collective."""
         return [
-            Compound(kind, self._assemble(self._material(share)))
+            Compound(kind, self._assemble(_material(self.body, share)))
             for kind, share in self.body.wall.kinds()
         ]
 
@@ -449,6 +437,26 @@ def rim_motion(body: Body, inflation: float, rolling: Rolling, turns: bool) -> R
             whole[name] = (whole[name] + sign * whole[name].T) / 2
             whole[name][TRANSLATIONS] = whole[name][:, TRANSLATIONS] = 0.0
     return RimMotion(rows, whole)
+
+
+def begin_forms(body: Body) -> None:
+    """Begin to compile the largest forms of `Operators`, while a static state is sought. Collective."""
+    compat.begin_form(_stiffness(body, 0.0))
+    for _, share in body.wall.kinds()[:1]:  # the others have the same code
+        compat.begin_form(_material(body, share))
+
+
+def _stiffness(body: Body, inflation: float) -> ufl.Form:
+    """The tangent of stresses and pressure (Pa), with the moduli of small motions."""
+    static = tangent(body, static_residual(body, fem.Constant(body.mesh, inflation), AT_REST))
+    return static + _material(body, body.wall.stiffening()) if body.wall.stiffens else static
+
+
+def _material(body: Body, share: Expr) -> ufl.Form:
+    """A share (constant in each cell) of the rubber's material tangent, in UFL."""
+    here = fem.Function(body.space)
+    here.x.array[:] = body.u.x.array
+    return tangent(body, added_stress(body, share, here))
 
 
 def _nodal_forces(body: Body, inflation: float, rolling: Rolling) -> np.ndarray:

@@ -33,7 +33,7 @@ def installation() -> dict[str, str]:
     from petsc4py import PETSc
     from slepc4py import SLEPc
 
-    from tireroad.fem import compat, form_cache
+    from tireroad.fem import form_cache
     from tireroad.runs.files.cache import Cache
     from tireroad.runs.files.store import libraries
     from tireroad.runs.version import PROGRAM, VERSION
@@ -52,9 +52,6 @@ def installation() -> dict[str, str]:
         "h5py": f"{h5py.__version__} (HDF5 {h5py.version.hdf5_version})",
         "BLAS": _blas(),
         "C compiler": compiler() or "none",
-        "forms are compiled into": (
-            "extension modules" if compat.HAS_HEADERS else "plain libraries (no headers of Python)"
-        ),
         "machine": f"{platform.machine()}, {len(os.sched_getaffinity(0))} of {os.cpu_count()} cores",
         "cache of stages": str(folder or "off"),
         "cache of forms": str(form_cache.kept_in()),

@@ -10,6 +10,7 @@ import numpy as np
 
 from tireroad.fem.collective import collect
 from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.matrices.operators import begin_forms
 from tireroad.fem.model import TireModel
 from tireroad.fem.static.equilibrium import Equilibrium, SolutionHistory
 from tireroad.fem.static.footprint import Footprint
@@ -243,6 +244,8 @@ class StaticStage(Computed[StaticState]):
         another speed. Collective."""
         rolling = steady_rolling(self.job, speed)
         with record.timing("mesh and forms"):
+            if self.job.scene.modal:
+                begin_forms(self.job.tire.body)
             equilibrium = Equilibrium(self.job.tire.body, rolling, road_shape(self.job.scene))
         equilibrium.history = history
         loader = LoadStepper(equilibrium, _show)

@@ -182,3 +182,85 @@ def test_a_user_s_options_that_may_not_be_looked_for_are_passed_over(tmp_path, m
     monkeypatch.setattr(form_cache.os, "stat", refused)
     form_cache._pass_over_options(tmp_path)
     assert os.environ["XDG_CONFIG_HOME"] == str(tmp_path)
+
+
+AHEAD = """
+import sys
+import numpy as np
+import tireroad
+import ufl
+from mpi4py import MPI
+from tireroad.fem import compat, form_cache
+from tireroad.fem.errors import InputError
+
+# Eight cubes in a row, of the root process.
+points = np.stack(np.meshgrid([0.0, 1.0], [0.0, 1.0], np.arange(9.0), indexing="ij"), -1).reshape(-1, 3)
+first = np.arange(8)[:, None] + 9 * np.array([0, 2, 1, 3])
+cells = np.concatenate([first, first + 1], axis=1)[: 8 if MPI.COMM_WORLD.rank == 0 else 0]
+points = points[: len(points) if MPI.COMM_WORLD.rank == 0 else 0]
+space = compat.vector_space(compat.create_mesh(MPI.COMM_WORLD, cells, points, 1), 2)
+
+def laplace():
+    u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
+    return ufl.inner(ufl.grad(u), ufl.grad(v)) * ufl.dx
+
+compat.begin_form(laplace())
+"""
+USED = """
+begun = MPI.COMM_WORLD.bcast(len(form_cache._begun))
+if "late" in sys.argv:
+    for process in form_cache._begun.values():
+        process.wait()
+compat.form(laplace())
+compat.begin_form(laplace())
+MPI.COMM_WORLD.Barrier()
+if MPI.COMM_WORLD.rank == 0:
+    print(begun, len(form_cache._begun), flush=True)
+"""
+
+
+def ahead(tmp_path: Path, code: str, compiler: str, processes: int = 1, *given: str):
+    """A program that begins a form, by a compiler that writes down its work into a file `done`."""
+    (tmp_path / "cc").write_text(f"#!/bin/sh\necho $* >>{tmp_path}/done\n{compiler}\n")
+    (tmp_path / "cc").chmod(0o755)
+    command = [sys.executable, "-P", "-c", AHEAD + code, *given]
+    if processes > 1:
+        command = ["mpirun", "-n", str(processes), *command]
+    own = environment(XDG_CACHE_HOME=str(tmp_path), CC=str(tmp_path / "cc"))
+    return subprocess.run(command, env=own, capture_output=True, text=True, timeout=600)
+
+
+@pytest.mark.parametrize("processes", [1, 2, 3])
+@pytest.mark.parametrize("given", ["early", "late"])
+def test_a_form_begun_ahead_is_compiled_once(tmp_path: Path, processes: int, given: str) -> None:
+    """Asked for while its compiler is at work, and after; asked for ahead again, it is there."""
+    found = ahead(tmp_path, USED, 'exec gcc "$@"', processes, given)
+    assert (found.returncode, found.stdout) == (0, "1 0\n"), found.stderr
+    done = [line for line in (tmp_path / "done").read_text().splitlines() if "ffcx_forms" in line]
+    assert len(done) == 1 and "-g" not in done[0].split()
+    assert incomplete(tmp_path) == []
+    assert list(tmp_path.glob("tireroad/forms-*/libffcx_forms*.so"))
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_what_fails_ahead_is_told_when_it_is_asked_for(tmp_path: Path, processes: int) -> None:
+    code = "try: compat.form(laplace())\nexcept InputError as error: print('told', flush=True)"
+    broken = 'case "$*" in *ffcx_forms*) exit 1;; esac\nexec gcc "$@"'
+    found = ahead(tmp_path, code, broken, processes)
+    assert (found.returncode, found.stdout) == (0, "told\n" * processes), found.stderr
+
+
+@pytest.mark.parametrize(
+    "ending", ["", "raise KeyboardInterrupt", "import os; os.kill(os.getpid(), 9)"]
+)
+def test_compilers_at_work_end_with_the_program(tmp_path: Path, ending: str) -> None:
+    """Whatever its end; those of a program that was killed by the next one."""
+    endless = 'case "$*" in *ffcx_forms*) while :; do sleep 0.1; done;; esac\nexec gcc "$@"'
+    began = time.monotonic()
+    ahead(tmp_path, ending, endless)
+    assert time.monotonic() - began < 300
+    left = compilers(tmp_path / "tireroad")
+    assert len(left) == (1 if "kill" in ending else 0)
+    found = ahead(tmp_path, USED, 'exec gcc "$@"')
+    assert found.returncode == 0, found.stderr
+    assert compilers(tmp_path / "tireroad") == [] and incomplete(tmp_path) == []

@@ -70,6 +70,10 @@ class IsoProfile:
             out[chunk == one] = self._within(int(one), place[chunk == one])
         return out
 
+    def lattice(self, x: Array, y: Array) -> Array:
+        """Heights (n, m) m at every x (n,) with every y (m,), m."""
+        return np.broadcast_to(self.height(x, y)[:, None], (len(x), len(y)))
+
     def _within(self, chunk: int, place: Array) -> Array:
         z = self._chunk(chunk)
         local = place - chunk * CHUNK

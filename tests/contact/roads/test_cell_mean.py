@@ -6,8 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from reference.cell_mean import smoothed
 
 from tireroad.contact.roads.cell_mean import CellMean
+from tireroad.contact.roads.road import make_road
 
 HALF = np.array([[2e-3, 1e-3]])
 
@@ -132,3 +134,36 @@ def test_the_slope_has_no_steps(length) -> None:
     kept = slope @ exact / (exact @ exact)
     assert kept == pytest.approx(1.0, abs=0.03)
     assert np.abs(slope - kept * exact).max() < 0.01 * k
+
+
+@pytest.mark.parametrize(
+    "road", [{"kind": "two-slope", "seed": 3}, {"kind": "cobblestones", "run_in": 0.0}]
+)
+@pytest.mark.parametrize("scatter", [0.0, 1e-3])
+def test_what_is_compiled_agrees_with_plain_numpy(road, scatter) -> None:
+    """Lines that share their strips and lines that do not, of several sizes, up to the end of the strip."""
+    rough = np.random.default_rng(1)
+    y = np.repeat([-0.01, 0.0, 0.01, 0.02], 3) + scatter * rough.standard_normal(12)
+    half = np.tile([[0.005, 0.005], [0.004, 0.005], [0.005, 0.003]], (4, 1))
+    prepared = make_road(**road).prepare(0.0, 0.5, -0.1, 0.1)
+    x = np.sort(rough.uniform(0.05, 0.5, (20, 12)), axis=0)
+    height, slope = smoothed(prepared, y, half, x)
+    mean = CellMean(prepared, y, half)
+    assert np.abs(mean.height(x, y) - height).max() < 1e-12 * np.abs(height).max()
+    assert np.abs(mean.slope(x, y) - slope).max() < 1e-11 * np.abs(slope).max()
+
+
+def test_lines_beside_each_other_share_their_strips() -> None:
+    """Half of those of a line lie on half of its neighbour's."""
+    asked = []
+
+    class Counted(Wave):
+        def height(self, x, y):
+            asked.append(len(np.unique(y)))
+            return super().height(x, y)
+
+    y = 0.1 + 2e-3 * np.arange(20)
+    CellMean(Counted(0.01), y, np.repeat(HALF, 20, axis=0)).height(np.full((1, 20), 0.1), None)
+    CellMean(Counted(0.01), y[:1], HALF).height(np.full((1, 1), 0.1), None)
+    shared, alone = asked
+    assert shared == alone + 19 * alone / 2

@@ -8,7 +8,12 @@ import pytest
 from tireroad.contact.roads.grid import Grid
 from tireroad.contact.roads.kinds.shapes import Sine
 from tireroad.contact.roads.road import make_road
-from tireroad.contact.roads.under_tire import PreparedRoad, RoadUnderTire, make_motion
+from tireroad.contact.roads.under_tire import (
+    PreparedRoad,
+    RoadUnderTire,
+    lattice_of,
+    make_motion,
+)
 from tireroad.fem.errors import InputError
 
 STRIP = (0.1, 5.0, -0.1, 0.1)
@@ -235,3 +240,32 @@ def test_motions() -> None:
     ):
         with pytest.raises(InputError, match=message):
             make_motion(**keys)
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [
+        {"kind": "flat"},
+        {"kind": "sine", "wavelength": 0.3, "amplitude": 1e-3},
+        {"kind": "cleat", "position": 0.6, "height": 0.01, "angle": 20.0},
+        STONES,
+        {"kind": "iso8608", "shortest_wave": 0.01},
+        {"kind": "texture", "cut_off": 0.004, "roll_off": 0.02},
+        {"kind": "two-slope", "skewness": -1.0},
+        {"kind": "two-slope", "longest_wave": 0.5, "lateral": 0.07, "start": -1.3},
+        {"kind": "texture", "drum_radius": 0.2},
+    ],
+    ids=lambda keys: "-".join(str(value) for value in keys.values()),
+)
+def test_a_lattice_of_heights_has_their_bits(keys) -> None:
+    """Over the run-in, over several tiles and chunks, in any order of x; in pieces too."""
+    road = make_road(**keys).prepare(*STRIP)
+    x, y = (
+        np.random.default_rng(1).permutation(np.linspace(-0.2, 5.0, 900)),
+        np.linspace(-0.1, 0.1, 31),
+    )
+    pairs = np.broadcast_arrays(x[:, None], y)
+    whole = lattice_of(road, x, y)
+    assert whole.shape == (900, 31) and np.array_equal(whole, road.height(*pairs))
+    pieces = [lattice_of(road, part, y) for part in np.split(x, [1, 13, 400])]
+    assert np.array_equal(np.concatenate(pieces), whole)
