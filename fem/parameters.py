@@ -264,8 +264,8 @@ def text(default: str | None, doc: str, *, only_for: OnlyFor = None) -> Any:
     return parameter(key, default)
 
 
-def numbers(doc: str, unit: str, limits: Limits, default: tuple[float, ...] = ()) -> Any:
-    """A list of finite numbers of any length, each within the limits."""
+def numbers(doc: str, unit: str, limits: Limits, default: tuple[float, ...] | None = ()) -> Any:
+    """A list of finite numbers of any length, each within the limits. A default of None makes it optional."""
 
     def read(value: Any) -> tuple[float, ...]:
         if not isinstance(value, list | tuple):
@@ -275,7 +275,14 @@ def numbers(doc: str, unit: str, limits: Limits, default: tuple[float, ...] = ()
             limits.check(part, unit)
         return result
 
-    key = Key(read=read, unit=unit, doc=doc, values=f"numbers, {limits}", limits=limits)
+    key = Key(
+        read=read,
+        unit=unit,
+        doc=doc,
+        values=f"numbers, {limits}",
+        limits=limits,
+        optional=default is None,
+    )
     return parameter(key, default)
 
 

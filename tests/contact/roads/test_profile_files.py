@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tireroad.contact.roads.profile_file import read_profile
+from tireroad.contact.roads.profile_file import Given, read_profile
 from tireroad.contact.roads.road import ROADS
 from tireroad.fem.errors import InputError
 
@@ -26,7 +26,7 @@ def lines(form: str, comma: bool = False) -> list[str]:
 def read(path: Path, text: str | bytes, **more):
     file = path / "line.csv"
     file.write_bytes(text if isinstance(text, bytes) else text.encode())
-    return read_profile(file, "road.file line.csv", **more)
+    return read_profile(file, "road.file line.csv", Given(**more))
 
 
 @pytest.mark.parametrize(
@@ -45,7 +45,7 @@ def read(path: Path, text: str | bytes, **more):
         "\n".join(lines("{n} {x} {z}")),
         "\n".join(reversed(lines("{x},{z}"))),
         "\n".join([*lines("{x},{z}")[:7], lines("{x},{z}")[6], *lines("{x},{z}")[7:]]),
-        "Abstand;Höhe [µm]\n".encode("cp1252") + "\n".join(lines("{x};{z}", comma=True)).encode(),
+        "Abstand [mm];Höhe [µm]\n".encode("cp1252") + "\n".join(lines("{x};{z}", comma=True)).encode(),
         "\n".join(lines("{x},{z}")).encode("utf-16"),
     ],
     ids=[
@@ -55,14 +55,14 @@ def read(path: Path, text: str | bytes, **more):
 )  # fmt: skip
 def test_the_same_profile_in_other_words(tmp_path: Path, text: str | bytes) -> None:
     found = read(tmp_path, text)
-    np.testing.assert_allclose(found.x, X)
-    np.testing.assert_allclose(found.heights, Z)
+    np.testing.assert_allclose(found.x, 1e-3 * X)
+    np.testing.assert_allclose(found.heights, (1e-6 if "µ" in str(found.readings) else 1e-3) * Z)
 
 
 def test_one_column_with_decimal_commas(tmp_path: Path) -> None:
     found = read(tmp_path, "\n".join(lines("{z}", comma=True)))
     assert found.x is None
-    np.testing.assert_allclose(found.heights, Z)
+    np.testing.assert_allclose(found.heights, 1e-3 * Z)
     with pytest.raises(InputError, match="decimal comma or two"):
         read(tmp_path, "\n".join(f"{k},{500 + k}" for k in range(100)))
 
