@@ -99,8 +99,14 @@ def described(value: Any) -> str:
     return str(value)[:60]
 
 
+def plain(value: Any) -> Any:
+    """A scalar or 0-d array of numpy as Python's own number; another value as it is."""
+    return value.item() if getattr(value, "ndim", None) == 0 and hasattr(value, "item") else value
+
+
 def whole(value: Any) -> int:
     """A whole number, also of numpy, as an int (not bool); else raises ValueError."""
+    value = plain(value)
     if isinstance(value, bool) or not isinstance(value, Integral):
         raise ValueError(f"must be a whole number, not {described(value)}")
     return int(value)
@@ -108,6 +114,7 @@ def whole(value: Any) -> int:
 
 def finite(value: Any) -> float:
     """A finite real number, also of numpy, as a float (not bool); else raises ValueError."""
+    value = plain(value)
     if isinstance(value, bool) or not isinstance(value, Real):
         raise ValueError(f"must be a number, not {described(value)}")
     try:
