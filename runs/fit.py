@@ -39,6 +39,7 @@ from tireroad.fem.sections.construction import INFLATION, Construction
 from tireroad.fem.sections.inflated import InflatedRing
 from tireroad.fem.sections.radial import radial, size
 from tireroad.runs.process import console
+from tireroad.runs.scene.resolved import scene_name
 
 
 @dataclass(frozen=True)
@@ -777,7 +778,7 @@ def command(path: Path, out: Path, changes: Sequence[str] = ()) -> str:
     scene = [
         f"# {figures.size} fitted to {path.name}:",
         *(f"#   {line}".rstrip() for line in text.splitlines()),
-        f'name = "{path.stem}"',
+        f'name = "{scene_name(out.name)}"',
         "",
         tire_table(figures, found.factors),
         "[static]",

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from torus_decks import Torus, plain
 
+from tireroad.fem.errors import InputError
+
 DENSITY = "*DENSITY\n1100.\n"
 
 
@@ -263,3 +265,13 @@ def test_refused(own, text, words):
                 Torus(arcs=4), materials="*MATERIAL, NAME=RUBBER\n*HYPERELASTIC, " + text + DENSITY
             )
         )
+
+
+def test_constants_that_were_fitted_say_so_when_they_are_refused(rubber):
+    """The deck states no C10: the sign of its stresses is what is wrong."""
+    lines = "-3.E5, 0.1\n-6.E5, 0.3\n-9.E5, 0.7\n"
+    with pytest.raises(
+        InputError,
+        match=r"states no constants: those of .* were fitted to its \*UNIAXIAL TEST DATA",
+    ):
+        rubber(f"*HYPERELASTIC, NEO HOOKE, TEST DATA INPUT\n*UNIAXIAL TEST DATA\n{lines}")
