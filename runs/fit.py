@@ -225,9 +225,8 @@ class Tir:
         except ValueError:
             found = math.nan
         if not math.isfinite(found):
-            raise InputError(
-                f"{self.path}, line {line}: {key} = {text} is not a number{_hint(text)}"
-            )
+            told = f"{key} = {text} is not a number{_hint(text)}" if text else f"{key} has no value"
+            raise InputError(f"{self.path}, line {line}: {told}")
         return found
 
     def unit(self, key: str) -> str | None:

@@ -268,10 +268,12 @@ def test_refused(own, text, words):
 
 
 def test_constants_that_were_fitted_say_so_when_they_are_refused(rubber):
-    """The deck states no C10: the sign of its stresses is what is wrong."""
-    lines = "-3.E5, 0.1\n-6.E5, 0.3\n-9.E5, 0.7\n"
+    """The deck states no C10: it is what Mooney and Rivlin's law makes of tension alone, -54381 Pa."""
+    lines = "".join(
+        f"{2 * (1 - s**-3) * (-54381.0 * s + 3e5):.9g}, {s - 1:.9g}\n" for s in (1.1, 1.3, 1.6, 2.0)
+    )
     with pytest.raises(
         InputError,
-        match=r"states no constants: those of .* were fitted to its \*UNIAXIAL TEST DATA",
+        match=r"must be .*not -5438.*states no constants: those of mooney-rivlin were fitted to its \*UNIAXIAL TEST DATA",
     ):
-        rubber(f"*HYPERELASTIC, NEO HOOKE, TEST DATA INPUT\n*UNIAXIAL TEST DATA\n{lines}")
+        rubber(f"*HYPERELASTIC, MOONEY-RIVLIN, TEST DATA INPUT\n*UNIAXIAL TEST DATA\n{lines}")
