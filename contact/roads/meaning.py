@@ -369,6 +369,8 @@ def _are_titles(found: Sequence[Column], line: Line, width: int) -> bool:
         return False  # Position;12.5
     if _UNIT_WORD.search(line.text) and not _BRACKETED.search(line.text):
         return False
+    if _STEP.search(line.text) or _SCALE.search(line.text) or _code_in(line.text) is not None:
+        return False  # Sampling interval 0.25 mm
     known = [column.role for column in found if column.role in ("x", "y", "z", "time")]
     if width == 1:
         # A sentence is no heading of a single column.
@@ -610,6 +612,10 @@ def scale_of(
         raise InputError(
             f"{source}, {stated.unclear} is not understood, and may state units or a factor: say {name} in [road], "
             "apply the factor, or remove the line"
+        )
+    if value is None and " and " in column.unclear:
+        raise InputError(
+            f"{source}: {what} are in {column.unclear} by the lines above the numbers: say {name}"
         )
     unit, said = column.unit, column.said
     for other in (role, ""):

@@ -124,6 +124,78 @@ def test_units_that_no_road_has(tmp_path: Path) -> None:
         assert road(tmp_path, text, height_unit="mm", outlier=1e6)
 
 
+@pytest.mark.parametrize(
+    "said",
+    [
+        "# Sampling interval 0.25 mm",
+        "# pitch [mm]: 0.25",
+        "dx = 250 um",
+        "Abtastabstand: 0,025 cm",
+        "# step 1/4",
+    ],
+)
+def test_the_distance_that_a_file_states(tmp_path: Path, said: str) -> None:
+    """It goes before 0.04 mm; road.pitch must not contradict it; without a unit that is known it is refused."""
+    text = f"{said}\n# heights in mm\n" + "\n".join(f"{z:.3f}" for z in Z)
+    if "1/4" in said:
+        with pytest.raises(InputError, match="may state the distance between heights"):
+            road(tmp_path, text)
+        assert road(tmp_path, text, pitch=2.5e-4).extent_of_file[0] == pytest.approx(
+            0.09975, abs=3e-4
+        )
+        return
+    made = road(tmp_path, text)
+    assert made.extent_of_file[0] == pytest.approx(0.09975, abs=3e-4)
+    assert not any("assumed" in note for note in made.notes)
+    with pytest.raises(InputError, match=r"every 0.25 mm by line 1, and road.pitch = 0.001 m"):
+        road(tmp_path, text, pitch=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("head", "row", "message"),
+    [
+        ("x [mm],z [s]", "{x},{z}", "heights are in s .*which is a time"),
+        ("t [s];z [mm]", "{x};{z}", "is a time, and no column holds the distance"),
+        ("sample,height [mm]", "{n},{z}", "counts the heights.*road.pitch"),
+        (
+            "x [furlong],z [mm]",
+            "{x},{z}",
+            '"furlong" in the heading .* is no unit that is known.*road.length_unit',
+        ),
+        ("x [mm],z", "{x},{z}", "a unit stands beside one column.*road.height_unit"),
+        ("# scale: 10\nx [mm],z [mm]", "{x},{z}", "scale: 10.*may state units or a factor"),
+        ("# units: mm\nx [cm],z [cm]\nmm,mm", "{x},{z}", "cm and mm"),
+        ("distance, height [mm], height [mm]", "{x},{z},{z}", "under 'distance'"),
+    ],
+)
+def test_what_a_file_leaves_open_is_refused(
+    tmp_path: Path, head: str, row: str, message: str
+) -> None:
+    rows = [
+        row.format(x=f"{x:.3f}", z=f"{z:.3f}", n=n)
+        for n, (x, z) in enumerate(zip(X, Z, strict=True))
+    ]
+    with pytest.raises(InputError, match=message):
+        road(tmp_path, "\n".join([head, *rows]))
+
+
+def test_a_statement_below_the_first_number_is_refused(tmp_path: Path) -> None:
+    text = "x [mm],z [mm]\n" + "\n".join(lines("{x},{z}"))
+    for said in ("# units: cm", "# scale = 10", "# z [um]", "# NODATA_value -9999"):
+        with pytest.raises(InputError, match="among the numbers"):
+            road(tmp_path, f"{text}\n{said}\n")
+    assert road(tmp_path, f"{text}\n# end of file\n")
+
+
+def test_a_key_that_contradicts_the_file_is_refused_with_both(tmp_path: Path) -> None:
+    text = "x [mm],z [mm]\n" + "\n".join(lines("{x},{z}"))
+    with pytest.raises(
+        InputError, match=r'x are in mm .heading "x \[mm\]"., and road.length_unit = "cm"'
+    ):
+        road(tmp_path, text, length_unit="cm")
+    assert road(tmp_path, text, length_unit="mm", height_unit="mm")
+
+
 def test_rounded_places_are_even(tmp_path: Path) -> None:
     """Every 0.05 mm, written to 0.1 mm; the step is that of the ends."""
     text = "\n".join(f"{k * 5e-5:.4f},{z}" for k, z in enumerate(np.tile(Z, 5)))
