@@ -99,8 +99,14 @@ def described(value: Any) -> str:
     return str(value)[:60]
 
 
+def plain(value: Any) -> Any:
+    """A scalar or 0-d array of numpy as Python's own number; another value as it is."""
+    return value.item() if getattr(value, "ndim", None) == 0 and hasattr(value, "item") else value
+
+
 def whole(value: Any) -> int:
     """A whole number, also of numpy, as an int (not bool); else raises ValueError."""
+    value = plain(value)
     if isinstance(value, bool) or not isinstance(value, Integral):
         raise ValueError(f"must be a whole number, not {described(value)}")
     return int(value)
@@ -108,6 +114,7 @@ def whole(value: Any) -> int:
 
 def finite(value: Any) -> float:
     """A finite real number, also of numpy, as a float (not bool); else raises ValueError."""
+    value = plain(value)
     if isinstance(value, bool) or not isinstance(value, Real):
         raise ValueError(f"must be a number, not {described(value)}")
     try:
@@ -264,8 +271,8 @@ def text(default: str | None, doc: str, *, only_for: OnlyFor = None) -> Any:
     return parameter(key, default)
 
 
-def numbers(doc: str, unit: str, limits: Limits, default: tuple[float, ...] = ()) -> Any:
-    """A list of finite numbers of any length, each within the limits."""
+def numbers(doc: str, unit: str, limits: Limits, default: tuple[float, ...] | None = ()) -> Any:
+    """A list of finite numbers of any length, each within the limits. A default of None makes it optional."""
 
     def read(value: Any) -> tuple[float, ...]:
         if not isinstance(value, list | tuple):
@@ -275,7 +282,14 @@ def numbers(doc: str, unit: str, limits: Limits, default: tuple[float, ...] = ()
             limits.check(part, unit)
         return result
 
-    key = Key(read=read, unit=unit, doc=doc, values=f"numbers, {limits}", limits=limits)
+    key = Key(
+        read=read,
+        unit=unit,
+        doc=doc,
+        values=f"numbers, {limits}",
+        limits=limits,
+        optional=default is None,
+    )
     return parameter(key, default)
 
 

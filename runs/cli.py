@@ -448,6 +448,7 @@ def _check(args: argparse.Namespace) -> None:
 
 def _check_file(path: Path) -> None:
     """Say what a file that is no scene holds."""
+    from tireroad.runs.files.folder import folder_of
     from tireroad.runs.report.input_file import (
         KINDS,
         describe_road,
@@ -456,7 +457,9 @@ def _check_file(path: Path) -> None:
         is_tire_file,
     )
 
-    out = Path("results") / path.stem
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    out = folder_of(path)
     if is_tire_file(path):
         print(describe_tire(path, out))
     elif is_road_file(path):
@@ -475,9 +478,10 @@ def _report(args: argparse.Namespace) -> None:
 
 
 def _fit(args: argparse.Namespace) -> None:
+    from tireroad.runs.files.folder import folder_of
     from tireroad.runs.fit import command
 
-    print(command(args.figures, args.out or Path("results") / args.figures.stem, args.set))
+    print(command(args.figures, args.out or folder_of(args.figures), args.set))
 
 
 def _export(args: argparse.Namespace) -> None:

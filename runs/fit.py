@@ -2,7 +2,7 @@
 
 The figures are mass, first modes, stiffness and footprint, from a TOML file or a .tir file. The
 latter is that of MF-Tyre/MF-Swift: sections in brackets, `KEY = value $ comment`, SI units. Of it
-belong here [DIMENSION], [OPERATING_CONDITIONS], [INERTIA], [VERTICAL], [STRUCTURAL] and
+belong here [UNITS], [DIMENSION], [OPERATING_CONDITIONS], [INERTIA], [VERTICAL], [DEFLECTION_LOAD_CURVE], [STRUCTURAL] and
 [CONTACT_PATCH]. The footprint of a load F is there, with the vertical stiffness C and the unloaded
 radius R,
 
@@ -33,11 +33,13 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import lsq_linear
 
+from tireroad.contact.roads.text_table import opened
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.sections.construction import INFLATION, Construction
 from tireroad.fem.sections.inflated import InflatedRing
 from tireroad.fem.sections.radial import radial, size
 from tireroad.runs.process import console
+from tireroad.runs.scene.resolved import scene_name
 
 
 @dataclass(frozen=True)
@@ -105,10 +107,11 @@ class FitFigures:
 
 def read(path: Path, changes: Sequence[str] = ()) -> FitFigures:
     """The figures in a file, with `changes` as key=value. Raises InputError with the key for what is no figure."""
-    try:
-        text = path.read_text(encoding="utf-8", errors="replace")
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror}") from None
+    with opened(path, str(path)) as stream:
+        try:
+            text = stream.read()
+        except UnicodeError:
+            raise InputError(f"{path}: is not a text file") from None
     notes: list[str] = []
     if path.suffix.lower() == ".tir":
         sized = any(change.partition("=")[0].strip() == "size" for change in changes)
@@ -190,34 +193,154 @@ def _checked(path: Path, key: str, value: object) -> float:
 
 
 _LINE = re.compile(r"^\s*([A-Za-z_]\w*)\s*=\s*('[^']*'|\"[^\"]*\"|[^$!]*)")
+_UNITS: Mapping[str, tuple[str, tuple[str, ...]]] = {
+    "LENGTH": ("meter", ("m", "meter", "metre", "meters", "metres")),
+    "FORCE": ("newton", ("n", "newton", "newtons")),
+    "TIME": ("second", ("s", "sec", "second", "seconds")),
+    "MASS": ("kg", ("kg", "kilogram", "kilograms", "kilo")),
+    "ANGLE": ("radians", ("rad", "radian", "radians")),
+    "PRESSURE": ("pascal", ("pa", "pascal", "pascals")),
+}
+"""What a .tir file calls the SI units."""
+_CURVE = "DEFLECTION_LOAD_CURVE"
+_MOST_LOADS = 3  # points of a curve that are fitted
+
+
+@dataclass(frozen=True)
+class Tir:
+    """A .tir file: `units` and `values` by key in capitals as written, with their lines, and rows of numbers by section."""
+
+    path: Path
+    units: Mapping[str, tuple[str, int]]
+    values: Mapping[str, tuple[str, int]]
+    tables: Mapping[str, list[tuple[str, int]]]
+
+    def number(self, key: str) -> float | None:
+        """The value of a key; None where it is absent. InputError for one that is no finite number."""
+        if key not in self.values:
+            return None
+        text, line = self.values[key]
+        try:
+            found = float(text.replace("D", "e").replace("d", "e"))
+        except ValueError:
+            found = math.nan
+        if not math.isfinite(found):
+            told = f"{key} = {text} is not a number{_hint(text)}" if text else f"{key} has no value"
+            raise InputError(f"{self.path}, line {line}: {told}")
+        return found
+
+    def unit(self, key: str) -> str | None:
+        """The unit as written if it is not that of SI."""
+        text = self.units.get(key, ("", 0))[0]
+        return text if text and text.lower() not in _UNITS[key][1] else None
+
+
+def _hint(text: str) -> str:
+    return f": write {text.replace(',', '.')}" if re.fullmatch(r"[-+\d,eE]+", text) else ""
+
+
+def tir_of(text: str, path: Path) -> Tir:
+    """The content of a .tir file; comments begin with $ or !. InputError for a key of two values."""
+    units: dict[str, tuple[str, int]] = {}
+    values: dict[str, tuple[str, int]] = {}
+    tables: dict[str, list[tuple[str, int]]] = {}
+    section = ""
+    for number, line in enumerate(text.replace("\x1a", "").splitlines(), 1):
+        plain = line.strip()
+        if not plain or plain.startswith(("$", "!", "{")):
+            continue
+        if plain.startswith("["):
+            section = plain[1:].partition("]")[0].strip().upper()
+            continue
+        if not (match := _LINE.match(line)):
+            tables.setdefault(section, []).append((re.split(r"[$!]", plain)[0].strip(), number))
+            continue
+        key, value = match[1].upper(), match[2].strip().strip("'\"").strip()
+        # Without sections MASS is a unit by its text.
+        of_units = section == "UNITS" or (not section and key in _UNITS and not value[:1].isdigit())
+        into = units if of_units else values
+        if key in into and into[key][0] != value and key in _USED:
+            raise InputError(
+                f"{path}, line {number}: {key} = {value}, and {into[key][0]} in line {into[key][1]}: which is right?"
+            )
+        into.setdefault(key, (value, number))
+    return Tir(path, units, values, tables)
+
+
+_USED = {
+    *(kind.tir for kind in KINDS.values()),
+    *(
+        "FNOMIN",
+        "UNLOADED_RADIUS",
+        "WIDTH",
+        "RIM_RADIUS",
+        "ASPECT_RATIO",
+        "INFLPRES",
+        "IP",
+        "NOMPRES",
+    ),
+    *(f"Q_R{which}" for which in ("A1", "A2", "B1", "B2")),
+} - {""}
+
+
+def _check_units(tir: Tir, notes: list[str]) -> None:
+    """InputError for a unit that is not SI and that a figure of the file is in."""
+    matters = {"MASS": "MASS" in tir.values, "ANGLE": "YAW_STIFFNESS" in tir.values}
+    if not tir.units:
+        notes.append("no [UNITS] in the file: SI units assumed")
+    for key, (unit, _) in _UNITS.items():
+        other = tir.unit(key)
+        if other is None:
+            continue
+        if matters.get(key, True):
+            raise InputError(
+                f"{tir.path}, line {tir.units[key][1]}: {key} = '{other}': files in SI units are read ({key} = '{unit}')"
+            )
+        notes.append(f"{key} = '{other}' in the file: no figure that is read is in it")
+
+
+def _curve(tir: Tir, nominal: float | None, notes: list[str]) -> list[list[float]]:
+    """Deflections (m) and loads (N) of [DEFLECTION_LOAD_CURVE]: at most three, about the nominal load."""
+    points: list[list[float]] = []
+    for text, line in tir.tables.get(_CURVE, []):
+        fields = re.split(r"[\s;]+", text)
+        try:
+            pair = [float(field) for field in fields]
+        except ValueError:
+            pair = []
+        if len(pair) != 2 or not all(math.isfinite(one) for one in pair):
+            raise InputError(
+                f"{tir.path}, line {line}: [{_CURVE}] has lines of a deflection and a load, not {text[:40]!r}{_hint(text)}"
+            )
+        if points and not (pair[0] > points[-1][0] and pair[1] >= points[-1][1]):
+            raise InputError(f"{tir.path}, line {line}: [{_CURVE}] must ascend, not {text[:40]!r}")
+        points.append(pair)
+    middle = nominal or 4000.0
+    near = [one for one in points if one[0] > 0 and 0.3 * middle <= one[1] <= 1.7 * middle]
+    chosen = (
+        [near[k] for k in sorted({round(k) for k in np.linspace(0, len(near) - 1, _MOST_LOADS)})]
+        if near
+        else []
+    )
+    if points:
+        loads = ", ".join(f"{load:g} N at {1e3 * deflection:g} mm" for deflection, load in chosen)
+        notes.append(
+            f"[{_CURVE}]: {len(points)} points; "
+            + (f"fitted: {loads}" if chosen else "none near the load: not used")
+        )
+    return chosen
 
 
 def tir_values(text: str) -> dict[str, str]:
-    """Values as written by key in capitals; comments begin with $ or !."""
-    found: dict[str, str] = {}
-    for line in text.splitlines():
-        match = None if line.lstrip().startswith(("$", "!", "[", "{")) else _LINE.match(line)
-        if match:
-            found.setdefault(match[1].upper(), match[2].strip().strip("'\""))
-    return found
+    """Values as written by key in capitals, without units."""
+    return {key: value for key, (value, _) in tir_of(text, Path("tir")).values.items()}
 
 
 def _of_tir(text: str, path: Path, notes: list[str], sized: bool) -> dict[str, Any]:
     """The figures of a .tir file by the keys of a TOML file; `sized`: the size is given otherwise."""
-    given = tir_values(text)
-    for key, unit in (("LENGTH", "meter"), ("FORCE", "newton"), ("TIME", "second")):
-        if given.get(key, unit).lower().rstrip("s") not in (unit, unit[:1], "metre", "m"):
-            raise InputError(
-                f"{path}: {key} = {given[key]}: files in SI units are read ({key} = '{unit}')"
-            )
-
-    def value(key: str) -> float | None:
-        try:
-            return float(given[key].replace("D", "e").replace("d", "e")) if key in given else None
-        except ValueError:
-            return None  # MASS is a unit, too
-
-    masses = re.findall(r"(?im)^\s*MASS\s*=\s*(\d+\.?\d*(?:e[-+]?\d+)?)\s*(?:[$!]|$)", text)
+    tir = tir_of(text, path)
+    _check_units(tir, notes)
+    value = tir.number
     named, off = ("", 0.0) if sized else _size(path, value)
     if abs(off) > 0.02:
         notes.append(
@@ -225,9 +348,7 @@ def _of_tir(text: str, path: Path, notes: list[str], sized: bool) -> dict[str, A
         )
     values: dict[str, float] = {}
     for key, kind in KINDS.items():
-        found = (
-            float(masses[0]) if key == "mass" and masses else value(kind.tir) if kind.tir else None
-        )
+        found = value(kind.tir) if kind.tir else None
         if found is None or (found == 0 and key != "mass"):
             continue
         values[key] = _checked(path, key, found)
@@ -244,7 +365,9 @@ def _of_tir(text: str, path: Path, notes: list[str], sized: bool) -> dict[str, A
             "footprint_width": 2 * (value("WIDTH") or 0.0) * (q[3] * x + q[2] * np.cbrt(x)),
         }
         values |= {key: _checked(path, key, float(one)) for key, one in sizes.items() if one > 0}
-    table = values | {"size": named} | ({"load": load} if load else {})
+    loads = _curve(tir, load, notes)
+    table: dict[str, Any] = values | {"size": named} | ({"load": load} if load else {})
+    table |= {"loads": loads} if loads else {}
     inflation = value("INFLPRES") or value("IP") or value("NOMPRES")
     if inflation is not None:
         return table | {"inflation": inflation}
@@ -654,7 +777,7 @@ def command(path: Path, out: Path, changes: Sequence[str] = ()) -> str:
     scene = [
         f"# {figures.size} fitted to {path.name}:",
         *(f"#   {line}".rstrip() for line in text.splitlines()),
-        f'name = "{path.stem}"',
+        f'name = "{scene_name(out.name)}"',
         "",
         tire_table(figures, found.factors),
         "[static]",

@@ -39,19 +39,20 @@ from tireroad.contact.tread.law import TREADS, TreadLaw
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.matrices import probe
 from tireroad.fem.model import SmallMotions, TireModel
+from tireroad.fem.parameters import plain
 from tireroad.fem.sections.torus import Torus
 from tireroad.fem.static.footprint import Footprint
 from tireroad.fem.static.press import press as press_tire
 from tireroad.fem.static.state import StaticState
 from tireroad.fem.static.virtual_work import AT_REST
 from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.material import Material, compound
+from tireroad.fem.tire.material import CONSTANT, Material, compound
 from tireroad.fem.wheel import Turning
 from tireroad.greens.coupling import Wheel, wheel_of
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.greens.responses import make_response
-from tireroad.modal.basis import ModalBasis
+from tireroad.modal.basis import ModalBasis, same_fields
 from tireroad.modal.rolling import RollingModes, rolling_modes
 from tireroad.modal.standing import standing_modes
 from tireroad.runs.scene.rules import barred_from_contact
@@ -61,6 +62,9 @@ from tireroad.runs.scene.tables.contact import DRY_ASPHALT
 from tireroad.runs.scene.tables.tire import NEAR_ROAD, TireTable
 from tireroad.runs.stages.rolling import grown
 from tireroad.runs.stages.stage import make_tire, rolling_shape
+
+# Arguments that are one number.
+_NUMBERS = {"inflation", "load", "deflection", "road_height", "count", "up_to", "duration", "step"}
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -101,10 +105,10 @@ def in_arguments(text: str) -> str:
 
 
 def typed(function: Callable[P, T]) -> Callable[P, T]:
-    """The function with errors that name its arguments, also those of the wrong class.
+    """The function with errors that name its arguments, also those of the wrong class; scalars of numpy are numbers.
 
     InputError for an argument that is not of the class it is annotated with, if functions of the library
-    make that class.
+    make that class, and for several numbers where one is meant.
     """
     signature = inspect.signature(function)
 
@@ -115,7 +119,14 @@ def typed(function: Callable[P, T]) -> Callable[P, T]:
 
     @wraps(function)
     def checked(*args: P.args, **keys: P.kwargs) -> T:
-        given = signature.bind(*args, **keys).arguments
+        bound = signature.bind(*args, **keys)
+        given = bound.arguments
+        for name, value in given.items():
+            given[name] = plain(value)
+            if isinstance(given[name], np.ndarray) and name in _NUMBERS:
+                raise InputError(
+                    f"{function.__name__}: {name} is an array of shape {value.shape}: it must be one number"
+                )
         for name, kind in kinds().items():
             if name in given and not isinstance(given[name], kind):
                 found = type(given[name]).__name__
@@ -123,7 +134,7 @@ def typed(function: Callable[P, T]) -> Callable[P, T]:
                     f"{function.__name__}: {name} is of the type {found}: take what {_maker(kind)} returns"
                 )
         try:
-            return function(*args, **keys)
+            return function(*bound.args, **bound.kwargs)
         except (InputError, ConvergenceError) as error:
             error.args = (in_arguments(str(error)),)
             raise
@@ -138,8 +149,10 @@ def _maker(hint: Any) -> str | None:
 
 
 Array = NDArray[np.float64]
+_OF_ONE_TIRE = 1e-5  # relative difference of a mode's mass and stiffness from 1 kg and omega^2
 
 
+@typed
 def torus(
     *,
     outer_radius: float = 0.32,
@@ -186,6 +199,7 @@ def torus(
     return TireModel(section, lambda: Body(comm, section, {"wall": rubber}))
 
 
+@typed
 def radial(
     size: str = "205/60 R15",
     *,
@@ -266,6 +280,28 @@ class Standing:
         """Natural frequencies (m,), Hz."""
         return self.basis.frequency
 
+    def check(self) -> None:
+        """InputError if the modes are not of these motions, in whose mass and stiffness they are normal. Collective."""
+        modes, operators = self.basis.modes, self.motions.operators
+        if modes is None:
+            return
+        comm = self.motions.body.comm
+        rows = operators.stiffness.getLocalSize()[0]
+        same = comm.allreduce(rows == len(modes.vectors), op=MPI.LAND)
+        if same and len(modes.squares) > modes.rigid:
+            last = modes.vectors[:, -1]
+            shape = operators.stiffness.createVecRight()
+            shape.setArray(last)
+            stiff = shape.dot(operators.stiffness * shape)
+            shape.destroy()
+            same = abs(comm.allreduce(float(last @ (operators.mass * last))) - 1) < _OF_ONE_TIRE
+            if all(kind.spectrum == CONSTANT for kind, _ in self.motions.body.wall.kinds()):
+                same = same and abs(stiff / modes.squares[-1] - 1) < _OF_ONE_TIRE
+        if not same:
+            raise InputError(
+                "roll: standing has the modes of another tire or static state: take what tireroad.modes(tire, static) returns"
+            )
+
 
 @typed
 def modes(
@@ -301,6 +337,10 @@ def _check_state(tire: TireModel, static: StaticState) -> None:
         why = "its nodes lie elsewhere"
     elif static.materials and static.materials != tire.body.materials:
         why = "its tire is of other materials"
+    elif static.ring and static.ring != tire.section.fingerprint:
+        why = "its mesh is another within, such as a wall of another thickness"
+    elif static.ring and static.plies != tuple(tire.body.plies.cords):
+        why = "its tire has other cords"
     if why:
         raise InputError(
             f"modes: static is the state of another tire ({why}): call tireroad.press(tire, …) for this one"
@@ -313,6 +353,16 @@ class RollingTire:
 
     standing: Standing
     states: RollingModes
+
+    def __post_init__(self) -> None:
+        """InputError if the states are not of these modes."""
+        if not self.states.full and not same_fields(
+            self.states.basis.shape, self.standing.basis.shape
+        ):
+            raise InputError(
+                "RollingTire: states and standing are of two tires, or of two solutions: take what tireroad.roll(standing, "
+                "turning) returns"
+            )
 
     @property
     def eigenvalue(self) -> NDArray[np.complex128]:
@@ -359,6 +409,7 @@ def roll(standing: Standing, turning: Turning) -> RollingTire:
 
     InputError for arguments of the wrong kind.
     """
+    standing.check()
     comm = standing.motions.body.comm
     return RollingTire(standing=standing, states=rolling_modes(standing.basis, turning, comm))
 

@@ -17,6 +17,10 @@ def program() -> None:
         os.execv(sys.executable, [sys.executable, *sys.argv[2:]])  # the launcher does it by itself
     signal.pthread_sigmask(signal.SIG_BLOCK, signals.STOP_SIGNALS)
     supervisor.mend()
+    if (tasks := signals.without_mpi(os.environ)) > 1:
+        if signals.rank_before_mpi() == 0:
+            print(_APART.format(tasks=tasks), file=sys.stderr)
+        os._exit(INPUT)
     _need_home()
     # A second BLAS thread waits by spinning: half as much processor time again for no second less, from
     # 30,000 to 100,000 unknowns. More cores are used by more processes.
@@ -36,6 +40,13 @@ def program() -> None:
             raise
         print(f"stopped by {signals.raised()} before anything was started", file=sys.stderr)
         os._exit(handed_over(STOPPED, for_all=False))
+
+
+_APART = (
+    "error: srun started {tasks} processes without MPI, so that each would compute all by itself: start one "
+    "(srun -n 1 --pty bash) and take ./tireroad run … -n {tasks} in it, or mpirun -n {tasks} python3 -m runs run …, or "
+    "srun --mpi=pmix where the cluster's MPI has it"
+)
 
 
 def _need_home() -> None:

@@ -63,6 +63,48 @@ def test_modes_refuse_the_state_of_another_tire(static, change: dict, why: str) 
         tr.modes(tr.torus(**TIRE | change), static, count=4)
 
 
+def test_a_wall_of_another_thickness_is_another_tire(static) -> None:
+    """Its outer face has the same nodes, and so many: the state of 12 mm gave modes of 20 mm."""
+    with pytest.raises(tr.InputError, match="another tire .its mesh is another within"):
+        tr.modes(tr.torus(**TIRE | {"thickness": 0.02}), static, count=4)
+
+
+def test_modes_and_rolling_tires_of_two_tires_are_refused(rolling, static) -> None:
+    thick = tr.torus(**TIRE | {"thickness": 0.02})
+    other = tr.modes(thick, tr.press(thick, inflation=2e5, load=400.0), count=12)
+    mixed = replace(rolling.standing, motions=other.motions)
+    with pytest.raises(tr.InputError, match="modes of another tire or static state"):
+        tr.roll(mixed, tr.Turning(speed=20.0))
+    with pytest.raises(tr.InputError, match="states and standing are of two tires"):
+        replace(rolling, standing=other)
+
+
+@pytest.mark.parametrize(
+    "kind", [np.float64, np.float32, np.array], ids=["float64", "float32", "0-d"]
+)
+def test_numbers_of_numpy_are_numbers(kind) -> None:
+    whole = np.array if kind is np.array else np.int64
+    sizes = {name: whole(value) for name, value in TIRE.items() if isinstance(value, int)}
+    reals = {name: kind(value) for name, value in TIRE.items() if isinstance(value, float)}
+    tire = tr.torus(**TIRE | sizes | reals)
+    turning = tr.Turning(speed=kind(50.0), damping=(kind(500.0), kind(0.0)))
+    static = tr.press(tire, inflation=kind(2e5), load=kind(500.0), turning=turning)
+    assert static.load == pytest.approx(500, rel=1e-6)
+    modes = tr.modes(tire, static, count=whole(4))
+    assert len(modes.frequency) == 4
+    road = tr.make_road(kind="sine", amplitude=kind(1e-4), wavelength=kind(0.1))
+    run = tr.drive(
+        tr.roll(modes, turning), road, duration=kind(1e-3), step=kind(1e-4), spacing=kind(0.02)
+    )
+    assert len(run.time) in (10, 11)  # 1e-3 of float32 is a little more than ten steps
+    rubber = tr.compound(
+        "neo-hookean", kind(1200.0), youngs_modulus=kind(48e6), poisson_ratio=kind(0.45)
+    )
+    assert rubber.density == 1200.0 and isinstance(rubber.density, float)
+    with pytest.raises(tr.InputError):
+        tr.press(tire, inflation=np.array([2e5, 3e5]), load=500.0)
+
+
 def test_modes_take_the_state_of_an_equal_tire(rolling, static) -> None:
     again = tr.modes(tr.torus(**TIRE), static, count=12)
     assert again.frequency == pytest.approx(rolling.standing.frequency, rel=1e-9)

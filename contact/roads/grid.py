@@ -8,12 +8,15 @@ import shutil
 import tempfile
 import weakref
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tireroad.contact.roads.meaning import ReadAs
+from tireroad.contact.roads.missing import CodeSearch
 from tireroad.contact.roads.under_tire import shown
 from tireroad.fem.errors import InputError
 
@@ -23,6 +26,8 @@ Array = NDArray[np.float64]
 PIECE = 4_000_000
 # Points in a list are sorted in memory, and positions along x are kept there.
 MAX_POINTS = 10_000_000
+# Codes for missing heights are looked for in at most 64 places of so many numbers.
+SEARCHED, MOST_SEARCHED = 500_000, 64
 # Largest number of heights unpacked into a temporary file: 16 GB.
 MAX_UNPACKED = 2_000_000_000
 
@@ -70,16 +75,50 @@ class GridColumns:
         return self._rows.read(i0, i1)[:, self._columns]
 
 
-class Scaled:
-    """Rows in another unit: multiplied by a factor."""
+@dataclass(frozen=True)
+class Coding:
+    """What the numbers of a file mean: metres = (number * scale + offset) * unit, and nan for what is no height.
 
-    def __init__(self, rows: Rows, factor: float) -> None:
-        self._rows, self._factor = rows, factor
+    No heights are numbers equal to one of `missing`, and those out of `valid` (lowest, highest).
+    """
+
+    unit: float = 1.0
+    scale: float = 1.0
+    offset: float = 0.0
+    missing: tuple[float, ...] = ()
+    valid: tuple[float, float] = (-np.inf, np.inf)
+
+    def decoded(self, numbers: Array) -> Array:
+        """Heights in m."""
+        z = self.numbers(numbers)
+        return z if self.unit == 1.0 else self.unit * z
+
+    def numbers(self, numbers: Array) -> Array:
+        """Heights in the file's unit."""
+        low, high = self.valid
+        gone = (numbers < low) | (numbers > high) if np.isfinite((low, high)).any() else None
+        for code in self.missing:
+            here = np.isclose(numbers, code, rtol=1e-6, atol=1e-12)
+            gone = here if gone is None else gone | here
+        z = numbers
+        if (self.scale, self.offset) != (1.0, 0.0):
+            z = numbers * self.scale + self.offset
+        return z if gone is None else np.where(gone, np.nan, z)
+
+
+class Decoded:
+    """Rows of a file as heights: by its coding, and without those where `mask` (rows of 0 and 1) is 1."""
+
+    def __init__(self, rows: Rows, coding: Coding, mask: Rows | None = None) -> None:
+        self._rows, self._coding, self._mask = rows, coding, mask
         self.shape = rows.shape
 
     def read(self, i0: int, i1: int) -> Array:
-        """Rows i0 to i1."""
-        return self._factor * self._rows.read(i0, i1)
+        """Rows i0 to i1, m."""
+        z = self._coding.decoded(self._rows.read(i0, i1))
+        if self._mask is None:
+            return z
+        return np.where(self._mask.read(i0, i1) != 0, np.nan, z)
 
 
 class Packed(NamedTuple):
@@ -218,6 +257,7 @@ class Window:
         self._known = np.zeros(0, dtype=bool)
         self.missing = 0
         self.hole: tuple[int, int] | None = None
+        self.search: CodeSearch | None = None  # looks for values that mean "no height"
 
     def __getstate__(self) -> dict[str, Any]:
         """The state without the rows in memory, which are read again when needed."""
@@ -228,7 +268,11 @@ class Window:
         """Search all rows for holes, once. InputError if there is no height at all."""
         known = np.ones(len(self._x), dtype=bool)
         for first in range(0, len(self._x), self._most):
-            missing = np.isnan(self._read(first, min(first + self._most, len(self._x))))
+            last = min(first + self._most, len(self._x))
+            z = self._read(first, last)
+            if self.search is not None:
+                self.search(z, self._x[first:last], self._y)
+            missing = np.isnan(z)
             known[first : first + len(missing)] = ~missing.all(axis=1)
             if self.hole is None and missing.any():
                 i, j = np.argwhere(missing)[0]
@@ -401,7 +445,24 @@ class Grid:
         self._sides = float(y[0]), float(y[-1])
         self.filled = 0
         self.notes: tuple[str, ...] = ()  # how the measurement was processed, for the user
+        self.readings: tuple[ReadAs, ...] = ()  # what of the file was read as what
+        self.search: CodeSearch | None = None
         self.making = 0.0  # bytes of memory that making it took
+
+    def look_for_codes(self) -> None:
+        """InputError for values that look like "no height" (`search`), of a long file in places all along it.
+
+        The strip that is driven over is searched completely when it is prepared.
+        """
+        if self.search is None:
+            return
+        count, width = self._rows.shape
+        most = max(SEARCHED // width, 2)
+        begins = range(0, count, most)
+        for first in begins[:: -(-len(begins) // MOST_SEARCHED)]:
+            last = min(first + most, count)
+            x, y = self._x.positions[first:last], self._y.positions
+            self.search(self._rows.read(first, last), x, y)
 
     def _over(self, rows: slice, columns: slice) -> Window:
         place = rows.start, columns
@@ -473,6 +534,7 @@ class Grid:
         self._check_strip(x0, x1, y0, y1)
         rows, columns = self._cells(x0, x1, y0, y1)
         window = self._over(rows, columns)
+        window.search = self.search
         window.scan()
         if window.missing and self._holes == "refuse":
             self._refuse_holes(window, rows.start, columns.start)

@@ -1,14 +1,15 @@
-"""Files of heights on a grid, .npz, .csv and .h5: read in pieces and checked for plausibility."""
+"""Files of heights on a grid, .npz, text, .h5 and .nc: read in pieces and checked for plausibility."""
 
 from __future__ import annotations
 
+import re
 import struct
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator
-from itertools import islice
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, NamedTuple, TextIO
+from typing import IO, TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,14 +18,18 @@ from tireroad.contact.roads.grid import (
     MAX_POINTS,
     PIECE,
     ArrayRows,
+    Coding,
+    Decoded,
     FileRows,
     Grid,
     Packed,
     Rows,
-    Scaled,
     Spool,
     check_count,
 )
+from tireroad.contact.roads.grid_text import Found, Keys, read_csv
+from tireroad.contact.roads.meaning import UNITS, Column, ReadAs, Stated, unit_of
+from tireroad.contact.roads.missing import CodeSearch, refused
 from tireroad.fem.errors import InputError
 
 if TYPE_CHECKING:
@@ -160,168 +165,187 @@ def read_numbers(archive: zipfile.ZipFile, name: str, most: int) -> Array:
     return numbers.reshape(header.shape, order="F" if header.by_columns else "C").astype(float)
 
 
-Line = tuple[int, str]  # line number and text
-
-BLOCK = 4096  # most lines per block
-BLOCK_CHARACTERS = 32_000_000  # most characters per block
-MAX_LINE = 16_000_000  # characters of a line: about a million heights across the road
-
-
-def read_csv(file: Path) -> tuple[Array, Array, Rows]:
-    """x (nx,), y (ny,) and z (nx, ny) of a text file in the layout given in `grid_file.read_grid`.
-
-    InputError names the line of an error.
-    """
-    try:
-        with file.open(encoding="utf-8-sig") as stream:
-            return _csv_rows(file, _lines(file, stream))
-    except UnicodeDecodeError as error:
-        raise InputError(f"road.file {file}: is not a text file (byte {error.start})") from error
+_UNIT_NAME = re.compile(r"(?:(x|y|z|lengths?|heights?)[_ ]?)?units?", re.IGNORECASE)
+_MISSING_NAMES = (
+    "_fillvalue",
+    "fill_value",
+    "fillvalue",
+    "missing_value",
+    "missing",
+    "nodata",
+    "no_data",
+    "nodata_value",
+)
+_FACTORS = re.compile(r"scale|scaling|factor|gain|multiplier|slope", re.IGNORECASE)
 
 
-def _lines(file: Path, stream: TextIO) -> Iterator[Line]:
-    """Lines of data with their numbers, none longer than MAX_LINE."""
-    number = 0
-    while line := stream.readline(MAX_LINE + 1):
-        number += 1
-        if len(line) > MAX_LINE:
+@dataclass
+class _Meaning:
+    """What stands beside the arrays x, y and z of a file: units by role ("" for all) with their place, and codes by array."""
+
+    units: dict[str, tuple[str, str]] = field(default_factory=dict)
+    codes: dict[str, dict[str, Any]] = field(default_factory=lambda: {name: {} for name in "xyz"})
+    down: bool = False  # heights are positive downwards
+
+    def take(self, whose: str, name: str, value: Any, source: str) -> bool:
+        """Take the attribute or entry `name` of the array `whose` ("" for all); False where it says nothing that is known."""
+        plain = name.lower()
+        numbers = np.asarray(value).ravel()
+        where = f"{name} of {whose}" if whose else name
+        if match := _UNIT_NAME.fullmatch(plain):
+            text = _text_of(value)
+            roles = {"l": "xy", "h": "z"}.get((match[1] or "")[:1], match[1] or whose or "xyz")
+            if text and text.strip():
+                for role in roles:
+                    self.units.setdefault(role, (text, where))
+            return True
+        of = self.codes[whose or "z"]
+        if numbers.dtype.kind not in "iuf" or not numbers.size:
+            down = (
+                plain == "positive" and (_text_of(value) or "").lower() == "down" and whose == "z"
+            )
+            self.down |= down
+            return down
+        if plain in _MISSING_NAMES:
+            of["missing"] = (*of.get("missing", ()), *(float(one) for one in numbers if one == one))
+        elif plain == "scale_factor":
+            of["scale"] = of.get("scale", 1.0) * float(numbers[0])
+        elif plain == "add_offset":
+            of["offset"] = float(numbers[0])
+        elif plain == "valid_range" and len(numbers) == 2:
+            of["valid"] = float(numbers[0]), float(numbers[1])
+        elif plain == "valid_min":
+            of["valid"] = float(numbers[0]), of.get("valid", (-np.inf, np.inf))[1]
+        elif plain == "valid_max":
+            of["valid"] = of.get("valid", (-np.inf, np.inf))[0], float(numbers[0])
+        elif _FACTORS.search(plain) and float(numbers[0]) != 1.0:
             raise InputError(
-                f"road.file {file}, line {number}: longer than {MAX_LINE:,} characters; write a line "
-                "for each x, or a list of points with the first line x,y,z"
+                f"{source}: {where} = {numbers[0]:g} may be a factor, and is not known: apply it, or name it scale_factor"
             )
-        if line.strip() and not line.startswith("#"):
-            yield number, line.rstrip("\r\n")
-
-
-def _blocks_of_lines(lines: Iterator[Line]) -> Iterator[list[Line]]:
-    """Lines in blocks of bounded size."""
-    while first := next(lines, None):
-        count = max(min(BLOCK, BLOCK_CHARACTERS // (len(first[1]) + 1)), 1)
-        yield [first, *islice(lines, count - 1)]
-
-
-def _csv_rows(file: Path, lines: Iterator[Line]) -> tuple[Array, Array, Rows]:
-    """x, y and z from numbered lines of text, block by block."""
-    number, first = next(lines, (0, ""))
-    if "," not in first:
-        raise InputError(
-            f"road.file {file}, line {number}: no comma; a matrix has the positions across in its first line, "
-            "after a comma, and then a line for each x; a list of points begins with x,y,z"
-            if number
-            else f"road.file {file}: is empty"
-        )
-    header = [field.strip().lower() for field in first.split(",")]
-    listed = header == ["x", "y", "z"]
-    # The text of the corner is ignored: a zero replaces it.
-    _, _, rest = first.partition(",")
-    if ";" in rest:
-        raise InputError(
-            f"road.file {file}, line {number}: fields separated by semicolons: take commas, and points in the "
-            "numbers instead of decimal commas"
-        )
-    axis = None if listed else _first_line(file, (number, f"0,{rest}"), len(header))
-    positions, spool, count = [], Spool(f"road.file {file}"), 0
-    for block in _blocks_of_lines(lines):
-        table = _numbers(file, block, len(header))
-        count += len(table)
-        check_count(file, count)
-        positions.append(table if listed else table[:, 0])
-        if axis is not None and axis.size:
-            spool.add(table[:, 1:])
-    if count < 2:
-        raise InputError(f"road.file {file}: {count + 1} lines of data, at least 3 are needed")
-    if axis is None:
-        x, y, z = _points(file, np.concatenate(positions))
-        return x, y, ArrayRows(z)
-    return np.concatenate(positions), axis, spool.rows()
-
-
-def _first_line(file: Path, line: Line, width: int) -> Array:
-    """The positions across of a matrix. InputError explains the layout if they do not ascend."""
-    try:
-        axis = _numbers(file, [line], width)[0, 1:]
-    except InputError as error:
-        raise InputError(
-            f"{error}; a list of points begins with the line x,y,z, a matrix with a corner that is not read, then the "
-            "y of its columns"
-        ) from error
-    if len(axis) > 1 and not np.all(np.diff(axis) > 0):
-        raise InputError(
-            f"road.file {file}, line {line[0]}: the first line must hold a corner that is not read, "
-            "then the ascending y of the columns; each further line one x, then its heights. Is this "
-            "a plain matrix of heights? Then add the x and the y"
-        )
-    return axis
-
-
-def _numbers(file: Path, numbered: list[Line], width: int) -> Array:
-    """(lines, width) numbers; InputError names the line of the first field that is not a number."""
-    if all(line.count(",") == width - 1 for _, line in numbered):
-        try:
-            table = np.loadtxt(
-                [line for _, line in numbered], delimiter=",", comments=None, ndmin=2, dtype=float
-            )
-        except ValueError:
-            pass  # again, slowly, to find the line and the wording
         else:
-            if table.shape == (len(numbered), width):
-                return table
-    table = np.empty((len(numbered), width))
-    for row, (number, line) in enumerate(numbered):
-        fields = line.split(",")
-        if len(fields) != width:
-            raise InputError(
-                f"road.file {file}, line {number}: {len(fields)} fields, {width} expected"
-            )
-        try:
-            table[row] = [float(field) for field in fields]
-        except ValueError as error:
-            raise InputError(f"road.file {file}, line {number}: {error}") from error
-    return table
+            return False
+        return True
+
+    def column(self, role: str) -> Column:
+        """The unit of x, y or z."""
+        text, where = self.units.get(role, ("", ""))
+        unit = unit_of(text)
+        return Column(unit=unit, unclear="" if unit else text.strip(), said=where)
+
+    def coding(self, role: str) -> Coding:
+        """How the numbers of x, y or z are coded."""
+        one = Coding(**self.codes[role])
+        if role == "z" and self.down:
+            return replace(one, scale=-one.scale, offset=-one.offset)
+        return one
 
 
-def _points(file: Path, table: Array) -> tuple[Array, Array, Array]:
-    """The grid of a list of points, which must hold each combination of x and y exactly once."""
-    if not np.all(np.isfinite(table[:, :2])):
-        raise InputError(f"road.file {file}: x and y must be finite numbers")
-    x, i = np.unique(table[:, 0], return_inverse=True)
-    y, j = np.unique(table[:, 1], return_inverse=True)
-    full = len(x) * len(y) == len(table)
-    count = np.zeros((len(x), len(y)) if full else (0, 0), dtype=int)
-    if full:
-        np.add.at(count, (i, j), 1)
-    if not full or not np.all(count == 1):
-        raise InputError(
-            f"road.file {file}: {len(table)} points do not fill the grid of their {len(x)} x and "
-            f"{len(y)} y once each; list every point, nan where the height is missing"
+def _text_of(value: Any) -> str | None:
+    """The text of an attribute; None where it is none."""
+    one = np.asarray(value)
+    if one.size != 1 or one.dtype.kind not in "USO":
+        return None
+    item = one.ravel()[0]
+    return item.decode("utf-8", "replace") if isinstance(item, bytes) else str(item)
+
+
+def _found(
+    x: Array,
+    y: Array,
+    rows: Rows,
+    meaning: _Meaning,
+    keys: Keys,
+    source: str,
+    notes: tuple[str, ...],
+    mask: Rows | None,
+) -> Found:
+    """The arrays of a file by what stands beside them."""
+    scales = keys.scales([meaning.column(role) for role in "xyz"], Stated(), source)
+    x, y = meaning.coding("x").numbers(x), meaning.coding("y").numbers(y)
+    coding = meaning.coding("z")
+    if coding.scale < 0 or coding.offset or abs(coding.scale) != 1.0:
+        notes = (
+            *notes,
+            f"heights are {coding.scale:g} times the numbers of the file, plus {coding.offset:g}",
         )
-    z = np.empty(count.shape)
-    z[i, j] = table[:, 2]
-    return x, y, z
+    if rows.shape[0] == rows.shape[1]:
+        notes = (*notes, "z is square: its rows are taken along x, its columns along y")
+    return Found(x, y, rows, scales, coding, ("x", "y", "z"), notes, mask)
 
 
-def read_npz(file: Path) -> tuple[Array, Array, Rows]:
+def read_npz(file: Path, keys: Keys) -> Found:
     """The arrays x (nx,), y (ny,) and z (nx, ny) of an archive; z stays in the file if possible.
 
-    InputError for missing arrays, arrays without numbers, and headers that announce other sizes
+    Beside them: units (or x_unit, ...), fill_value, scale_factor, add_offset, and a mask (nx, ny) whose true entries are
+    no heights, as numpy's. InputError for missing arrays, arrays without numbers, and headers that announce other sizes
     than the archive holds.
     """
+    source = f"road.file {file}"
     with zipfile.ZipFile(file) as archive:
-        members = {member.filename for member in archive.infolist()}
-        missing = [name for name in "xyz" if f"{name}.npy" not in members]
-        if missing:
-            names = ", ".join(missing)
-            raise InputError(f"road.file {file}: no array {names}; x, y and z are needed")
+        members = [member.filename.removesuffix(".npy") for member in archive.infolist()]
+        names = {role: _named(members, role) for role in "xyz"}
+        if missing := [role for role, name in names.items() if name is None]:
+            shown = ", ".join(missing)
+            raise InputError(f"{source}: no array {shown}; x, y and z are needed")
+        meaning, mask, unused = _Meaning(), None, []
         try:
-            x, y = (read_numbers(archive, name, MAX_POINTS) for name in "xy")
-            return x, y, _rows(file, archive)
+            x, y = (read_numbers(archive, names[role] or "", MAX_POINTS) for role in "xy")
+            rows = _rows(file, archive, names["z"] or "")
+            for name in members:
+                if name in names.values():
+                    continue
+                if name.lower() in ("mask", "z_mask"):
+                    mask = _mask(archive, name, rows.shape, source)
+                elif not (value := _beside(archive, name)) or not meaning.take(
+                    "", name, value[0], source
+                ):
+                    unused.append(name)
         except (ValueError, TypeError) as error:
-            raise InputError(f"road.file {file}: x, y and z must hold numbers ({error})") from error
+            raise InputError(f"{source}: x, y and z must hold numbers ({error})") from error
+    notes = (f"not used of the file: {', '.join(unused)}",) if unused else ()
+    if rows.shape == (len(y), len(x)) != (len(x), len(y)) and mask is None:
+        check_count(file, len(x) * len(y))
+        rows = ArrayRows(rows.read(0, len(y)).T)
+        notes = (*notes, "z is (y, x) in the file: transposed")
+    return _found(x, y, rows, meaning, keys, source, notes, mask)
 
 
-def _rows(file: Path, archive: zipfile.ZipFile) -> Rows:
-    """z, left in the archive if it is not compressed; all of it is read once, as a check."""
-    info = archive.getinfo("z.npy")
+def _named(names: Iterable[str], role: str) -> str | None:
+    """The name that is a role in any case."""
+    found = [name for name in names if name == role] or [
+        name for name in names if name.lower() == role
+    ]
+    return found[0] if len(found) == 1 else None
+
+
+def _beside(archive: zipfile.ZipFile, name: str) -> tuple[Any] | None:
+    """A small entry of an archive; None for what is large or no array of numbers or text."""
+    try:
+        info = archive.getinfo(f"{name}.npy")
+        if info.file_size > 4096:
+            return None
+        with archive.open(info) as stream:
+            return (np.lib.format.read_array(stream, allow_pickle=False),)
+    except (KeyError, ValueError):
+        return None
+
+
+def _mask(archive: zipfile.ZipFile, name: str, shape: tuple[int, int], source: str) -> Rows:
+    info = archive.getinfo(f"{name}.npy")
+    if info.file_size > 8 * shape[0] * shape[1] + 20_000:
+        raise InputError(f"{source}: {name} is larger than z")
+    with archive.open(info) as stream:
+        found = np.lib.format.read_array(stream, allow_pickle=False)
+    if found.shape == ():  # no height is masked
+        found = np.full(shape, bool(found))
+    if found.shape != shape or found.dtype.kind not in "biu":
+        raise InputError(f"{source}: {name} is {found.dtype} of shape {found.shape}, z has {shape}")
+    return ArrayRows(found)
+
+
+def _rows(file: Path, archive: zipfile.ZipFile, name: str) -> Rows:
+    """z by its name, left in the archive if it is not compressed; all of it is read once, as a check."""
+    info = archive.getinfo(f"{name}.npy")
     with archive.open(info) as stream:
         header = read_header(stream, info, "z")
         if len(header.shape) != 2:
@@ -369,54 +393,114 @@ MAX_CHUNK = 256_000_000  # bytes: HDF5 unpacks a chunk as a whole
 
 
 class Hdf5Rows:
-    """Rows of a dataset that stays in its file."""
+    """Rows of a dataset that stays in its file; `turned`: its columns."""
 
-    def __init__(self, dataset: h5py.Dataset) -> None:
-        self._dataset, self.shape = dataset, dataset.shape
+    def __init__(self, dataset: h5py.Dataset, turned: bool = False) -> None:
+        self._dataset, self._turned = dataset, turned
+        self.shape = dataset.shape[::-1] if turned else dataset.shape
 
-    def __reduce__(self) -> tuple[Callable[[str, str], Hdf5Rows], tuple[str, str]]:
+    def __reduce__(self) -> tuple[Callable[[str, str, bool], Hdf5Rows], tuple[str, str, bool]]:
         """Another process reopens the file."""
-        return _opened, (self._dataset.file.filename, self._dataset.name)
+        return _opened, (self._dataset.file.filename, self._dataset.name, self._turned)
 
     def read(self, i0: int, i1: int) -> Array:
         """Rows i0 to i1."""
+        if self._turned:
+            return np.asarray(self._dataset[:, i0:i1], dtype=float).T
         return np.asarray(self._dataset[i0:i1], dtype=float)
 
 
-def _opened(file: str, name: str) -> Hdf5Rows:
+def _opened(file: str, name: str, turned: bool) -> Hdf5Rows:
     import h5py
 
-    return Hdf5Rows(h5py.File(file, "r")[name])
+    return Hdf5Rows(h5py.File(file, "r")[name], turned)
 
 
-def read_hdf5(file: Path) -> tuple[Array, Array, Rows]:
-    """The datasets x (nx,), y (ny,) and z (nx, ny) in the root of the file.
+def read_hdf5(file: Path, keys: Keys) -> Found:
+    """The datasets x (nx,), y (ny,) and z (nx, ny) in the root of the file, which can be netCDF-4.
 
-    Only data of this file are read: links to other files, external and virtual datasets are refused
-    (InputError).
+    Of their attributes and those of the root are read units, _FillValue, missing_value, valid_min, valid_max, valid_range,
+    scale_factor, add_offset, positive; a dataset mask (nx, ny) is true where there is no height. Where dimensions have
+    names (netCDF), they say which of z is x. Only data of this file are read: links to other files, external and virtual
+    datasets are refused (InputError).
     """
     import h5py  # needed for this format only
 
+    source = f"road.file {file}"
     store = h5py.File(file, "r")
-    datasets = {}
-    for name in "xyz":
+    datasets: dict[str, Any] = {}
+    for role in "xyz":
+        name = _named(store, role) or role
         if isinstance(store.get(name, getlink=True), h5py.ExternalLink):
-            raise InputError(
-                f"road.file {file}: {name} is a link to another file; copy it into this"
-            )
-        datasets[name] = store.get(name)
+            raise InputError(f"{source}: {name} is a link to another file; copy it into this")
+        datasets[role] = store.get(name)
     missing = [name for name, found in datasets.items() if not isinstance(found, h5py.Dataset)]
     if missing:
-        raise InputError(
-            f"road.file {file}: no dataset {', '.join(missing)}; x, y and z are needed"
-        )
-    for name, dataset in datasets.items():
-        _check(file, name, dataset)
+        raise InputError(f"{source}: no dataset {', '.join(missing)}; x, y and z are needed")
+    meaning = _Meaning()
+    for role, dataset in datasets.items():
+        _check(file, role, dataset)
+        for name, value in dataset.attrs.items():
+            meaning.take(role, name, value, source)
+    for name, value in store.attrs.items():
+        meaning.take("", name, value, source)
+    z = datasets["z"]
+    if z.fillvalue not in (0, None) and z.fillvalue == z.fillvalue:
+        meaning.take("z", "_FillValue", z.fillvalue, source)
     try:
         x, y = (np.asarray(datasets[name][()], dtype=float) for name in "xy")
     except (ValueError, TypeError) as error:
-        raise InputError(f"road.file {file}: x, y and z must hold numbers ({error})") from error
-    return x, y, Hdf5Rows(datasets["z"])
+        raise InputError(f"{source}: x, y and z must hold numbers ({error})") from error
+    turned, notes = _turned(z, (len(x), len(y)))
+    other = store.get("mask") if isinstance(store.get("mask"), h5py.Dataset) else None
+    if other is not None and (other.shape != z.shape or other.dtype.kind not in "biu"):
+        raise InputError(f"{source}: mask is {other.dtype} of shape {other.shape}, z has {z.shape}")
+    mask = None if other is None else Hdf5Rows(other, turned)
+    return _found(x, y, Hdf5Rows(z, turned), meaning, keys, source, notes, mask)
+
+
+def _turned(z: h5py.Dataset, shape: tuple[int, int]) -> tuple[bool, tuple[str, ...]]:
+    """Whether z is (y, x), by the names of its dimensions, else by its shape; and a note of it."""
+    names = []
+    for dimension in z.dims:
+        scales = [scale.name for scale in dimension.values() if scale.name]
+        names.append((scales[0].rpartition("/")[2] if scales else dimension.label).lower())
+    by_name = names == ["y", "x"]
+    if by_name or (names != ["x", "y"] and z.shape == shape[::-1] != shape):
+        return True, (f"z is (y, x) by its {'dimensions' if by_name else 'shape'}: transposed",)
+    return False, ()
+
+
+def read_netcdf(file: Path, keys: Keys) -> Found:
+    """The variables x, y and z of a netCDF file: HDF5, or the classic format, which is held in memory."""
+    with file.open("rb") as stream:
+        if stream.read(3) != b"CDF":
+            return read_hdf5(file, keys)
+    from scipy.io import netcdf_file
+
+    source = f"road.file {file}"
+    try:
+        with netcdf_file(file, mmap=False) as store:
+            names = {role: _named(store.variables, role) for role in "xyz"}
+            if missing := [role for role, name in names.items() if name is None]:
+                raise InputError(
+                    f"{source}: no variable {', '.join(missing)}; x, y and z are needed"
+                )
+            meaning, arrays = _Meaning(), {}
+            for role, name in names.items():
+                variable = store.variables[name]
+                check_count(file, int(np.prod(variable.shape)))
+                arrays[role] = np.array(variable.data, dtype=float)
+                for key, value in variable._attributes.items():
+                    meaning.take(role, key, value, source)
+            turned = [name.lower() for name in store.variables[names["z"]].dimensions] == ["y", "x"]
+    except (ValueError, TypeError, IndexError, AssertionError) as error:
+        raise InputError(f"{source}: cannot be read ({error}); is it complete?") from error
+    if arrays["z"].ndim != 2 or arrays["x"].ndim != 1 or arrays["y"].ndim != 1:
+        raise InputError(f"{source}: x, y and z must hold numbers, z in rows and columns")
+    z = arrays["z"].T if turned else arrays["z"]
+    notes = ("z is (y, x) by its dimensions: transposed",) if turned else ()
+    return _found(arrays["x"], arrays["y"], ArrayRows(z), meaning, keys, source, notes, None)
 
 
 def _check(file: Path, name: str, dataset: h5py.Dataset) -> None:
@@ -436,8 +520,13 @@ def _check(file: Path, name: str, dataset: h5py.Dataset) -> None:
         )
 
 
-UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
-READERS = {".npz": read_npz, ".csv": read_csv, ".h5": read_hdf5, ".hdf5": read_hdf5}
+READERS: dict[str, Callable[[Path, Keys], Found]] = {
+    ".npz": read_npz,
+    **dict.fromkeys((".csv", ".txt", ".tsv", ".xyz"), read_csv),
+    **dict.fromkeys((".h5", ".hdf5"), read_hdf5),
+    ".nc": read_netcdf,
+}
+ASSUMED = "m"
 
 
 def read_grid(
@@ -447,55 +536,111 @@ def read_grid(
     *,
     length_unit: str | None = None,
     height_unit: str | None = None,
+    missing: tuple[float, ...] | None = None,
 ) -> Grid:
     """The road of a grid file: x (nx,) in rolling direction, y (ny,) to the left, z (nx, ny).
 
-    .npz: arrays x, y, z. .h5 or .hdf5: datasets x, y, z in the root. .csv: with a first line
-    `x,y,z`, one point per line, every point of the grid once, in any order; otherwise a matrix
-    whose first line holds an ignored corner and then all y, and whose further lines hold one x and
-    its heights. Lines starting with # are skipped; `nan` is a hole. InputError names the file and
-    the place of an error.
+    .npz: arrays x, y, z. .h5, .hdf5, .nc: datasets x, y, z in the root. Text (.csv, .txt, .tsv, .xyz): under headings that
+    name x, y and z, one point per line, every point of the grid once, in any order; otherwise a matrix whose first line
+    holds a corner and then all y, and whose further lines hold one x and its heights. `nan` is a hole. InputError
+    names the file and the place of an error.
 
-    `length_unit` is that of x and y, `height_unit` that of z (one of UNITS). None: metres, and the
+    Units are those that the file states (headings, attributes). `length_unit` is that of x and y, `height_unit` that of z
+    (one of UNITS) where it states none; one that it contradicts is an error. None of both: metres, and the
     sizes of the road must be plausible in metres (InputError), since a file in millimetres looks
     the same. A height unit of None is the length unit where that is given.
 
+    `missing`: numbers of the file that mean "no height", beside those that it states. None: values that look like such are
+    an error (contact.roads.missing); (): there are none.
+
     Heights stay in the file, and the part under the tire is read when needed: for .h5, and for .npz
-    as written by numpy.savez. A .csv matrix or a compressed .npz is first converted to a temporary
+    as written by numpy.savez. A text matrix or a compressed .npz is first converted to a temporary
     file (contact.roads.grid.Spool). Only a list of points is kept in memory, at most 10 million.
     """
     reader = READERS.get(file.suffix.lower())
     if reader is None:
         raise InputError(
-            f"road.file {file}: the ending {file.suffix!r} is not .npz, .csv, .h5 or .hdf5; for "
+            f"road.file {file}: the ending {file.suffix!r} is not {', '.join(READERS)}; for "
             'OpenCRG files take kind = "crg"'
         )
     if not file.is_file():
         raise InputError(f"road.file {file}: no such file")
     source = f"road.file {file}"
+    for key, unit in (("length_unit", length_unit), ("height_unit", height_unit)):
+        if unit is not None and unit not in UNITS:
+            raise InputError(f'road: {key} = "{unit}" is unknown: take one of {", ".join(UNITS)}')
     try:
-        x, y, rows = reader(file)
-        length, height = _factors(length_unit, height_unit)
-        if height != 1.0:
-            rows = Scaled(rows, height)
-        grid = Grid(length * x, length * y, rows, holes=holes, end=end, source=source)
-        check_plausible(
-            grid.extent_of_file,
-            grid.steps,
-            rows,
-            source,
-            lengths=length_unit is None,
-            heights=None if height_unit else length_unit or "m",
-        )
+        found = reader(file, Keys(length_unit, height_unit, missing))
+        grid = _grid(found, holes, end, missing, source)
     except UNREADABLE as error:
         raise InputError(f"{source}: cannot be read ({error}); is it complete?") from error
     return grid
 
 
-def _factors(length_unit: str | None, height_unit: str | None) -> tuple[float, float]:
-    """Metres per unit of x and y, and of z. InputError for an unknown unit."""
-    for key, unit in (("length_unit", length_unit), ("height_unit", height_unit)):
-        if unit is not None and unit not in UNITS:
-            raise InputError(f'road: {key} = "{unit}" is unknown: take one of {", ".join(UNITS)}')
-    length = UNITS[length_unit or "m"]
-    return length, UNITS[height_unit] if height_unit else length
+def _grid(
+    found: Found, holes: str, end: str, missing: tuple[float, ...] | None, source: str
+) -> Grid:
+    """The road of what was found in a file."""
+    along, across, up = found.scales
+    pairs = [(along, across, "x", "length_unit"), (across, along, "y", "length_unit")]
+    pairs += [(up, along, "the heights", "height_unit")]
+    pairs += [(along, up, "x", "length_unit")] if found.text else []
+    for mine, other, name, key in pairs:
+        if mine is None and other is not None and other.stated:
+            raise InputError(
+                f"{source}: a unit stands beside others, {other.text}, and not beside {name}: say road.{key}"
+            )
+    height = up or (along and replace(along, text=f"{along.text}, as x"))
+    lengths = [scale.metres if scale else 1.0 for scale in (along, across)]
+    metre = height.metres if height else 1.0
+    coding = replace(found.coding, unit=metre, missing=_all_missing(found.coding, missing))
+    rows: Rows = found.rows
+    if coding != Coding() or found.mask is not None:
+        rows = Decoded(rows, coding, found.mask)
+    grid = Grid(
+        lengths[0] * found.x, lengths[1] * found.y, rows, holes=holes, end=end, source=source
+    )
+    if missing is None or len(missing):
+        if odd := [one for one in found.odd if one not in coding.missing]:
+            raise refused(odd, 0, "written with other decimals than the heights", source)
+        grid.search = CodeSearch(source, metre)
+        grid.look_for_codes()
+    check_plausible(
+        grid.extent_of_file,
+        grid.steps,
+        rows,
+        source,
+        lengths=along is None,
+        heights=None if up else (height.text.split(" ")[0] if height else ASSUMED),
+    )
+    assumed = f"{ASSUMED}: assumed"
+    grid.readings = tuple(
+        ReadAs(name, place, scale.text if scale else assumed, remark)
+        for name, place, scale, remark in zip(
+            ("x", "y", "height"),
+            found.places,
+            (along, across, height),
+            (
+                "",
+                "",
+                f"no height: {', '.join(f'{one:g}' for one in coding.missing)}"
+                if coding.missing
+                else "",
+            ),
+            strict=True,
+        )
+    )
+    unsaid = [name for name, scale in (("x and y", along), ("heights", height)) if scale is None]
+    grid.notes = (
+        *found.notes,
+        *([f"{' and '.join(unsaid)} in {ASSUMED}: assumed"] if unsaid else []),
+    )
+    return grid
+
+
+def _all_missing(coding: Coding, missing: tuple[float, ...] | None) -> tuple[float, ...]:
+    """What the file and the scene call missing, in the file's numbers."""
+    given = missing or ()
+    if (coding.scale, coding.offset) != (1.0, 0.0):
+        given = (*given, *((one - coding.offset) / coding.scale for one in given))
+    return (*coding.missing, *given)

@@ -3,8 +3,8 @@
 The tire follows the reference line: the height under it at the distance u along and v to the left
 of the line is the grid's z(u, v). The curvature of the line is neglected within the patch: 0.12 m
 ahead of the axle a line of radius R has an offset of 0.12^2/2R, below 0.4 mm for R >= 20 m; lines
-of smaller radius are refused. Slope and banking of the line, and modifiers and options that change
-heights, are refused by name unless they are zero.
+of smaller radius are refused. Factors of heights, length and width among the modifiers are applied. Slope and banking
+of the line, and other modifiers and options that change heights, are refused by name unless they are zero.
 """
 
 import re
@@ -15,7 +15,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.contact.roads.grid import FileRows, Grid, GridColumns, Packed, Rows, Spool, pieces
+from tireroad.contact.roads.grid import (
+    Coding,
+    Decoded,
+    FileRows,
+    Grid,
+    GridColumns,
+    Packed,
+    Rows,
+    Spool,
+    pieces,
+)
+from tireroad.contact.roads.meaning import ReadAs
+from tireroad.contact.roads.missing import CodeSearch
 from tireroad.fem.errors import InputError
 
 # Line number and text, by the block's name in capitals.
@@ -30,7 +42,7 @@ MAX_BYTES = 1_000_000_000_000  # larger: an error, not a road
 def read_header(file: Path) -> tuple[Blocks, int, int]:
     """Named blocks of (line number, text) without comments; byte and line where the data begin.
 
-    InputError if no line of $$$$ ends the header.
+    InputError if no line of $$$$ ends the header, and the file does not refer to another one.
     """
     if file.stat().st_size > MAX_BYTES:
         raise InputError(f"{file}: larger than {MAX_BYTES:,} bytes; cut the road first")
@@ -48,9 +60,8 @@ def read_header(file: Path) -> tuple[Blocks, int, int]:
             blocks.setdefault(name, [])
         elif name and not text.startswith("*"):
             blocks[name].append((number, text.split("!", 1)[0].strip()))
-    for _, text in blocks.get("ROAD_CRG_FILE", []):
-        if text:
-            raise InputError(f"{file}: has no road of its own and refers to {text}: give that file")
+    if "ROAD_CRG_FILE" in blocks:
+        return blocks, 0, 0
     raise InputError(
         f"{file}: no line of $$$$ that separates header and data within {len(head):,} bytes: "
         "this is not an OpenCRG file, or it is truncated"
@@ -250,56 +261,173 @@ HARMLESS_MODIFIERS = (
 )  # fmt: skip
 
 
-def read_opencrg(file: Path | str, holes: str = "refuse", end: str = "refuse") -> Grid:
+def read_opencrg(
+    file: Path | str,
+    holes: str = "refuse",
+    end: str = "refuse",
+    missing: tuple[float, ...] | None = None,
+) -> Grid:
     """The road of an OpenCRG file as a Grid: x = u from its beginning, y = v to the left, z in m.
 
     Formats LRFI, LDFI, KRBI (also if none is named) and KDBI; long sections are numbered or given
-    `at v =`. `holes` and `end` as in Grid. InputError names the file, and the line or byte, of what
+    `at v =`. A file that refers to another one ($ROAD_CRG_FILE) is the road of that with its own modifiers and options.
+    `holes` and `end` as in Grid, `missing` as in `read_grid`. InputError names the file, and the line or byte, of what
     is missing, damaged or not supported.
     """
-    file = Path(file)
-    if not file.is_file():
-        raise InputError(f"road.file {file}: no such file")
+    given = Path(file)
+    if not given.is_file():
+        raise InputError(f"road.file {given}: no such file")
     try:
-        blocks, start, line = read_header(file)
+        file, blocks, start, line, followed = _followed(given)
         unused = _refuse_blocks(file, blocks)
+        scales = _scales(file, blocks)
         parameters = key_values(file, blocks.get("ROAD_CRG", []))
         code, channels = _definition(file, blocks)
         step, rows = _rows(file, parameters, blocks["KD_DEFINITION"])
         payload = Payload(file, code, start, line, len(channels), rows)
         table = read_payload(payload)
     except OSError as error:
-        raise InputError(f"road.file {file}: cannot be read ({error})") from error
+        raise InputError(f"road.file {given}: cannot be read ({error})") from error
     count = table.shape[0]
     if count < 2:
         raise InputError(f"{file}: {count} cross sections, at least 2 are needed")
+    step *= scales["SCALE_LENGTH"]
     _check_line(file, channels, parameters, table, step)
     v, columns = _sections(file, channels, parameters)
     u = step * np.arange(count, dtype=float)
-    road = Grid(u, v, GridColumns(table, columns), holes=holes, end=end, source=f"road.file {file}")
+    source = f"road.file {given}"
+    z: Rows = GridColumns(table, columns)
+    factor = scales["SCALE_Z_GRID"]
+    coding = Coding(unit=factor, missing=missing or ())
+    if coding != Coding():
+        z = Decoded(z, coding)
+    road = Grid(u, scales["SCALE_WIDTH"] * v, z, holes=holes, end=end, source=source)
+    if missing is None or len(missing):
+        road.search = CodeSearch(source, factor or 1.0)
+        road.look_for_codes()
+    road.notes = tuple(followed)
+    changed = [f"{key.lower()} = {value:g}" for key, value in scales.items() if value != 1.0]
+    if changed:
+        road.notes = (*road.notes, f"modifiers: {', '.join(changed)}")
     if unused:
         road.notes = (
+            *road.notes,
             f"not used, as they act beyond the road or where it has holes: {', '.join(unused)}",
         )
+    times = f"m times {factor:g}" if factor != 1.0 else "m"
+    gone = f"no height: {', '.join(f'{one:g}' for one in missing)}" if missing else ""
+    road.readings = (
+        ReadAs("x", "reference line u", "m", f"every {step:g} m"),
+        ReadAs("y", f"{len(v)} long sections", "m"),
+        ReadAs("height", f"data of format {code}", times, gone),
+    )
     return road
+
+
+def referred(file: Path) -> tuple[Path, ...]:
+    """The file, and those that it refers to as far as they are there."""
+    found = [file]
+    while len(found) <= DEEPEST and found[-1].is_file():
+        try:
+            lines = read_header(found[-1])[0].get("ROAD_CRG_FILE", [])
+        except (InputError, OSError):
+            break
+        names = [text for _, text in lines if text]
+        if not names or (target := _target(found[-1], names[0])) in found:
+            break
+        found.append(target)
+    return tuple(found)
+
+
+def _target(file: Path, name: str) -> Path:
+    """The file that a name in another one means."""
+    return file.parent / name.strip("'\"").replace("\\", "/")
+
+
+DEEPEST = 8  # files that refer to a file
+
+
+def _followed(file: Path) -> tuple[Path, Blocks, int, int, list[str]]:
+    """The file that holds the road, its header with the blocks of those that refer to it, where its data begin, and notes.
+
+    InputError for a file that is not there, a circle, and a modifier or option that two of the files set differently.
+    """
+    over: Blocks = {}
+    notes: list[str] = []
+    seen: list[Path] = []
+    while True:
+        if file.resolve() in seen or len(seen) > DEEPEST:
+            raise InputError(
+                f"{file}: refers to itself, through {len(seen)} files ($ROAD_CRG_FILE)"
+            )
+        seen.append(file.resolve())
+        blocks, start, line = read_header(file)
+        over = _merged(file, blocks, over)
+        names = [(number, text) for number, text in blocks.get("ROAD_CRG_FILE", []) if text]
+        if "ROAD_CRG_FILE" not in blocks:
+            return file, {**blocks, **over}, start, line, notes
+        if len(names) != 1 or start:
+            why = (
+                "has a road of its own, too"
+                if start
+                else f"names {len(names)} files, one is needed"
+            )
+            raise InputError(f"{file}: $ROAD_CRG_FILE {why}")
+        number, name = names[0]
+        target = _target(file, name)
+        if not target.is_file():
+            raise InputError(
+                f"{file}, line {number}: refers to {name}, and there is no file {target}"
+            )
+        notes.append(f"{file.name} refers to {target.name}, which was read with its modifiers")
+        file = target
+
+
+def _merged(file: Path, blocks: Blocks, over: Blocks) -> Blocks:
+    """Modifiers and options of a file together with those of the files that refer to it."""
+    merged: Blocks = {}
+    for name in ("ROAD_CRG_MODS", "ROAD_CRG_OPTS"):
+        here, above = (key_values(file, part.get(name, [])) for part in (blocks, over))
+        for key in here.keys() & above.keys():
+            if here[key] != above[key]:
+                raise InputError(
+                    f"{file}: ${name} {key} = {here[key]:g}, and {above[key]:g} in a file that refers to it: keep one"
+                )
+        if name in blocks or name in over:
+            merged[name] = [*blocks.get(name, []), *over.get(name, [])]
+    return merged
+
+
+SCALES = "SCALE_Z_GRID", "SCALE_LENGTH", "SCALE_WIDTH"
+# Without effect, as slope and banking have to be none.
+OF_THE_LINE = "SCALE_SLOPE", "SCALE_BANKING"
+
+
+def _scales(file: Path, blocks: Blocks) -> dict[str, float]:
+    """Factors of heights, length and width among the modifiers. InputError for one that leaves no road."""
+    given = key_values(file, blocks.get("ROAD_CRG_MODS", []))
+    found = {key: given.get(key, 1.0) for key in SCALES}
+    for key in ("SCALE_LENGTH", "SCALE_WIDTH"):
+        if not 0.0 < found[key] < LONGEST_STEP:
+            raise InputError(f"{file}: {key} = {found[key]:g} leaves no road: it must be positive")
+    return found
 
 
 def _refuse_blocks(file: Path, blocks: Blocks) -> list[str]:
     """Options without an effect on the road. InputError for what would change heights, by name."""
     unused = []
     for name in ("ROAD_CRG", "KD_DEFINITION"):
-        if name not in blocks and "ROAD_CRG_FILE" not in blocks:
+        if name not in blocks:
             raise InputError(
                 f"{file}: no block ${name}: this is not an OpenCRG file, or it is damaged"
             )
-    if "ROAD_CRG_FILE" in blocks:
-        raise InputError(f"{file}: refers to another file ($ROAD_CRG_FILE); name that file instead")
     for block, harmless in (
         ("ROAD_CRG_OPTS", HARMLESS_OPTIONS),
         ("ROAD_CRG_MODS", HARMLESS_MODIFIERS),
     ):
         for key, value in key_values(file, blocks.get(block, [])).items():
-            without_effect = value == 0.0 or (value == 1.0 and key.startswith("SCALE_"))
+            scale = key.startswith("SCALE_")
+            without_effect = key in (*SCALES, *OF_THE_LINE) or value == (1.0 if scale else 0.0)
             if not without_effect and key.startswith(BEYOND):
                 unused.append(f"{key} = {value:g}")
             elif not without_effect and not key.startswith(harmless):

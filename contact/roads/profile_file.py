@@ -1,249 +1,329 @@
 """Profiles along a line as profilometers, spreadsheets and other programs write them.
 
-One height a line, x and a height, or columns of which the headings name x and the height. Commas,
-semicolons, tabs or spaces between them; decimal points or commas; lines of headings and units
-before the numbers; UTF-8, UTF-16 or the code page of western Windows; the words of many programs
-for a missing value. What is not one of these is refused with the line of the file.
+One height a line, x and a height, or columns of which the headings name x and the height; in any
+encoding and form that `contact.roads.meaning` reads. What is not one of these is refused with the
+line of the file.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain, islice
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.contact.roads.grid import check_count
+from tireroad.contact.roads.meaning import (
+    Column,
+    Layout,
+    ReadAs,
+    Scale,
+    check_late,
+    layout_of,
+    scale_of,
+)
+from tireroad.contact.roads.missing import codes, refused
+from tireroad.contact.roads.text_table import (
+    MISSING,
+    Decimals,
+    Line,
+    head_of,
+    lines_of,
+    numbers_of,
+    opened,
+)
 from tireroad.fem.errors import InputError
 
 Array = NDArray[np.float64]
 
-# What programs print instead of a number that they do not have; 1.#QNAN is of older Windows.
-MISSING = re.compile(
-    r"[+-]?(?:nan(?:\(\w*\))?|n/?a|null|none|missing|void|inf(?:inity)?|\d*[.,]?#(?:q?nan|snan|ind|inf)\w*|\*+|-+|\?+)?",
-    re.IGNORECASE,
-)
-_X = re.compile(
-    r"^\W*(x\b|x_|dist|pos|abstand|weg|station|chain|str(?:ecke|eck)|length|longitudinal|absci)",
-    re.I,
-)
-_Z = re.compile(
-    r"^\W*(z\b|z_|height|h(?:ö|o|oe|�)he|depth|prof|elev|alt|tief|ordinate|value|wert|y\b)", re.I
-)
-_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?")
 _FEWEST = 3  # heights
-_RUNS, _AT_LEAST = 3, 4  # runs and values of equal heights that make a code for missing ones
-_JUMP = 20.0  # usual differences of neighbours: a code lies that far from what is beside it
-_SAMPLE = 400  # lines by which separator and decimal mark are found
+_BLOCK = 65536  # lines read at a time
+_MOST_COLUMNS = 8
+_SAMPLE = 400  # lines that tell how x is rounded
+HEIGHTS, LENGTHS = "mm", "mm"  # assumed where neither file nor scene says
 
 
 @dataclass(frozen=True)
 class Profile:
-    """Heights (n,) in the file's unit, nan where missing; x (n,) in its own, None if it has none.
+    """Heights (n,) m, nan where missing; x (n,) m, None if the file has none.
 
-    `rounding`: half of the last digit of x; `lines` (n,): their numbers in the file; `notes`: what
-    was found out.
+    `rounding` m: half of the last digit of x; `pitch` m: the distance between heights that the file states; `lines` (n,):
+    their numbers in the file; `notes`: what was found out; `readings`: which column was read as what; `assumed`,
+    `x_assumed`: whether the unit of heights, of x was.
     """
 
     heights: Array
     x: Array | None
     rounding: float
+    pitch: float | None
     lines: NDArray[np.intp]
     notes: tuple[str, ...]
-
-
-def read_profile(path: Path, source: str, missing: Sequence[float] = ()) -> Profile:
-    """The profile in a text file; values equal to one of `missing` are. InputError where it is none."""
-    text = _text(path, source)
-    rows = [(n, line.strip()) for n, line in enumerate(text.splitlines(), 1)]
-    rows = [(n, _bare(line)) for n, line in rows if line and not line.startswith(("#", "%", "//"))]
-    form = _form(rows, source)
-    begin = _begin(rows, form)
-    if begin is None and len(rows) >= _FEWEST and MISSING.fullmatch(form.fields(rows[-1][1])[-1]):
-        raise InputError(f"{source}: none of the {len(rows)} heights is a number")
-    if begin is None or len(rows) - begin < _FEWEST:
-        raise InputError(f"{source}: only {len(rows) - (begin or 0)} heights: too few for a road")
-    check_count(path, len(rows))
-    numbers = [form.numbers(line, n, source) for n, line in rows[begin:]]
-    width = len(numbers[0])
-    for (n, line), row in zip(rows[begin:], numbers, strict=True):
-        if len(row) == width - 1 and form.separator and line.endswith(form.separator):
-            row.append(np.nan)  # nothing behind the separator
-        if len(row) != width:
-            raise InputError(
-                f"{source}, line {n}: {len(row)} values where the lines before have {width}: {line[:60]!r}"
-            )
-    table = np.array(numbers, float)
-    headings = _headings(rows[:begin], form, width)
-    x, z, notes = _columns(table, headings, source)
-    heights = table[:, z].copy()
-    for code in missing:
-        heights[np.isclose(heights, code, rtol=1e-9, atol=1e-12)] = np.nan
-    lines = np.array([n for n, _ in rows[begin:]])
-    codes = _codes(heights)
-    if codes:
-        shown = ", ".join(f"{code:g}" for code in codes)
-        where = int(lines[np.flatnonzero(heights == codes[0])[0]])
-        raise InputError(
-            f"{source}: heights of exactly {shown} come in runs apart from the heights beside them (first in line {where}): "
-            f"if they mean that there is none, say road.missing = [{shown}]; if they are heights, cut them out"
-        )
-    place, rounding = None, 0.0
-    if x is not None:
-        rounding = _rounding([form.fields(line)[x] for _, line in rows[begin : begin + _SAMPLE]])
-        place, heights, lines, more = _ascending(table[:, x], heights, lines)
-        notes += more
-    if form.comma:
-        notes.append("decimal commas")
-    return Profile(heights, place, rounding, lines, tuple(notes))
-
-
-def _text(path: Path, source: str) -> str:
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{source}: {error.strerror}") from error
-    for mark, name in (
-        (b"\xff\xfe", "utf-16"),
-        (b"\xfe\xff", "utf-16"),
-        (b"\xef\xbb\xbf", "utf-8-sig"),
-    ):
-        if data.startswith(mark):
-            try:
-                return data.decode(name)
-            except UnicodeDecodeError as error:
-                raise InputError(f"{source}: is not a text file (byte {error.start})") from error
-    if b"\0" in data[:4096]:
-        raise InputError(f"{source}: is not a text file (byte {data.index(0)})")
-    try:
-        return data.decode("utf-8")
-    except UnicodeDecodeError as error:
-        odd = sum(byte < 9 or 13 < byte < 32 for byte in data[:4096])
-        if odd > 4:
-            raise InputError(f"{source}: is not a text file (byte {error.start})") from error
-        return data.decode("cp1252", errors="replace")
-
-
-def _bare(line: str) -> str:
-    """Without a comment at its end; `#` within a word is part of that."""
-    return re.sub(r"\s+(?:#|//).*$", "", line)
+    readings: tuple[ReadAs, ...]
+    assumed: bool
+    x_assumed: bool
 
 
 @dataclass(frozen=True)
-class _Form:
-    """Separator ("" for white space) and whether the decimal mark is a comma."""
+class Given:
+    """What a scene says of the file: units, values that mean "no height" (None: to be looked for), distance of heights m."""
 
-    separator: str
-    comma: bool
-
-    def fields(self, line: str) -> list[str]:
-        if not self.separator:
-            return line.split()
-        parts = [part.strip().strip('"') for part in line.split(self.separator)]
-        while len(parts) > 1 and not parts[-1]:  # a separator at the end of the line
-            parts.pop()
-        return parts
-
-    def number(self, field: str) -> float | None:
-        """The number; nan for a word that means it is missing, None for another word."""
-        plain = field.replace(",", ".") if self.comma else field
-        if _NUMBER.fullmatch(plain):
-            return float(plain.replace("d", "e").replace("D", "e"))
-        return np.nan if MISSING.fullmatch(field) else None
-
-    def numbers(self, line: str, n: int, source: str) -> list[float]:
-        found = []
-        for field in self.fields(line):
-            value = self.number(field)
-            if value is None:
-                raise InputError(
-                    f"{source}, line {n}: {field[:40]!r} is not a number: {line[:60]!r}"
-                )
-            found.append(value)
-        return found
+    length_unit: str | None = None
+    height_unit: str | None = None
+    missing: Sequence[float] | None = None
+    pitch: float | None = None
 
 
-def _form(rows: list[tuple[int, str]], source: str) -> _Form:
-    """The form by which most of the later lines are rows of numbers."""
-    sample = [line for _, line in rows[len(rows) // 2 : len(rows) // 2 + _SAMPLE]] or [
-        line for _, line in rows
-    ]
-    sample = [
-        line for line in sample if re.search(r"\d", line) and not MISSING.fullmatch(line)
-    ] or sample
-    commas = [line.count(",") for line in sample]
-    for separator in (";", "\t"):
-        if sum(separator in line for line in sample) > len(sample) / 2:
-            return _Form(separator, max(commas) > 0 and not any("." in line for line in sample))
-    if max(commas, default=0) == 0:
-        return _Form("", False)
-    if any(
-        " " in line.strip() and "," in line and "," not in re.sub(r"\d,\d", "", line)
-        for line in sample
-    ) and not any("." in line for line in sample):
-        return _Form("", True)  # numbers with decimal commas between spaces
-    if set(commas) == {1} and not any("." in line for line in sample):
-        tails = [line.split(",")[1].strip() for line in sample]
-        if (
-            all(tail.isdigit() for tail in tails)
-            and len({len(tail) for tail in tails}) == 1
-            and len(tails[0]) > 1
-        ):
-            if any(tail.startswith("0") for tail in tails):
-                return _Form("", True)  # one column: 3,015 and 3,004
+def read_profile(path: Path, source: str, given: Given = Given()) -> Profile:
+    """The profile in a text file. InputError where it is none, and where its meaning is not certain."""
+    with opened(path, source) as stream:
+        lines = lines_of(stream, source)
+        head = head_of(lines)
+        rows = [line for line in head if not line.comment]
+        layout = layout_of(head, source, _FEWEST)
+        if layout is None:
+            last = re.split(r"[;,\t ]", rows[-1].text)[-1] if rows else "-"
+            if len(rows) >= _FEWEST and MISSING.fullmatch(last):
+                count = len(rows) + sum(1 for _ in lines)
+                raise InputError(f"{source}: none of the {count} heights is a number")
+            raise InputError(f"{source}: no {_FEWEST} rows of numbers: too few heights for a road")
+        data = check_late(
+            chain((line for line in head if line.number >= layout.first), lines), source
+        )
+        table, numbers, odd = _table(path, data, layout, source)
+    if len(table) < _FEWEST:
+        raise InputError(f"{source}: only {len(table)} heights: too few for a road")
+    return _profile(table, numbers, odd, layout, rows, given, source)
+
+
+def _table(
+    path: Path, data: Iterator[Line], layout: Layout, source: str
+) -> tuple[Array, NDArray[np.intp], list[list[float]]]:
+    """All rows, their lines, and of each column numbers that are written otherwise than the rest."""
+    blocks: list[Array] = []
+    decimals = [Decimals() for _ in range(layout.width)]
+    numbers: list[int] = []
+    while some := list(islice(data, _BLOCK)):
+        blocks.append(numbers_of(some, layout.form, layout.width, source))
+        for k, one in enumerate(decimals[:_MOST_COLUMNS]):
+            one.count(some, layout.form, blocks[-1], [k])
+        numbers += [line.number for line in some]
+        check_count(path, len(numbers))
+    if not blocks:
+        return np.empty((0, layout.width)), np.empty(0, dtype=int), []
+    return np.concatenate(blocks), np.array(numbers), [one.codes() for one in decimals]
+
+
+def _profile(
+    table: Array,
+    numbers: NDArray[np.intp],
+    odd: list[list[float]],
+    layout: Layout,
+    rows: list[Line],
+    given: Given,
+    source: str,
+) -> Profile:
+    """Columns, units and missing heights of a table."""
+    at, z, notes = _columns(table, layout, given, source)
+    stated = layout.stated
+    height = scale_of("z", layout.columns[z], stated, ("height_unit", given.height_unit), source)
+    length = None
+    if at is not None:
+        length = scale_of(
+            "x", layout.columns[at], stated, ("length_unit", given.length_unit), source
+        )
+        height, length = _together(height, length, source)
+    up = height or Scale(1e-3, f"{HEIGHTS}: assumed", assumed=True)
+    heights = table[:, z].copy()
+    declared = (*(given.missing or ()), *stated.missing)
+    gone = np.zeros(len(heights), dtype=bool)
+    for code in declared:
+        gone |= np.isclose(heights, code, rtol=1e-9, atol=1e-12)
+    heights[gone] = np.nan
+    if given.missing is None or len(given.missing):
+        found = codes(heights[None, :], up.metres)
+        found += [code for code in odd[z] if code not in found and (heights == code).any()]
+        if found:
+            same = np.isin(heights, found)
+            where = f"in line {numbers[np.flatnonzero(same)[0]]}"
+            raise refused(found, int(same.sum()), where, source)
+    named = f"{int(np.isnan(heights).sum())} missing" + (
+        f", of these {int(gone.sum())} as {', '.join(f'{code:g}' for code in declared)}"
+        if declared
+        else ""
+    )
+    readings = [ReadAs("height", _place(layout, z), up.text, named)]
+    x, rounding, unsaid_x = None, 0.0, False
+    if at is not None:
+        along = length or Scale(1e-3, f"{LENGTHS}: assumed", assumed=True)
+        unsaid_x = along.assumed
+        written = [layout.form.fields(line.text) for line in rows if line.number >= layout.first]
+        rounding = _rounding([row[at] for row in written[:_SAMPLE] if at < len(row)])
+        place, heights, numbers, more = _ascending(table[:, at], heights, numbers)
+        notes += more
+        x, rounding = along.metres * place, along.metres * rounding
+        step = (place[-1] - place[0]) / max(len(place) - 1, 1)
+        readings.append(
+            ReadAs("x", _place(layout, at), along.text, f"every {step:.4g} of the file")
+        )
+        if along.assumed or up.assumed:
+            unsaid = [f"x every {1e3 * along.metres * step:.4g} mm"] if along.assumed else []
+            unsaid += [f"heights in {HEIGHTS}"] if up.assumed else []
+            notes.append(f"{', '.join(unsaid)}: assumed")
+    elif up.assumed:
+        notes.append(f"heights in {HEIGHTS}: assumed")
+    pitch = _stated_pitch(layout, given, at, source)
+    if layout.form.comma:
+        notes.append("decimal commas")
+    return Profile(
+        up.metres * heights,
+        x,
+        rounding,
+        pitch,
+        numbers,
+        tuple(notes),
+        tuple(readings),
+        up.assumed,
+        unsaid_x,
+    )
+
+
+def _together(
+    height: Scale | None, length: Scale | None, source: str
+) -> tuple[Scale | None, Scale | None]:
+    """Both scales. InputError where the file states that of one alone: a default beside it would be a guess."""
+    for mine, other, name, key in (
+        (height, length, "the heights", "height_unit"),
+        (length, height, "x", "length_unit"),
+    ):
+        if mine is None and other is not None and other.stated:
             raise InputError(
-                f"{source}: {sample[0][:40]!r} can be one number with a decimal comma or two: separate columns by semicolons"
+                f"{source}: a unit stands beside one column, {other.text}, and not beside {name}: say road.{key}"
             )
-    return _Form(",", False)
+    return height, length
 
 
-def _begin(rows: list[tuple[int, str]], form: _Form) -> int | None:
-    """Index of the first of the rows of numbers that the file ends with, or of its first such row."""
-    for k in range(len(rows)):
-        ahead = rows[k : k + _FEWEST]
-        values = [[form.number(field) for field in form.fields(line)] for _, line in ahead]
-        if (
-            all(None not in row for row in values)
-            and len({len(row) for row in values}) == 1
-            and any(value == value for value in values[0])
-        ):
-            return k
+def _place(layout: Layout, k: int) -> str:
+    title = layout.columns[k].title
+    return f'column {k + 1} "{title}"' if title else f"column {k + 1}"
+
+
+def _stated_pitch(layout: Layout, given: Given, x: int | None, source: str) -> float | None:
+    """The distance of heights (m) that the file states, where it has no x. InputError where the scene says another."""
+    stated = layout.stated
+    if x is not None or given.pitch is not None and stated.pitch is None:
+        return None
+    if stated.pitch is not None:
+        pitch, where = stated.pitch
+        if given.pitch is not None and abs(given.pitch / pitch - 1) > 1e-6:
+            raise InputError(
+                f"{source}: heights are every {1e3 * pitch:.6g} mm by {where}, and road.pitch = {given.pitch:g} m: take the "
+                "key out, or correct the file"
+            )
+        return pitch
+    if stated.unclear_pitch:
+        raise InputError(
+            f"{source}, {stated.unclear_pitch} may state the distance between heights, without a unit that is known: say "
+            "road.pitch (m)"
+        )
     return None
 
 
-def _headings(rows: list[tuple[int, str]], form: _Form, width: int) -> list[str]:
-    """The words over the columns: the last line before the numbers with one for each that names x or z."""
-    for _, line in reversed(rows):
-        fields = form.fields(line)
-        if len(fields) == width and any(_X.match(f) or _Z.match(f) for f in fields):
-            return fields
-    return []
+def _is_count(values: Array) -> bool:
+    """Whether a column counts its lines: 0, 1, 2, … or 1, 2, 3, …"""
+    return bool(
+        len(values) > 1
+        and values[0] in (0.0, 1.0)
+        and np.array_equal(np.diff(values), np.ones(len(values) - 1))
+    )
 
 
-def _columns(table: Array, headings: list[str], source: str) -> tuple[int | None, int, list[str]]:
-    """The columns of x and of the heights."""
-    width = table.shape[1]
+def _columns(
+    table: Array, layout: Layout, given: Given, source: str
+) -> tuple[int | None, int, list[str]]:
+    """The columns of x (None where there is none) and of the heights."""
+    width, columns = layout.width, layout.columns
+    if layout.headed:
+        return _by_headings(table, layout, given, source)
     if width == 1:
         return None, 0, []
+    if width == 3 and _is_count(table[:, 0]):
+        return _ordered(table, columns, (1, 2), ["the first column counts the lines"])
     if width == 2:
-        return 0, 1, []
-    x = [k for k, name in enumerate(headings) if _X.match(name)]
-    z = [k for k, name in enumerate(headings) if _Z.match(name) and k not in x]
-    if len(x) == 1 and len(z) == 1:
-        return x[0], z[0], [f"x is the column {headings[x[0]]!r}, the height {headings[z[0]]!r}"]
-    if (
-        width == 3
-        and not headings
-        and np.array_equal(np.diff(table[:, 0]), np.ones(len(table) - 1))
-    ):
-        return 1, 2, ["the first column counts the lines"]
-    raise InputError(
-        f"{source}: {table.shape[0]} lines of {width} numbers; a measured line has one height a line, or x and a "
-        "height, or headings that name one column each for the distance and the height"
+        return _ordered(table, columns, (0, 1), [])
+    raise _many(table, "", source)
+
+
+def _ordered(
+    table: Array, columns: Sequence[Column], pair: tuple[int, int], notes: list[str]
+) -> tuple[int, int, list[str]]:
+    """x and height of two columns without headings: x is the one that goes on in even steps."""
+    a, b = pair
+    if not _even(table[:, a]) and _even(table[:, b]):
+        return b, a, [*notes, f"x is taken to be column {b + 1}, which goes on in even steps"]
+    return a, b, notes
+
+
+def _even(values: Array) -> bool:
+    steps = np.diff(values)
+    return bool(
+        np.isfinite(steps).all()
+        and steps.size
+        and (steps > 0).all()
+        and np.ptp(steps) < 0.5 * abs(steps.mean())
     )
+
+
+def _many(table: Array, titles: str, source: str) -> InputError:
+    return InputError(
+        f"{source}: {table.shape[0]} lines of {table.shape[1]} numbers{titles}; a measured line has one height a line, or x and "
+        "a height, or headings that name one column each for the distance and the height"
+    )
+
+
+def _by_headings(
+    table: Array, layout: Layout, given: Given, source: str
+) -> tuple[int | None, int, list[str]]:
+    """x and heights by the headings; one of two columns may be named by what is left over."""
+    width, columns = layout.width, layout.columns
+    titles = ", ".join(repr(column.title) for column in columns)
+    x, z, y = layout.of("x"), layout.of("z"), layout.of("y")
+    if not z and len(y) == 1:
+        z, y = y, []  # a plot of y over x
+    counts = [k for k in layout.of("count") if _is_count(table[:, k])]
+    unknown = [k for k in range(width) if columns[k].role == ""]
+    if width == 1:
+        if columns[0].role in ("x", "time", "other"):
+            raise InputError(f"{source}: the only column is {titles}: no heights")
+        return None, 0, []
+    if len(x) == 1 and not z and len(unknown) == 1:
+        z = unknown
+    elif len(z) == 1 and not x and len(unknown) == 1 and not counts and not layout.of("time"):
+        x = unknown
+    if len(x) == 1 and len(z) == 1:
+        return (
+            x[0],
+            z[0],
+            [f"x is the column {columns[x[0]].title!r}, the height {columns[z[0]].title!r}"],
+        )
+    times = layout.of("time")
+    if not x and times:
+        raise InputError(
+            f"{source}: {columns[times[0]].title!r} is a time, and no column holds the distance: a road has heights over x; "
+            "multiply the time by the speed"
+        )
+    if not x and len(z or unknown) == 1 and counts and width == 2:
+        one = (z or unknown)[0]
+        if given.pitch is None and layout.stated.pitch is None:
+            raise InputError(
+                f"{source}: {columns[counts[0]].title!r} counts the heights, and nothing says how far apart they are: say "
+                "road.pitch (m)"
+            )
+        return None, one, [f"{columns[counts[0]].title!r} counts the heights"]
+    raise _many(table, f" under {titles}", source)
 
 
 def _rounding(fields: list[str]) -> float:
@@ -272,31 +352,6 @@ def _ascending(
         x, z, lines = x[keep], z[keep], lines[keep]
         notes.append(f"{int(same.sum())} lines are there twice: taken once")
     return x, z, lines, notes
-
-
-def _codes(heights: Array) -> list[float]:
-    """Values that come in runs far from the heights beside them: no heights."""
-    known = np.isfinite(heights)
-    z = heights[known]
-    if len(z) < 20:
-        return []
-    usual = float(np.median(np.abs(np.diff(z)))) or float(np.std(z)) * 1e-3
-    # Heights of a profile in steps repeat all along: only those that are left by a jump are looked at.
-    jumps = np.flatnonzero(np.abs(np.diff(z)) > _JUMP * usual)
-    found = []
-    for one in np.unique(np.concatenate([z[jumps], z[jumps + 1]])):
-        at = np.concatenate([[False], z == one, [False]])
-        if at.sum() < _AT_LEAST:
-            continue
-        change = np.diff(at.astype(int))
-        begin, end = np.flatnonzero(change == 1), np.flatnonzero(change == -1)
-        long = end - begin > 1
-        beside = np.concatenate([z[begin[begin > 0] - 1], z[end[end < len(z)]]])
-        apart = float(np.median(np.abs(beside - one))) if len(beside) else 0.0
-        alone = abs(one) >= 99 and apart > 1e3 * usual
-        if apart > _JUMP * usual and (long.sum() >= _RUNS or alone):
-            found.append(float(one))
-    return found
 
 
 # m: standard deviation of the relief of roads within a short piece; less than FLAT is an even plate.

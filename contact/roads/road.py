@@ -34,6 +34,11 @@ class RoadKind(Parameters):
         """The file that `make` reads, if any: one process reads it and shares the result."""
         return None
 
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """All files that `make` reads: a result depends on their content."""
+        return () if self.reads is None else (self.reads,)
+
     def make(self) -> Road:
         """The road of these parameters. InputError if files cannot be used."""
         raise NotImplementedError

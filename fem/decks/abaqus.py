@@ -23,6 +23,7 @@ from tireroad.fem.decks.abaqus_generation import (
 )
 from tireroad.fem.decks.deck import (
     LABEL,
+    LABELS,
     SCOPE,
     Card,
     CardBlock,
@@ -561,7 +562,9 @@ class _Reader:
         labels = table[:, 0]
         wrong = (labels != np.floor(labels)) | (labels < 1) | (labels > LABEL)
         if wrong.any():
-            raise card.place.error(f"*NODE: {labels[wrong][0]:g} is not a label of a node")
+            raise card.place.error(
+                f"*NODE: {labels[wrong][0]:.17g} is not a label of a node: {LABELS}"
+            )
         points = table[:, 1:4]
         if system == "C":
             radius, angle = points[:, 0].copy(), np.radians(points[:, 1])

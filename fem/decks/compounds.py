@@ -191,7 +191,7 @@ def rubber(compound: DeckCompound, units: Units) -> Rubber:
     kept = series if instant else replace(series, shear=1.0, bulk=1.0)
     if not law.shear > 0:
         raise place.error(
-            f"material {compound.name}: its modulus of shear at zero strain, {law.shear:.4g}, must be > 0"
+            f"material {compound.name}: its modulus of shear at zero strain, {law.shear:.4g}, must be > 0{_by_fit(law)}"
         )
     values, held = law.si(kept, units.stress)
     if held:
@@ -202,7 +202,7 @@ def rubber(compound: DeckCompound, units: Units) -> Rubber:
     try:
         MATERIALS.make(law.model, **values)
     except InputError as error:
-        raise place.error(f"material {compound.name}: {error}") from None
+        raise place.error(f"material {compound.name}: {error}{_by_fit(law)}") from None
     return Rubber(
         name=compound.name,
         model=law.model,
@@ -213,6 +213,17 @@ def rubber(compound: DeckCompound, units: Units) -> Rubber:
         spectrum=series.spectrum,
         notes=tuple(notes),
         fit=law.fit,
+    )
+
+
+def _by_fit(law: _Law) -> str:
+    """What is added to an error of constants that the deck does not state."""
+    if law.fit is None:
+        return ""
+    tests = " and ".join(f"*{curve.test}" for curve in law.fit.curves)
+    return (
+        f". The deck states no constants: those of {law.fit.model} were fitted to its {tests}, {100 * law.fit.error:.3g} % off. "
+        "Are stress and strain in this order, nominal, with tension positive? Otherwise take another law, or give constants"
     )
 
 

@@ -128,7 +128,8 @@ def _pieces(file: BinaryIO, path: Path, reading: _Reading) -> Iterator[tuple[int
         end = _whole_lines(text) if new else len(text)
         if not end and len(text) > PIECE:
             raise Place(path.name, number).error(f"a line longer than {PIECE >> 20} MB: no deck")
-        piece = text[:end].replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+        # The last byte of a file of DOS is Ctrl-Z.
+        piece = text[:end].replace(b"\r\n", b"\n").replace(b"\r", b"\n").replace(b"\x1a", b"")
         if piece:
             yield number, _COMMENT.sub(b"", piece.removeprefix(b"\xef\xbb\xbf"))
         number += piece.count(b"\n")
@@ -188,7 +189,18 @@ def _beside(name: str, place: Place, reading: _Reading) -> Path:
     """The path of an included file. Raises InputError unless it is in the deck's folder."""
     if not name or "\0" in name or len(name) > 1000:
         raise place.error("INPUT= names no file")
-    path = (reading.folder / name.replace("\\", "/")).resolve()
+    plain = name.replace("\\", "/")
+    if re.match(r"[A-Za-z]:|//", plain):  # of another machine: the file beside the deck
+        own = reading.folder / plain.rpartition("/")[2]
+        if not own.is_file():
+            raise place.error(
+                f"{name} is a path of Windows, and there is no {own.name} beside the deck: put it there"
+            )
+        return own.resolve()
+    path = (reading.folder / plain).resolve()
+    if not path.is_file() and path.parent.is_dir():  # Windows does not tell capitals apart
+        alike = [one for one in path.parent.iterdir() if one.name.lower() == path.name.lower()]
+        path = alike[0] if len(alike) == 1 else path
     if not path.is_relative_to(reading.folder):
         raise place.error(f"{name} lies outside the deck's folder; only files in it are included")
     if not path.is_file():
@@ -200,6 +212,7 @@ def _beside(name: str, place: Place, reading: _Reading) -> Path:
 _CLEAN = bytes.maketrans(b",\tDd", b"  ee")
 _EMPTY_FIELD = re.compile(rb",[ \t]*(?=,)|,[ \t]*$", re.MULTILINE)
 LABEL = 10**9  # the largest label of a node or element
+LABELS = "whole numbers up to 1,000,000,000 are read, as Abaqus allows: renumber the mesh"
 
 
 def rows(data: list[Data], width: int, least: int = 1) -> np.ndarray:
@@ -370,7 +383,7 @@ def label(text: str, place: Place) -> int:
     """Label of a node or element, an integer from 0 to 10^9. Raises InputError otherwise."""
     value = number(text, place)
     if value != int(value) or not 0 <= value <= LABEL:
-        raise place.error(f"{shown(text)} is not a label of a node or element")
+        raise place.error(f"{shown(text)} is not a label of a node or element: {LABELS}")
     return int(value)
 
 

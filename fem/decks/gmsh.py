@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 import shlex
 import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -184,7 +185,7 @@ class BinaryNumbers(_Numbers):
 
 
 Numbers = TextNumbers | BinaryNumbers
-Elements = list[tuple[int, int, int, np.ndarray]]  # type, physical group, label, nodes
+Elements = list[tuple[int, tuple[int, ...], int, np.ndarray]]  # type, physical groups, label, nodes
 
 
 def read(path: Path) -> Deck:
@@ -207,6 +208,8 @@ def read(path: Path) -> Deck:
     names = _names(found.get("PhysicalNames"))
     if version == "4.1":
         groups = _entities(numbers(found["Entities"]))
+        if "PartitionedEntities" in found:
+            groups |= _partitioned(numbers(found["PartitionedEntities"]))
         labels, points = _nodes_4(numbers(found["Nodes"]))
         elements = _elements_4(numbers(found["Elements"]), groups)
     else:
@@ -244,20 +247,40 @@ def _names(part: Part | None) -> dict[tuple[int, int], str]:
     return names
 
 
-def _entities(numbers: Numbers) -> dict[tuple[int, int], int]:
-    """(dimension, entity) -> physical group, the first if there are several."""
-    groups = {}
-    counts = numbers.sizes(4)
-    for dimension, count in enumerate(counts):
-        for _ in range(numbers.fits(count, 4)):
-            (tag,) = numbers.ints(1)
-            numbers.reals(3 if dimension == 0 else 6)
-            physical = numbers.ints(numbers.fits(numbers.sizes(1)[0], 4))
-            if dimension:
-                numbers.ints(numbers.fits(numbers.sizes(1)[0], 4))
-            if len(physical):
-                groups[dimension, int(tag)] = abs(int(physical[0]))
-    return groups
+Groups = dict[tuple[int, int], tuple[int, ...]]  # (dimension, entity) -> its physical groups
+
+
+def _entities(numbers: Numbers) -> Groups:
+    """The physical groups of all entities."""
+    return dict(_entity(numbers, dimension) for dimension in _each(numbers))
+
+
+def _partitioned(numbers: Numbers) -> Groups:
+    """The physical groups of the parts that a partitioned mesh (gmsh -part) has its entities in."""
+    numbers.sizes(1)
+    numbers.ints(2 * numbers.fits(numbers.sizes(1)[0], 4))  # ghosts: entity, partition
+    return dict(_entity(numbers, dimension, parts=True) for dimension in _each(numbers))
+
+
+def _each(numbers: Numbers) -> Iterator[int]:
+    """The dimension of each entity that follows."""
+    for dimension, count in enumerate(numbers.sizes(4)):
+        yield from [dimension] * numbers.fits(count, 4)
+
+
+def _entity(
+    numbers: Numbers, dimension: int, parts: bool = False
+) -> tuple[tuple[int, int], tuple[int, ...]]:
+    """An entity with its groups; `parts`: behind its parent, and the partitions that it is in."""
+    (tag,) = numbers.ints(1)
+    if parts:
+        numbers.ints(2)
+        numbers.ints(numbers.fits(numbers.sizes(1)[0], 4))
+    numbers.reals(3 if dimension == 0 else 6)
+    physical = numbers.ints(numbers.fits(numbers.sizes(1)[0], 4))
+    if dimension:
+        numbers.ints(numbers.fits(numbers.sizes(1)[0], 4))
+    return (dimension, int(tag)), tuple(dict.fromkeys(np.abs(physical).tolist()))
 
 
 def _nodes_4(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
@@ -275,7 +298,7 @@ def _nodes_4(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(labels), np.concatenate(points)
 
 
-def _elements_4(numbers: Numbers, groups: dict[tuple[int, int], int]) -> Elements:
+def _elements_4(numbers: Numbers, groups: Groups) -> Elements:
     blocks, total, *_ = numbers.sizes(4)
     numbers.fits(total, 8)
     found: Elements = []
@@ -284,7 +307,7 @@ def _elements_4(numbers: Numbers, groups: dict[tuple[int, int], int]) -> Element
         count = numbers.fits(numbers.sizes(1)[0], 8)
         width = 1 + _nodes_of(sort, numbers)
         table = numbers.sizes(count * width).reshape(count, width)
-        group = groups.get((dimension, tag), 0)
+        group = groups.get((dimension, tag), ())
         found += [(sort, group, int(row[0]), row[1:]) for row in table]
     return found
 
@@ -332,10 +355,24 @@ def _elements_2(numbers: Numbers, binary: bool) -> Elements:
             table = np.insert(table, 0, label, axis=1)
         group = table[:, 1] if tags else np.zeros(many, np.int64)
         found += [
-            (sort, int(g), int(row[0]), row[1 + tags :])
+            (sort, (int(g),) if g else (), int(row[0]), row[1 + tags :])
             for g, row in zip(group, table, strict=True)
         ]
-    return found
+    return _once(found)
+
+
+def _once(found: Elements) -> Elements:
+    """Elements that format 2.2 writes once for each of their groups, as one."""
+    first: dict[tuple[int, bytes], int] = {}
+    single: Elements = []
+    for sort, groups, label, nodes in found:
+        at = first.setdefault((sort, nodes.tobytes()), len(single))
+        if at == len(single):
+            single.append((sort, groups, label, nodes))
+        else:
+            known = single[at]
+            single[at] = (sort, tuple(dict.fromkeys((*known[1], *groups))), *known[2:])
+    return single
 
 
 def _deck(
@@ -353,8 +390,10 @@ def _deck(
     dimension = max(TYPES[sort][0] for sort, *_ in elements)
     order = np.argsort(labels, kind="stable")
     labels, points = labels[order], points[order]
-    if labels[0] < 1 or labels[-1] > LABEL or (np.diff(labels) < 1).any():
-        raise InputError(f"{path.name}: node labels must be different and from 1 to {LABEL}")
+    if labels[0] < 1 or (np.diff(labels) < 1).any():
+        raise InputError(f"{path.name}: node labels must be different and above 0")
+    if labels[-1] > LABEL or max(label for _, _, label, _ in elements) > LABEL:
+        labels, elements = _renumbered(labels, elements, part)
     if not np.isfinite(points).all():
         raise InputError(f"{path.name}: a coordinate is not a number")
     if dimension == 2 and np.abs(points[:, 2]).max() > 1e-9 * max(np.ptp(points), 1e-300):
@@ -380,6 +419,20 @@ def _deck(
     return _counter_clockwise(deck) if dimension == 2 else deck
 
 
+def _renumbered(labels: np.ndarray, elements: Elements, part: Part) -> tuple[np.ndarray, Elements]:
+    """Nodes and elements numbered from 1, where labels are larger than this program's."""
+    nodes = np.concatenate([one[3] for one in elements])
+    at = np.minimum(np.searchsorted(labels, nodes), len(labels) - 1)
+    if (labels[at] != nodes).any():
+        raise part.place.error(f"node {nodes[labels[at] != nodes][0]} of an element is not there")
+    split = np.split(at + 1, np.cumsum([len(one[3]) for one in elements])[:-1])
+    renumbered = [
+        (sort, groups, k, own)
+        for k, ((sort, groups, *_), own) in enumerate(zip(elements, split, strict=True), 1)
+    ]
+    return np.arange(1, len(labels) + 1), renumbered
+
+
 def _groups(
     elements: Elements, dimension: int, names: dict[tuple[int, int], str], part: Part
 ) -> tuple[list[CardBlock], dict[str, Members], dict[str, np.ndarray]]:
@@ -400,10 +453,9 @@ def _groups(
         labels = np.array([e[2] for e in those], np.int64)
         nodes = np.array([e[3] for e in those], np.int64)[:, list(take)]
         blocks.append(CardBlock(name, used_kind(name), labels, nodes, part.place))
-        group = np.array([e[1] for e in those])
-        for number in np.unique(group):
-            title = names.get((own, int(number)), f"{'group' if number else 'no group'} {number}")
-            mine = labels[group == number]
+        for number in sorted({one for e in those for one in e[1] or (0,)}):
+            title = names.get((own, number), f"{'group' if number else 'no group'} {number}")
+            mine = np.array([e[2] for e in those if number in (e[1] or (0,))], np.int64)
             if own == dimension:
                 sets.setdefault(title.upper(), Members()).labels.append(mine)
             elif number:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -111,14 +112,28 @@ class Regions:
     notes: tuple[str, ...] = ()
 
 
+_PLANE = re.compile(r"ELEMENT, TYPE=(CP[SE]\d+\w*)")
+
+
+def no_solids(deck: Deck) -> InputError:
+    """The error for a deck without solid elements that are read, with the types that it has."""
+    plane = next((match[1] for text in deck.unused if (match := _PLANE.search(text))), None)
+    if plane:
+        axisymmetric = re.sub(r"CP[SE](\d)R?\w*", r"CGAX\1", plane)
+        why = (
+            f"it has plane elements, {plane} (Gmsh writes a section so): save it as .msh, or rename them {axisymmetric}, with x "
+            "from the axle and y along it"
+        )
+    else:
+        why = "CGAX, CAX (sections) and C3D types are read, and quadrilaterals, triangles, hexahedra and wedges of Gmsh"
+    return InputError(f"{deck.file}: no solid element in it: {why}")
+
+
 def regions(deck: Deck) -> Regions:
     """The solid sections of a deck or, if it has none, its element sets."""
     blocks = [b for b in deck.blocks if b.kind.role == "solid" and len(b.labels)]
     if not blocks:
-        raise InputError(
-            f"{deck.file}: no solid element in it: CGAX, CAX (sections) and C3D types are read, and "
-            "quadrilaterals, triangles, hexahedra and wedges of Gmsh"
-        )
+        raise no_solids(deck)
     labels = np.sort(np.concatenate([block.labels for block in blocks]))
     if not deck.solids:
         return _by_set(deck, blocks, labels)
@@ -154,19 +169,27 @@ def _by_set(deck: Deck, blocks: list[CardBlock], labels: np.ndarray) -> Regions:
     }
     names: list[str] = []
     of: dict[int, int] = {}
+    notes = [
+        "no solid sections: the regions are the element sets, their materials those of the scene"
+    ]
     for name, mine in sorted(sets.items(), key=lambda item: len(item[1])):
         new = [label for label in mine.tolist() if label not in of]
         if new:
             of.update(dict.fromkeys(new, len(names)))
             names.append(name)
+        if len(new) < len(mine):
+            others = ", ".join(sorted({names[of[label]] for label in mine.tolist()} - {name}))
+            rest = f"{len(new)} elements are its region" if new else "it is no region"
+            notes.append(
+                f"{name}: {len(mine) - len(new)} of its {len(mine)} elements are in {others}, too: {rest}"
+            )
     left = [label for label in labels.tolist() if label not in of]
     if left:
         of.update(dict.fromkeys(left, len(names)))
         names.append("WALL")
-    note = "no solid sections: the regions are the element sets, their materials those of the scene"
     place = blocks[0].place
     count = len(names)
-    return Regions(tuple(names), (None,) * count, (place,) * count, of, (note,))
+    return Regions(tuple(names), (None,) * count, (place,) * count, of, tuple(notes))
 
 
 ELEMENTS = 26  # bead to bead, as in the built-in radial tire

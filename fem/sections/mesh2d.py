@@ -9,6 +9,7 @@ more.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -603,6 +604,17 @@ class Ring:
     thickness: float
     height: float
     coarser: Callable[[], Ring | None] = lambda: None
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """Hash of the mesh: nodes, cells, regions, faces, lines of cords and angles around."""
+        mesh, found = self.section, hashlib.sha256()
+        faces = (mesh.outer, mesh.tread, mesh.inner, mesh.rim)
+        lines = [line for _, line in sorted(mesh.plies.items())]
+        for array in (mesh.nodes, mesh.cells, mesh.region, *faces, *lines, self.ring_corners):
+            found.update(np.ascontiguousarray(array).tobytes())
+        found.update(repr((mesh.order, mesh.regions, sorted(mesh.plies))).encode())
+        return found.hexdigest()
 
     @property
     def segments(self) -> int:

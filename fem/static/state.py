@@ -26,7 +26,7 @@ from tireroad.fem.static.footprint import Evenness, Footprint, evenness, footpri
 from tireroad.fem.static.road import FLAT, RoadShape
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.cords import TAUT
+from tireroad.fem.tire.cords import TAUT, Cords
 from tireroad.fem.tire.material import Material
 from tireroad.fem.tire.mesh import NodeGrid, position
 from tireroad.fem.tire.plies import RULE, Sheet, edge_rule, face_points
@@ -135,8 +135,8 @@ class StaticState:
     deformed x with respect to the ring angle.
 
     `road_height` (m) is None without a road; `inflation` (Pa) and the steady `rolling` are the
-    loads of this state. `cords` by name of the ply; `mass` (kg) of wall and cords; `materials` of
-    the tire by region, empty for a state from a file; `fine_extent`: contact extent on finer
+    loads of this state. `cords` by name of the ply; `mass` (kg) of wall and cords; `ring`, `materials` by region and
+    `plies`: fingerprint of the mesh, rubbers and cords of the tire, empty for a state from a file; `fine_extent`: contact extent on finer
     elements if known (fem.static.load_error).
 
     With friction: `pull` (s, 2) N, force of the road on the tire along and across it, and for a
@@ -158,6 +158,8 @@ class StaticState:
     cords: Mapping[str, CordForce] = field(default_factory=dict)
     mass: float = 0.0
     materials: Mapping[str, Material] = field(default_factory=dict)
+    ring: str = ""
+    plies: tuple[Cords, ...] = ()
     road: RoadShape = FLAT
     fine_extent: Footprint | None = None
     pull: np.ndarray | None = None
@@ -298,6 +300,8 @@ def static_state(equilibrium: Equilibrium, touch_height: float) -> StaticState:
         cords=cord_forces(body),
         mass=body.comm.allreduce(float(body.nodal_mass()[::3].sum())),
         materials=body.materials,
+        ring=body.ring.fingerprint,
+        plies=tuple(body.plies.cords),
     )
 
 

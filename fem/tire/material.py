@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from tireroad.fem.errors import InputError
-from tireroad.fem.parameters import Parameters, Registry
+from tireroad.fem.parameters import Parameters, Registry, plain
 
 if TYPE_CHECKING:
     from ufl.core.expr import Expr
@@ -174,9 +174,9 @@ def compound(
         raise InputError(f"material {model}: unknown parameter {wrong[0]}; valid: {known}")
     return Material(
         law=law(**parameters),
-        density=density,
-        dynamic=dynamic,
-        loss_factor=loss_factor,
+        density=plain(density),
+        dynamic=plain(dynamic),
+        loss_factor=plain(loss_factor),
         spectrum=spectrum,
     )
 

@@ -1,6 +1,7 @@
 """The result folder: its owner, its summary, and which of its files belong to the scene."""
 
 import fcntl
+import itertools
 import json
 import math
 import os
@@ -24,7 +25,7 @@ from tireroad.runs.files.disk import (
 )
 from tireroad.runs.files.store import opened, plain
 from tireroad.runs.scene.plan import STAGES
-from tireroad.runs.scene.resolved import MARK
+from tireroad.runs.scene.resolved import MARK, scene_name
 from tireroad.runs.version import PROGRAM, RESULT_FORMAT, VERSION
 
 OTHER = "choose another folder with --out, or remove this one; nothing was written"
@@ -112,6 +113,30 @@ def make_folder(directory: Path) -> None:
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise _unusable(directory, error) from None
+
+
+MADE_OF = "made_of.txt"
+
+
+def folder_of(file: Path, of: Path = Path("results")) -> Path:
+    """The folder for what is made from a file that is no scene: results/NAME, results/NAME-2, …
+
+    The first that is new or was made from this very file: files of one name in different folders, or of different kinds,
+    and the results of a run, do not overwrite each other. Creates nothing where that is not permitted.
+    """
+    text, name = f"{file.resolve()}\n", scene_name(file.stem)
+    for number in itertools.count(1):
+        folder = of / (name if number == 1 else f"{name}-{number}")
+        mark = folder / MADE_OF
+        try:
+            if folder.exists() and (not mark.is_file() or mark.read_text(encoding="utf-8") != text):
+                continue
+            folder.mkdir(parents=True, exist_ok=True)
+            mark.write_text(text, encoding="utf-8")
+        except OSError:
+            pass
+        return folder
+    raise AssertionError("numbers do not end")
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""What must be settled before shared libraries are loaded: BLAS kernels, the MPI and compiler of wheels."""
+"""What must be settled before shared libraries are loaded: BLAS kernels, MPI in a Slurm step, MPI and compiler of wheels."""
 
 import _ctypes
 import ctypes
@@ -9,6 +9,7 @@ import sys
 from importlib import metadata
 from pathlib import Path
 
+from tireroad.runs.process import signals
 from tireroad.runs.process.installation import compiler, found
 
 UNKNOWN = b"Prescott"  # OpenBLAS's fallback on x86-64: SSE3, two numbers at a time
@@ -19,9 +20,12 @@ _FLAGS = (  # CPU flags required by each kernel, the widest first
 
 
 def prepare() -> None:
-    """Settle all of it. Changes OPENBLAS_CORETYPE and CC where they are needed and not set, and loads
+    """Settle all of it. Changes OPENBLAS_CORETYPE and CC where they are needed and not set, forgets SLURM_NODELIST where
+    Slurm has started one process without MPI, and loads
     the MPI library of the mpich wheel where dolfinx is a wheel. Not collective, does not start MPI."""
     choose_kernels()
+    if signals.without_mpi(os.environ) == 1:
+        del os.environ["SLURM_NODELIST"]
     if found("dolfinx_solver"):
         _load_mpi_of_wheel()
     if compiler() is None and found("ziglang"):

@@ -5,6 +5,7 @@ import signal
 import sys
 import threading
 import time
+from collections.abc import Mapping
 from contextlib import suppress
 from importlib.machinery import ExtensionFileLoader
 from types import FrameType
@@ -19,6 +20,22 @@ def rank_before_mpi() -> int:
         if os.environ.get(name, "").isdigit():
             return int(os.environ[name])
     return 0
+
+
+# Variables of what starts a process with MPI: Open MPI's mpirun, and PMI or PMIx of any launcher.
+_OF_MPI = "OMPI_COMM_WORLD_SIZE", "PMIX_NAMESPACE", "PMIX_RANK", "PMI_RANK", "PMI_FD", "PMI_PORT"
+
+
+def without_mpi(variables: Mapping[str, str]) -> int:
+    """Number of tasks that Slurm has started this process among, if none of them is told of MPI; 0 elsewhere.
+
+    A shell of salloc or of `srun --pty`, a batch script and a Jupyter kernel in a job are one such task. Open MPI takes
+    SLURM_NODELIST for a start by srun with MPI, and gives up where it was built without PMI.
+    """
+    if "SLURM_NODELIST" not in variables or any(name in variables for name in _OF_MPI):
+        return 0
+    tasks = variables.get("SLURM_STEP_NUM_TASKS", "1")
+    return int(tasks) if tasks.isdigit() else 1
 
 
 def processes_here() -> int:

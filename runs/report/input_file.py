@@ -13,16 +13,19 @@ from numpy.typing import NDArray
 
 from tireroad.contact.roads.kinds.iso8608 import CLASSES
 from tireroad.contact.roads.kinds.iso8608 import REFERENCE as PER_METRE
+from tireroad.contact.roads.meaning import layout_of
 from tireroad.contact.roads.road import ROADS
+from tireroad.contact.roads.text_table import head_of, lines_of, opened
 from tireroad.contact.roads.under_tire import REFERENCE, Texture, texture_of
 from tireroad.fem.decks.compounds import SYSTEMS, Rubber
 from tireroad.fem.decks.deck import Deck
 from tireroad.fem.decks.history import DeckHistory, history
-from tireroad.fem.decks.own import MESHES, Wishes, section_of
+from tireroad.fem.decks.own import MESHES, Wishes, no_solids, section_of
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections.construction import INFLATION, RADII
 from tireroad.runs.report.figures import COLOURS, WIDE, canvas, styled
 from tireroad.runs.report.section_figure import NAME, save_section
+from tireroad.runs.scene.resolved import literal, scene_name
 from tireroad.runs.scene.sections.file import FileSection, own_section
 from tireroad.runs.scene.tables.tire import TireTable
 
@@ -58,7 +61,11 @@ def describe_tire(path: Path, out: Path) -> str:
     out.mkdir(parents=True, exist_ok=True)
 
     def write() -> str:
-        tables = *_table(path, wishes, guessed), "", *_run(steps, wishes.length_unit)
+        tables = (
+            *_table(path, scene_name(out.name), wishes, guessed),
+            "",
+            *_run(steps, wishes.length_unit),
+        )
         text = "\n".join(tables) + "\n"
         (out / "scene.toml").write_text(text)
         return text
@@ -95,7 +102,7 @@ def _guess(deck: Deck) -> tuple[Wishes, dict[str, str]]:
     guessed: dict[str, str] = {}
     solids = [block for block in deck.blocks if block.kind.role == "solid"]
     if not solids:
-        raise InputError(f"{deck.file}: no solid elements in it that are read: no tire")
+        raise no_solids(deck)
     points = deck.points[
         np.unique(np.concatenate([deck.rows(b.nodes, b.place).ravel() for b in solids]))
     ]
@@ -162,7 +169,7 @@ def _readable(deck: Deck, wishes: Wishes) -> Wishes:
     return wishes
 
 
-def _table(path: Path, wishes: Wishes, guessed: dict[str, str]) -> list[str]:
+def _table(path: Path, name: str, wishes: Wishes, guessed: dict[str, str]) -> list[str]:
     """The [tire] of a scene, with why each key has its value."""
 
     def line(key: str, value: str) -> str:
@@ -170,18 +177,20 @@ def _table(path: Path, wishes: Wishes, guessed: dict[str, str]) -> list[str]:
         return f"{key} = {value}".ljust(40) + (f" # {reason}" if reason else "")
 
     rows = [
-        f'name = "{re.sub(r"[^A-Za-z0-9_-]", "-", path.stem) or "tire"}"',
+        f'name = "{name}"',
         "",
         "[tire]",
         'section = "file"',
-        f'file = "{path.resolve()}"',
+        f"file = {literal(str(path.resolve()))}",
         line("length_unit", f'"{wishes.length_unit}"'),
-        line("rim", "[" + ", ".join(f'"{name}"' for name in wishes.rim) + "]"),
+        line("rim", literal(wishes.rim)),
     ]
     for key in ("inner", "tread"):
-        name = getattr(wishes, key)
+        found = getattr(wishes, key)
         rows.append(
-            line(key, f'"{name}"') if name else f"# {key}: absent, found from the section's shape"
+            line(key, literal(found))
+            if found
+            else f"# {key}: absent, found from the section's shape"
         )
     if wishes.mirror:
         rows.append(line("mirror", "true"))
@@ -254,7 +263,9 @@ KINDS = {
     ".h5": ("grid",),
     ".hdf5": ("grid",),
     ".csv": ("grid", "laser"),
-    **dict.fromkeys((".txt", ".dat", ".asc", ".prn", ".tsv", ".xyz"), ("laser",)),
+    ".nc": ("grid",),
+    **dict.fromkeys((".txt", ".tsv", ".xyz"), ("grid", "laser")),
+    **dict.fromkeys((".dat", ".asc", ".prn"), ("laser",)),
 }
 """Kinds of road by ending, in the order in which they are tried."""
 _LONG = 0.35  # m: shortest wave of the fit of ISO 8608, 2.83 cycles a metre
@@ -297,7 +308,7 @@ def describe_road(path: Path, out: Path) -> str:
         lines.append(f"  drawn: {out / 'road.png'}")
     except OSError as error:
         lines.append(f"  not drawn: {out / 'road.png'}: {error.strerror}")
-    table = ["[road]", f'kind = "{kind}"', f'file = "{path.name}"', *more]
+    table = ["[road]", f'kind = "{kind}"', f"file = {literal(str(path.resolve()))}", *more]
     return "\n".join([*lines, "", *table])
 
 
@@ -308,10 +319,9 @@ def _read(path: Path) -> tuple[str, Any, list[str]]:
     if len(kinds) > 1 and _is_line(path):
         kinds = ("laser",)
     for kind in kinds:
-        units = ("mm", "m") if kind == "laser" else (None,)
-        for unit in units:
+        for unit in (None, "m") if kind == "laser" else (None,):
             try:
-                more = {"across": "ruts", "length_unit": unit} if unit else {}
+                more = {"across": "ruts", "length_unit": unit} if kind == "laser" else {}
                 road = ROADS.make(kind, file=str(path), **more).make()
             except InputError as error:
                 if unit != "m":
@@ -331,14 +341,16 @@ def _read(path: Path) -> tuple[str, Any, list[str]]:
 
 
 def _is_line(path: Path) -> bool:
-    """Whether a text file has one or two numbers a line, which is no grid."""
-    with path.open("rb") as file:
-        first = [
-            line
-            for line in file.read(4000).splitlines()[:-1]
-            if line.strip() and not line.startswith(b"#")
-        ]
-    return all(max(line.count(mark) for mark in (b",", b";", b"\t")) < 2 for line in first)
+    """Whether a text file is a profile along a line and no grid: one or two columns, or x and z without y."""
+    source = str(path)
+    with opened(path, source) as stream:
+        try:
+            layout = layout_of(head_of(lines_of(stream, source)), source)
+        except InputError:
+            return False  # told by the reader
+    if layout is None:
+        return False
+    return layout.width < 3 or bool(layout.of("z") and not layout.of("y"))
 
 
 def _middle(road: Any) -> tuple[NDArray, NDArray]:

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from tireroad.runs.process.surroundings import crowded
+from tireroad.runs.scene import files
 from tireroad.runs.scene.estimate import check_demand, duration, estimate, memory_of, out_of_core
 from tireroad.runs.scene.plan import STAGES, meets_road, skipped
 from tireroad.runs.scene.resolved import literal
@@ -68,6 +69,8 @@ def explain(scene: Scene, processes: int = 1, until: str | None = None) -> str:
         )
     described = [*scene.tire.shape.described(scene.tire), *(remarks(scene) if on_road else [])]
     lines += ["", *described] if described else []
+    read = files.table(scene, until)
+    lines += ["", *read] if read else []
     if scene.accuracy.searches:
         lines += ["", *bounds(scene)]
         scene = applied(scene, Ladders.of(scene).first())

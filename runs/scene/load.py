@@ -23,7 +23,7 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Key, ParameterError, described, second_digit
 from tireroad.runs.scene import rules
 from tireroad.runs.scene.plan import meets_road, skipped
-from tireroad.runs.scene.resolved import literal
+from tireroad.runs.scene.resolved import literal, scene_name
 from tireroad.runs.scene.schema import (
     Path_,
     Pitch,
@@ -376,7 +376,7 @@ def load(
     changed = frozenset(override(raw, item) for item in overrides)
     unread = frozenset() if meets_road(until) else frozenset({("road", "file")})
     source = Source(path, text, changed, unread=unread)
-    raw.setdefault("name", re.sub(r"[^A-Za-z0-9._-]", "-", path.stem).lstrip(".-") or "scene")
+    raw.setdefault("name", scene_name(path.stem))
     drop_unused(Scene, raw, changed, say)
     by_section(raw)
     scene = _table(Scene, raw, (), source)

@@ -147,11 +147,9 @@ def keep(surface: RoadKind, road: Road) -> Road:
 
 
 def _which(surface: RoadKind) -> tuple:
-    """The road and the state of its file, which may have been rewritten."""
-    if surface.reads is None or not surface.reads.is_file():
-        return (surface,)
-    state = surface.reads.stat()
-    return surface, state.st_ino, state.st_size, state.st_mtime_ns
+    """The road and the state of its files, which may have been rewritten."""
+    states = [file.stat() for file in surface.files if file.is_file()]
+    return surface, *((state.st_ino, state.st_size, state.st_mtime_ns) for state in states)
 
 
 def _check_extent(scene: Scene, road: Road) -> None:

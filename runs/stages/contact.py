@@ -457,7 +457,7 @@ class ContactStage(Stage[ContactHistory]):
             "greens": self.greens.key,
             "contact": asdict(scene.contact),
             "road": [asdict(scene.road), stages_setup.inputs(self.job)],
-            "file": store.file_hash(scene.road.file) if scene.road.file else None,
+            "files": [store.file_hash(file) for file in scene.road.surface.files],
             "speed": self.setup.product.rolled.speed,
             "slip": [scene.rotation.free_rolling, scene.rotation.slip_angle]
             if scene.rotation

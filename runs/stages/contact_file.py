@@ -106,8 +106,9 @@ def describe(record: Record, setup: ContactSetup, road: RoadTable) -> None:
 
     Warns if the `road` of the scene is flat where the run passes, or flat to its points.
     """
-    for note in setup.road.notes:
-        console.say(f"  road: {note}")
+    if not road.surface.files:  # of a file it is in the table of files
+        for note in setup.road.notes:
+            console.say(f"  road: {note}")
     texture = setup.road.texture
     if texture is not None and texture.depth is not None:
         record.headline["mean profile depth"] = (texture.depth, "m")

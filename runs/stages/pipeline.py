@@ -26,6 +26,7 @@ from tireroad.runs.files.folder import Summary, make_folder
 from tireroad.runs.process import console
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.process.surroundings import factors_on_disk, forget_peak
+from tireroad.runs.scene import files
 from tireroad.runs.scene.estimate import (
     Estimate,
     check_demand,
@@ -216,6 +217,9 @@ def _begun(job: Job, until: str | None) -> tuple[Summary, float, bool]:
     if scene.road is not None and meets_road(until):
         share(scene.road.surface, comm)
         on_root(comm, lambda: check_road(scene))
+    if scene.road is not None or scene.pattern is not None or scene.tire.section == "file":
+        for line in on_root(comm, lambda: files.table(scene, until)):
+            console.say(line)
     wanted = on_root(comm, lambda: estimate(scene, until))  # may read the road's file
     on_disk = on_root(comm, lambda: out_of_core(wanted, comm.size))
     each = 1e-9 * sum(memory_of(wanted, comm.size, on_disk).values()) / comm.size

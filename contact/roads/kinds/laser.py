@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.contact.roads.grid import Grid
-from tireroad.contact.roads.grid_file import UNITS
-from tireroad.contact.roads.profile_file import check_relief, read_profile
+from tireroad.contact.roads.kinds.measured import CODES, MISSING_DOC
+from tireroad.contact.roads.meaning import UNITS, ReadAs
+from tireroad.contact.roads.profile_file import HEIGHTS, Given, check_relief, read_profile
 from tireroad.contact.roads.random_texture import cleaned, memory, widened
 from tireroad.contact.roads.road import Levelled, road_kind
 from tireroad.contact.roads.under_tire import DEVIATION, mean_profile_depth
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import (
-    Limits,
     ParameterError,
     choice,
     filename,
@@ -25,6 +25,7 @@ from tireroad.fem.parameters import (
 )
 
 Array = NDArray[np.float64]
+PITCH = 4e-5  # m between heights, where neither file nor scene says
 MOST_HEIGHTS = 20_000_000  # of a widened profile: 160 MB, and four times that during its making
 ENDINGS = ".csv", ".txt", ".dat", ".asc", ".prn", ".tsv", ".xyz"
 _MANY = 100  # places of a file whose x may be rounded
@@ -48,18 +49,19 @@ class LaserFile(Levelled):
     file: str | None = filename(
         "measured profile (.csv, .txt, .dat): one height per line, x and a height, or columns with headings"
     )
-    pitch: float = number(
-        4e-5, "m", "distance between heights, where the file has no x", least=1e-7, most=0.1
+    pitch: float | None = number(
+        None, "m", "distance between heights, where the file has no x; absent: what the file says, else 0.04 mm",
+        least=1e-7, most=0.1,
+    )  # fmt: skip
+    length_unit: str | None = choice(
+        None, tuple(UNITS), "unit of x in the file; absent: what the file says, else mm"
     )
-    length_unit: str = choice("mm", tuple(UNITS), "unit of x in the file")
     height_unit: str | None = choice(
-        None, tuple(UNITS), "unit of the heights in the file; absent: mm, if the heights can be"
+        None,
+        tuple(UNITS),
+        "unit of the heights in the file; absent: what the file says, else mm, if the heights can be",
     )
-    missing: tuple[float, ...] = numbers(
-        'values in the file that mean "no height", such as -9999; nan always does',
-        "-",
-        Limits(-1e12, 1e12),
-    )
+    missing: tuple[float, ...] | None = numbers(MISSING_DOC, "-", CODES, None)
     outlier: float = number(
         8.0, "-", "a height is an outlier this many times the usual distance (1.48 times the median) from "
         "the median of its 11 neighbours", least=3, most=1e6,
@@ -98,7 +100,7 @@ class LaserFile(Levelled):
         InputError if the measurement cannot be used.
         """
         source = f"road.file {self.file}"
-        line, notes = self._read(self.reads, source)
+        line, notes, readings = self._read(self.reads, source)
         sound = cleaned(line.profile, line.pitch, self.outlier, self.longest_gap, source)
         profile, pitch = self._resampled(sound.profile, line.pitch, source)
         depth = mean_profile_depth(sound.profile, line.pitch)
@@ -113,34 +115,40 @@ class LaserFile(Levelled):
         road = Grid(x, y, z, end=self.end, source=source)
         road.making = 0.0 if self.across == "ruts" else memory(len(profile), pitch, self.width)
         said = [] if depth is None else [f"mean profile depth as measured {1e3 * depth:.3g} mm"]
+        road.readings = readings
         road.notes = (*notes, sound.summary, f"extended to {self.width:g} m: {how}", *said)
         return road
 
-    def _read(self, path: Path, source: str) -> tuple[_Line, list[str]]:
+    def _read(self, path: Path, source: str) -> tuple[_Line, list[str], tuple[ReadAs, ...]]:
         if not path.is_file():
             raise InputError(f"{source}: no such file")
         if path.suffix.lower() not in ENDINGS:
             raise InputError(f"{source}: the ending {path.suffix!r} is not {', '.join(ENDINGS)}")
-        found = read_profile(path, source, self.missing)
-        unit = self.height_unit or "mm"
-        profile, notes = found.heights * UNITS[unit], list(found.notes)
-        if self.height_unit is None:
-            check_relief(profile, unit, source)
+        given = Given(self.length_unit, self.height_unit, self.missing, self.pitch)
+        found = read_profile(path, source, given)
+        profile, notes = found.heights, list(found.notes)
+        if found.assumed:
+            check_relief(profile, HEIGHTS, source)
         if found.x is None:
-            return _Line(profile, self.pitch), notes
-        x = found.x * UNITS[self.length_unit]
+            pitch = found.pitch or self.pitch
+            if pitch is None:
+                pitch = PITCH
+                notes.append(f"heights every {1e3 * pitch:g} mm: assumed (road.pitch)")
+            every = ReadAs("x", "none in the file", f"every {1e3 * pitch:g} mm")
+            return _Line(profile, pitch), notes, (*found.readings, every)
+        x = found.x
         if not np.isfinite(x).all():
             line = int(found.lines[np.flatnonzero(~np.isfinite(x))[0]])
             raise InputError(f"{source}, line {line}: x is missing")
         pitch = (x[-1] - x[0]) / (len(x) - 1)
-        if self.length_unit == "mm" and 0 < pitch < _FINEST <= 1e3 * pitch:
+        if found.x_assumed and 0 < pitch < _FINEST <= 1e3 * pitch:
             raise InputError(
                 f"{source}: heights every {1e6 * pitch:.3g} um, {x[-1] - x[0]:.3g} m long, where x is read in mm: is it in m? "
                 'Then road.length_unit = "m"'
             )
         off = np.abs(x - x[0] - pitch * np.arange(len(x)))
         # Both ends are rounded, too. Few places tell no rounding from uneven steps.
-        rounded = 2.1 * found.rounding * UNITS[self.length_unit] if len(x) >= _MANY else 0.0
+        rounded = 2.1 * found.rounding if len(x) >= _MANY else 0.0
         steps = np.abs(np.diff(x) - pitch)
         if not (pitch > 0 and (steps.max() < _EVEN * pitch or off.max() <= rounded)):
             worst = int(steps.argmax())
@@ -150,7 +158,7 @@ class LaserFile(Levelled):
             )
         if steps.max() >= _EVEN * pitch:
             notes.append(f"x is rounded; its even steps are {1e3 * pitch:.5g} mm")
-        return _Line(profile, float(pitch), float(x[0])), notes
+        return _Line(profile, float(pitch), float(x[0])), notes, found.readings
 
     def _resampled(self, profile: Array, pitch: float, source: str) -> tuple[Array, float]:
         """Without waves shorter than `shortest_wave` (ISO 16610-21), sampled at a quarter of it."""

@@ -4,15 +4,21 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tireroad.contact.roads.grid import Grid
-from tireroad.contact.roads.grid_file import UNITS, read_grid
-from tireroad.contact.roads.opencrg import read_opencrg
+from tireroad.contact.roads.grid_file import read_grid
+from tireroad.contact.roads.meaning import UNITS
+from tireroad.contact.roads.opencrg import read_opencrg, referred
 from tireroad.contact.roads.road import Levelled, road_kind
-from tireroad.fem.parameters import ParameterError, choice, filename
+from tireroad.fem.parameters import Limits, ParameterError, choice, filename, numbers
 
 _LAYOUT = (
-    "measured road: .npz or .h5 with arrays x, y, z; or .csv, either a matrix (first line a corner entry and all y, then "
-    "an x and its heights per line) or a list (first line x,y,z, then one point per line)"
+    "measured road: .npz, .h5 or .nc with arrays x, y, z; or .csv, either a matrix (first line a corner entry and all y, then "
+    "an x and its heights per line) or a list (headings x, y, z, then one point per line)"
 )
+MISSING_DOC = (
+    'values in the file that mean "no height", such as -9999; nan always does. Absent: what the file says, and values that '
+    "look like it are an error; []: there are none"
+)
+CODES = Limits(-1e40, 1e40)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,6 +35,7 @@ class MeasuredRoad(Levelled):
     end: str = choice(
         "refuse", ("refuse", "mirror"), "a run longer than the road: an error, or the road mirrored"
     )
+    missing: tuple[float, ...] | None = numbers(MISSING_DOC, "-", CODES, None)
     file: str | None  # each kind of file describes it differently
 
     @property
@@ -43,17 +50,21 @@ class MeasuredRoad(Levelled):
             raise ParameterError("file", f'is missing: name a file for {self.what} by file = "…"')
 
 
-@road_kind("grid", "heights measured on a regular grid, in a .npz, .csv or .h5 file")
+@road_kind("grid", "heights measured on a regular grid, in a .npz, .csv, .h5 or .nc file")
 class GridFile(MeasuredRoad):
     """Heights on a grid, bilinear in between."""
 
     what = "the measured grid"
     file: str | None = filename(_LAYOUT)
     length_unit: str | None = choice(
-        None, tuple(UNITS), "unit of x and y in the file; absent: m, if the sizes can be metres"
+        None,
+        tuple(UNITS),
+        "unit of x and y in the file; absent: what the file says, else m, if the sizes can be metres",
     )
     height_unit: str | None = choice(
-        None, tuple(UNITS), "unit of the heights in the file; absent: as length_unit"
+        None,
+        tuple(UNITS),
+        "unit of the heights in the file; absent: what the file says, else as length_unit",
     )
 
     def make(self) -> Grid:
@@ -64,6 +75,7 @@ class GridFile(MeasuredRoad):
             end=self.end,
             length_unit=self.length_unit,
             height_unit=self.height_unit,
+            missing=self.missing,
         )
 
 
@@ -74,6 +86,11 @@ class CrgFile(MeasuredRoad):
     what = "the OpenCRG road (crg)"
     file: str | None = filename("measured road in OpenCRG (versions up to 1.2), text or binary")
 
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The file, and those that it refers to."""
+        return referred(self.reads)
+
     def make(self) -> Grid:
         """The road in the file; InputError if it cannot be used."""
-        return read_opencrg(self.reads, holes=self.holes, end=self.end)
+        return read_opencrg(self.reads, holes=self.holes, end=self.end, missing=self.missing)

@@ -174,8 +174,8 @@ def test_archive_whose_headers_do_not_parse_is_refused(tmp_path: Path, header: s
         (",0,1\n0,1,2\n# note\n1,2,x\n", "line 4"),
         ("x,y,z\n", "at least 3"),
         ("", "road.csv: is empty"),
-        ("0.001\n0.002\n0.001\n", "line 1: no comma"),
-        ("# laser\n0;1;2\n1;0;0\n", "line 2: no comma"),
+        ("0.001\n0.002\n0.001\n", 'kind = "laser"'),
+        ("# laser\n0;1;2\n1;0;0\n", "2 lines of data"),
     ],
 )
 def test_csv_damage_is_named_by_line(tmp_path: Path, text: str, message: str) -> None:

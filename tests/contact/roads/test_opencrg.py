@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tireroad.contact.roads.opencrg import read_opencrg
+from tireroad.contact.roads.road import ROADS as KINDS
 from tireroad.contact.roads.road import make_road
 from tireroad.fem.errors import InputError
 
@@ -165,8 +166,9 @@ SLOPE = PHI.replace("phi,rad", "slope,m/m")
         ({"parameters": "REFERENCE_LINE_INCREMENT = 0.0\n"}, "INCREMENT = 0"),
         ({"parameters": "REFERENCE_LINE_END_U = 1e300\n"}, "not a whole number"),
         ({"parameters": "LONG_SECTION_V_RIGHT = one\n"}, "line 8: .*KEY = number"),
-        ({"blocks": "$ROAD_CRG_MODS\nSCALE_Z_GRID = 2.0\n"}, "SCALE_Z_GRID = 2"),
-        ({"blocks": "$ROAD_CRG_FILE\nother.crg\n"}, "refers to another file"),
+        ({"blocks": "$ROAD_CRG_MODS\nSCALE_CURVATURE = 2.0\n"}, "SCALE_CURVATURE = 2"),
+        ({"blocks": "$ROAD_CRG_MODS\nSCALE_WIDTH = 0.0\n"}, "SCALE_WIDTH = 0 leaves no road"),
+        ({"blocks": "$ROAD_CRG_FILE\nother.crg\n"}, "has a road of its own"),
         ({"code": "XRFI"}, "'XRFI'"),
         ({"channels": "D:long section 1,m\n"}, "at least 2"),
         ({"channels": "D:long section 1,m\nD:long section 3,m\n"}, "numbered 1 to 2"),
@@ -271,9 +273,65 @@ def test_belgian_block_truncated(tmp_path: Path, share: float) -> None:
         read_opencrg(tmp_path / "cut.crg")
 
 
-def test_a_file_that_refers_to_another(tmp_path):
-    """$ROAD_CRG_FILE without a road of its own: the file it names is what can be read."""
-    text = "$CT\nreference\n$ROAD_CRG_FILE   ! reference\n  ../roads/other.crg  ! path\n$ROAD_CRG_OPTS\n"
-    (tmp_path / "road.crg").write_text(text)
-    with pytest.raises(InputError, match=r"refers to ../roads/other.crg: give that file"):
+REFERENCE = "$CT\nreference\n$ROAD_CRG_FILE   ! reference\n  {}  ! path\n$ROAD_CRG_MODS\n{}$\n"
+
+
+@pytest.mark.parametrize(
+    "name", ["sub/other.crg", "sub\\other.crg", "'sub/other.crg'", "sub/again.crg"]
+)
+def test_a_reference_is_followed_with_its_modifiers(tmp_path: Path, name: str) -> None:
+    """The road is that of the other file: twice as high, half as long, three times as wide; its own modifiers hold, too."""
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub" / "other.crg").write_bytes(
+        crg("LRFI", Z, blocks="$ROAD_CRG_MODS\nSCALE_WIDTH = 3\n")
+    )
+    (tmp_path / "sub" / "again.crg").write_text(REFERENCE.format("other.crg", ""))
+    (tmp_path / "road.crg").write_text(
+        REFERENCE.format(name, "scale_z_grid = 2.0\nSCALE_LENGTH = 0.5\n")
+    )
+    road = read_opencrg(tmp_path / "road.crg")
+    assert road.extent_of_file == pytest.approx((2.0, 7.5))
+    x, y = np.meshgrid(0.25 * np.arange(9), 0.75 * (np.arange(11) - 5), indexing="ij")
+    np.testing.assert_allclose(road.height(x, y), 2 * Z, atol=1e-7)
+    assert any("refers to" in note for note in road.notes)
+    surface = KINDS.make("crg", file=str(tmp_path / "road.crg"))
+    assert len(surface.files) == (3 if "again" in name else 2)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "message"),
+    [
+        (REFERENCE.format("none.crg", ""), "", "line 4: refers to none.crg, and there is no file"),
+        (REFERENCE.format("b.crg", ""), REFERENCE.format("a.crg", ""), "refers to itself"),
+        (REFERENCE.format("a.crg", ""), "", "refers to itself"),
+        (
+            REFERENCE.format("b.crg", "SCALE_WIDTH = 2\n"),
+            REFERENCE.format("c.crg", "SCALE_WIDTH = 3\n"),
+            "SCALE_WIDTH = 3, and 2 in a file that refers to it",
+        ),
+        (REFERENCE.format("b.crg\nc.crg", ""), "", "names 2 files"),
+    ],
+)
+def test_a_reference_that_leads_nowhere(
+    tmp_path: Path, first: str, second: str, message: str
+) -> None:
+    (tmp_path / "a.crg").write_text(first)
+    (tmp_path / "b.crg").write_text(second)
+    (tmp_path / "c.crg").write_bytes(crg("LRFI", Z))
+    with pytest.raises(InputError, match=message):
+        read_opencrg(tmp_path / "a.crg")
+
+
+def test_codes_in_an_opencrg_file(tmp_path: Path) -> None:
+    z = np.random.default_rng(3).normal(0, 2e-3, (30, 11))
+    z[5:8, 3:6] = -9.999
+    (tmp_path / "road.crg").write_bytes(crg("KDBI", z))
+    with pytest.raises(
+        InputError, match=r"exactly -9.999 \(9, the first at .*missing = \[-9.999\]"
+    ):
         read_opencrg(tmp_path / "road.crg")
+    road = read_opencrg(tmp_path / "road.crg", holes="fill", missing=(-9.999,))
+    assert road.prepare(0, 14.5, -1.25, 1.25).filled == 9
+    assert read_opencrg(tmp_path / "road.crg", missing=()).lowest(0, 14.5, -1, 1) == pytest.approx(
+        -9.999
+    )

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tireroad.contact.roads.profile_file import read_profile
+from tireroad.contact.roads.profile_file import Given, read_profile
 from tireroad.contact.roads.road import ROADS
 from tireroad.fem.errors import InputError
 
@@ -26,7 +26,7 @@ def lines(form: str, comma: bool = False) -> list[str]:
 def read(path: Path, text: str | bytes, **more):
     file = path / "line.csv"
     file.write_bytes(text if isinstance(text, bytes) else text.encode())
-    return read_profile(file, "road.file line.csv", **more)
+    return read_profile(file, "road.file line.csv", Given(**more))
 
 
 @pytest.mark.parametrize(
@@ -45,7 +45,7 @@ def read(path: Path, text: str | bytes, **more):
         "\n".join(lines("{n} {x} {z}")),
         "\n".join(reversed(lines("{x},{z}"))),
         "\n".join([*lines("{x},{z}")[:7], lines("{x},{z}")[6], *lines("{x},{z}")[7:]]),
-        "Abstand;Höhe [µm]\n".encode("cp1252") + "\n".join(lines("{x};{z}", comma=True)).encode(),
+        "Abstand [mm];Höhe [µm]\n".encode("cp1252") + "\n".join(lines("{x};{z}", comma=True)).encode(),
         "\n".join(lines("{x},{z}")).encode("utf-16"),
     ],
     ids=[
@@ -55,14 +55,14 @@ def read(path: Path, text: str | bytes, **more):
 )  # fmt: skip
 def test_the_same_profile_in_other_words(tmp_path: Path, text: str | bytes) -> None:
     found = read(tmp_path, text)
-    np.testing.assert_allclose(found.x, X)
-    np.testing.assert_allclose(found.heights, Z)
+    np.testing.assert_allclose(found.x, 1e-3 * X)
+    np.testing.assert_allclose(found.heights, (1e-6 if "µ" in str(found.readings) else 1e-3) * Z)
 
 
 def test_one_column_with_decimal_commas(tmp_path: Path) -> None:
     found = read(tmp_path, "\n".join(lines("{z}", comma=True)))
     assert found.x is None
-    np.testing.assert_allclose(found.heights, Z)
+    np.testing.assert_allclose(found.heights, 1e-3 * Z)
     with pytest.raises(InputError, match="decimal comma or two"):
         read(tmp_path, "\n".join(f"{k},{500 + k}" for k in range(100)))
 
@@ -122,6 +122,78 @@ def test_units_that_no_road_has(tmp_path: Path) -> None:
             road(tmp_path, text)
         assert road(tmp_path, text, height_unit=unit)
         assert road(tmp_path, text, height_unit="mm", outlier=1e6)
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "# Sampling interval 0.25 mm",
+        "# pitch [mm]: 0.25",
+        "dx = 250 um",
+        "Abtastabstand: 0,025 cm",
+        "# step 1/4",
+    ],
+)
+def test_the_distance_that_a_file_states(tmp_path: Path, said: str) -> None:
+    """It goes before 0.04 mm; road.pitch must not contradict it; without a unit that is known it is refused."""
+    text = f"{said}\n# heights in mm\n" + "\n".join(f"{z:.3f}" for z in Z)
+    if "1/4" in said:
+        with pytest.raises(InputError, match="may state the distance between heights"):
+            road(tmp_path, text)
+        assert road(tmp_path, text, pitch=2.5e-4).extent_of_file[0] == pytest.approx(
+            0.09975, abs=3e-4
+        )
+        return
+    made = road(tmp_path, text)
+    assert made.extent_of_file[0] == pytest.approx(0.09975, abs=3e-4)
+    assert not any("assumed" in note for note in made.notes)
+    with pytest.raises(InputError, match=r"every 0.25 mm by line 1, and road.pitch = 0.001 m"):
+        road(tmp_path, text, pitch=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("head", "row", "message"),
+    [
+        ("x [mm],z [s]", "{x},{z}", "heights are in s .*which is a time"),
+        ("t [s];z [mm]", "{x};{z}", "is a time, and no column holds the distance"),
+        ("sample,height [mm]", "{n},{z}", "counts the heights.*road.pitch"),
+        (
+            "x [furlong],z [mm]",
+            "{x},{z}",
+            '"furlong" in the heading .* is no unit that is known.*road.length_unit',
+        ),
+        ("x [mm],z", "{x},{z}", "a unit stands beside one column.*road.height_unit"),
+        ("# scale: 10\nx [mm],z [mm]", "{x},{z}", "scale: 10.*may state units or a factor"),
+        ("# units: mm\nx [cm],z [cm]\nmm,mm", "{x},{z}", "cm and mm"),
+        ("distance, height [mm], height [mm]", "{x},{z},{z}", "under 'distance'"),
+    ],
+)
+def test_what_a_file_leaves_open_is_refused(
+    tmp_path: Path, head: str, row: str, message: str
+) -> None:
+    rows = [
+        row.format(x=f"{x:.3f}", z=f"{z:.3f}", n=n)
+        for n, (x, z) in enumerate(zip(X, Z, strict=True))
+    ]
+    with pytest.raises(InputError, match=message):
+        road(tmp_path, "\n".join([head, *rows]))
+
+
+def test_a_statement_below_the_first_number_is_refused(tmp_path: Path) -> None:
+    text = "x [mm],z [mm]\n" + "\n".join(lines("{x},{z}"))
+    for said in ("# units: cm", "# scale = 10", "# z [um]", "# NODATA_value -9999"):
+        with pytest.raises(InputError, match="among the numbers"):
+            road(tmp_path, f"{text}\n{said}\n")
+    assert road(tmp_path, f"{text}\n# end of file\n")
+
+
+def test_a_key_that_contradicts_the_file_is_refused_with_both(tmp_path: Path) -> None:
+    text = "x [mm],z [mm]\n" + "\n".join(lines("{x},{z}"))
+    with pytest.raises(
+        InputError, match=r'x are in mm .heading "x \[mm\]"., and road.length_unit = "cm"'
+    ):
+        road(tmp_path, text, length_unit="cm")
+    assert road(tmp_path, text, length_unit="mm", height_unit="mm")
 
 
 def test_rounded_places_are_even(tmp_path: Path) -> None:

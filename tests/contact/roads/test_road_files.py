@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from tireroad.contact.roads import grid, grid_file
+from tireroad.contact.roads import grid, grid_text
 from tireroad.contact.roads.grid import Grid
 from tireroad.contact.roads.grid_file import read_grid
 from tireroad.fem.errors import InputError
@@ -109,7 +109,7 @@ def test_unpacking_takes_no_more_than_half_of_the_disk(tmp_path: Path, monkeypat
     body = [f"{x:g},{line.partition(',')[2]}" for x, line in zip(X[1:], text[1:], strict=True)]
     (tmp_path / "zeros.csv").write_text("\n".join([head, *body]))
     monkeypatch.setattr(grid, "PIECE", 1000)
-    monkeypatch.setattr(grid_file, "BLOCK", 10)
+    monkeypatch.setattr(grid_text, "BLOCK", 10)
     for name in ("zeros.npz", "zeros.csv"):
         read_grid(tmp_path / name)
     monkeypatch.setattr(grid, "MAX_UNPACKED", 10_000)
@@ -140,9 +140,9 @@ def test_millimetres_of_a_road_that_is_the_same_across_are_noticed_along_it(tmp_
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("x;-0,1;0,1\n0;0,001;0,002\n", "semicolons"),
+        ("x;-0,1;0,1\n0;0,001;0,002\n", "2 lines of data"),
         ("X [m],Y [m],Z [m]\n0,0,0\n", "begins with the line x,y,z"),
-        ("x,z\n0,0\n1,0\n", "begins with the line x,y,z"),
+        ("x,z\n0,0\n1,0\n", 'kind = "laser"'),
     ],
 )
 def test_csv_of_other_programs_is_told_the_layout(tmp_path: Path, text: str, words: str) -> None:

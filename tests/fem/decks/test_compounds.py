@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from torus_decks import Torus, plain
 
+from tireroad.fem.errors import InputError
+
 DENSITY = "*DENSITY\n1100.\n"
 
 
@@ -263,3 +265,15 @@ def test_refused(own, text, words):
                 Torus(arcs=4), materials="*MATERIAL, NAME=RUBBER\n*HYPERELASTIC, " + text + DENSITY
             )
         )
+
+
+def test_constants_that_were_fitted_say_so_when_they_are_refused(rubber):
+    """The deck states no C10: it is what Mooney and Rivlin's law makes of tension alone, -54381 Pa."""
+    lines = "".join(
+        f"{2 * (1 - s**-3) * (-54381.0 * s + 3e5):.9g}, {s - 1:.9g}\n" for s in (1.1, 1.3, 1.6, 2.0)
+    )
+    with pytest.raises(
+        InputError,
+        match=r"must be .*not -5438.*states no constants: those of mooney-rivlin were fitted to its \*UNIAXIAL TEST DATA",
+    ):
+        rubber(f"*HYPERELASTIC, MOONEY-RIVLIN, TEST DATA INPUT\n*UNIAXIAL TEST DATA\n{lines}")

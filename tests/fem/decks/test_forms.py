@@ -7,7 +7,8 @@ import pytest
 from ring_decks import solids
 from torus_decks import CENTRE, HALF_ANGLE, MINOR, RUBBER, WALL, Torus, plain
 
-from tireroad.fem.decks.own import read
+from tireroad.fem.decks import abaqus, gmsh
+from tireroad.fem.decks.own import read, regions
 from tireroad.fem.errors import InputError
 
 EXACT = 2 * np.pi * HALF_ANGLE * (MINOR**2 - (MINOR - WALL) ** 2) * CENTRE + 2 * np.pi * (
@@ -241,3 +242,149 @@ def test_coincident_nodes_are_one(own, quadratic):
         own(plain(Unmerged(quadratic), kind), **dict(FULL), merge=0.0)
     with pytest.raises(InputError, match="nearer to each other than tire.merge"):
         own(plain(Torus(quadratic), kind), **dict(FULL), merge=0.01)
+
+
+GROUPS = {"left": (4, 5), "all": (4, 5, 6, 7), "right": (6, 7)}
+
+
+def _gmsh(version: str, first: int = 1, parted: bool = False) -> str:
+    """A row of four quadrilaterals in three groups, two of them overlapping; labels from `first` on."""
+    points = [(0.3, 0.01 * (k - 2), 0.0) for k in range(5)] + [
+        (0.32, 0.01 * (k - 2), 0.0) for k in range(5)
+    ]
+    cells = [(k, k + 5, k + 6, k + 1) for k in range(4)]
+    sides = {
+        "rim": [(0, 5), (4, 9)],
+        "inner": [(k, k + 1) for k in range(4)],
+        "tread": [(k + 5, k + 6) for k in range(4)],
+    }
+    names = [*((1, name) for name in sides), *((2, name) for name in GROUPS)]
+    head = [f"$MeshFormat\n{version} 0 8\n$EndMeshFormat", f"$PhysicalNames\n{len(names)}"]
+    head += [f'{dimension} {k} "{name}"' for k, (dimension, name) in enumerate(names, 1)]
+    head.append("$EndPhysicalNames")
+    number = {name: k for k, (_, name) in enumerate(names, 1)}
+    if version == "2.2":
+        nodes = [f"{first + k} {x} {y} {z}" for k, (x, y, z) in enumerate(points)]
+        rows = [
+            f"1 2 {number[name]} 1 " + " ".join(str(first + n) for n in side)
+            for name in sides
+            for side in sides[name]
+        ]
+        for name, entities in GROUPS.items():
+            rows += [
+                f"3 2 {number[name]} 1 " + " ".join(str(first + n) for n in cells[e - 4])
+                for e in entities
+            ]
+        elements = [f"{first + k} {row}" for k, row in enumerate(rows)]
+        tail = [
+            f"$Nodes\n{len(points)}",
+            *nodes,
+            f"$EndNodes\n$Elements\n{len(rows)}",
+            *elements,
+            "$EndElements",
+        ]
+        return "\n".join([*head, *tail]) + "\n"
+    curves = [f"{k} 0 0 0 1 1 1 1 {number[name]} 0" for k, name in enumerate(sides, 1)]
+    surfaces = []
+    for entity in range(4, 8):
+        mine = [str(number[name]) for name, entities in GROUPS.items() if entity in entities]
+        surfaces.append(f"{entity} 0 0 0 1 1 1 {len(mine)} {' '.join(mine)} 0")
+    shift = 100 if parted else 0  # a partitioned file has its elements in parts of the entities
+    entities = [f"$Entities\n0 {len(curves)} {len(surfaces)} 0", *curves, *surfaces, "$EndEntities"]
+    if parted:
+        parts = [
+            f"{100 + int(row.split()[0])} {d} {row.split()[0]} 1 1 {row.partition(' ')[2]}"
+            for d, rows in ((1, curves), (2, surfaces))
+            for row in rows
+        ]
+        entities += [
+            f"$PartitionedEntities\n1\n0\n0 {len(curves)} {len(surfaces)} 0",
+            *parts,
+            "$EndPartitionedEntities",
+        ]
+    nodes = [
+        f"2 4 0 {len(points)}",
+        *(str(first + k) for k in range(len(points))),
+        *(f"{x} {y} {z}" for x, y, z in points),
+    ]
+    blocks = []
+    label = first
+    for k, name in enumerate(sides, 1):
+        blocks.append(f"1 {k + shift} 1 {len(sides[name])}")
+        for side in sides[name]:
+            blocks.append(f"{label} " + " ".join(str(first + n) for n in side))
+            label += 1
+    for entity in range(4, 8):
+        blocks += [
+            f"2 {entity + shift} 3 1",
+            f"{label} " + " ".join(str(first + n) for n in cells[entity - 4]),
+        ]
+        label += 1
+    last = first + len(points) - 1
+    tail = [f"$Nodes\n1 {len(points)} {first} {last}", *nodes, "$EndNodes"]
+    tail += [
+        f"$Elements\n{len(sides) + 4} {label - first} {first} {label - 1}",
+        *blocks,
+        "$EndElements",
+    ]
+    return "\n".join([*head, *entities, *tail]) + "\n"
+
+
+@pytest.mark.parametrize("version", ["2.2", "4.1", "4.1 parted"])
+@pytest.mark.parametrize("first", [1, 3_000_000_000], ids=["labels from 1", "labels over 2^31"])
+def test_groups_that_overlap(tmp_path: Path, version: str, first: int) -> None:
+    """A surface in two groups is in both; the larger one is no region, and that is said; parts are followed to their groups."""
+    (tmp_path / "two.msh").write_text(_gmsh(version[:3], first, "parted" in version))
+    deck = gmsh.read(tmp_path / "two.msh")
+    solids = [block for block in deck.blocks if block.kind.role == "solid"]
+    assert [len(block.labels) for block in solids] == [4]
+    sizes = {name: len(deck.element_sets.labels(name)) for name in deck.element_sets.names}
+    assert sizes == {"LEFT": 2, "ALL": 4, "RIGHT": 2}
+    found = regions(deck)
+    assert sorted(found.names) == ["LEFT", "RIGHT"]
+    assert any("ALL: 4 of its 4 elements are in LEFT, RIGHT, too" in note for note in found.notes)
+    assert {name: len(rows) for name, rows in deck.surfaces.items()} == {
+        "rim": 2,
+        "inner": 4,
+        "tread": 4,
+    }
+
+
+def test_the_deck_that_gmsh_writes_of_a_section_is_named(tmp_path: Path) -> None:
+    text = plain(Torus(arcs=8, wall=1), "CAX4").replace("TYPE=CAX4", "type=CPS4")
+    (tmp_path / "deck.inp").write_text(text)
+    with pytest.raises(
+        InputError, match="plane elements, CPS4 .Gmsh writes a section so.*rename them CGAX4"
+    ):
+        regions(abaqus.read(tmp_path / "deck.inp"))
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "MESH.INP",
+        "C:\\work\\tire\\mesh.inp",
+        "\\\\server\\tires\\mesh.inp",
+        ".\\mesh.inp",
+    ],
+)
+def test_includes_of_windows(tmp_path: Path, name: str) -> None:
+    """Capitals, and folders of another machine: the file beside the deck; Ctrl-Z at the end of both."""
+    text = plain(Torus(arcs=8, wall=1))
+    (tmp_path / "mesh.inp").write_text(text.replace("\n", "\r\n") + "\x1a")
+    (tmp_path / "deck.inp").write_text(f"*HEADING\n*INCLUDE, INPUT={name}\n\x1a\r\n")
+    whole = abaqus.read(tmp_path / "mesh.inp").labels
+    assert abaqus.read(tmp_path / "deck.inp").labels.tolist() == whole.tolist()
+    (tmp_path / "deck.inp").write_text("*INCLUDE, INPUT=D:\\other.inp\n")
+    with pytest.raises(
+        InputError, match="a path of Windows, and there is no other.inp beside the deck"
+    ):
+        abaqus.read(tmp_path / "deck.inp")
+
+
+def test_labels_beyond_those_of_abaqus_are_named(tmp_path: Path) -> None:
+    (tmp_path / "deck.inp").write_text("*NODE\n3000000001, 0.3, 0., 0.\n")
+    with pytest.raises(
+        InputError, match=r"3000000001 is not a label of a node: .*up to 1,000,000,000"
+    ):
+        abaqus.read(tmp_path / "deck.inp")

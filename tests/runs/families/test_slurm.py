@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from one_node import ended, slurm
-from started import environment
+from started import ROOT, environment
 from tires import soft_torus
 
 import tireroad
@@ -218,3 +218,34 @@ def _until(condition, seconds: float = 300) -> None:
     while not condition():
         assert time.monotonic() < end
         time.sleep(0.2)
+
+
+@pytest.mark.long
+def test_in_a_step_of_srun(tmp_path: Path, queue) -> None:
+    """`srun --pty bash`: one process starts as in a plain shell, -n 2 by mpirun; several without MPI are told so."""
+    (tmp_path / "scene.toml").write_text(
+        soft_torus(12, 4, order=2) + "[static]\nload = 300.0\nerror_estimate = false\n"
+    )
+    launcher, script = ROOT / "tireroad", tmp_path / "size.py"
+    script.write_text("from mpi4py import MPI\nprint('size', MPI.COMM_WORLD.size)\n")
+
+    def step(tasks: int, *arguments: object) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            ["srun", "-n", str(tasks), "--overcommit", *map(str, arguments)],
+            env=queue,
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            timeout=300,
+        )
+
+    assert "dolfinx" in step(1, launcher, "info").stdout
+    assert "size 1" in step(1, launcher, "python", script).stdout
+    for count in (1, 2):
+        done = step(1, launcher, "run", "scene.toml", "--until", "static", "--fresh", "-n", count)
+        assert done.returncode == 0, done.stderr
+        assert (
+            f'"processes": {count}' in (tmp_path / "results" / "scene" / "summary.json").read_text()
+        )
+    refused = step(2, launcher, "info")
+    assert refused.returncode == 2 and refused.stderr.count("2 processes without MPI") == 1

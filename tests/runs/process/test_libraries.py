@@ -6,9 +6,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from started import ROOT
+from started import ROOT, environment
 
-from tireroad.runs.process import libraries
+from tireroad.runs.process import libraries, signals
 
 WIDE = "avx2 fma avx512f avx512cd avx512bw avx512dq avx512vl"
 ASK = "import os, tireroad, numpy; from threadpoolctl import threadpool_info; print([i.get('architecture') for i in threadpool_info()])"
@@ -82,3 +82,46 @@ def test_the_program_takes_one_blas_thread_unless_told(given: dict, threads: int
         check=True,
     ).stdout
     assert found.split() == [str(threads)]
+
+
+STEP = {"SLURM_NODELIST": "here", "SLURM_STEP_ID": "0", "SLURM_JOB_ID": "1", "SLURM_PROCID": "0"}
+
+
+@pytest.mark.parametrize(
+    ("more", "count"),
+    [
+        ({}, 1),
+        ({"SLURM_STEP_NUM_TASKS": "1"}, 1),
+        ({"SLURM_STEP_NUM_TASKS": "4"}, 4),
+        ({"SLURM_STEP_NUM_TASKS": "4", "PMIX_NAMESPACE": "slurm.pmix.1"}, 0),
+        ({"OMPI_COMM_WORLD_SIZE": "2"}, 0),
+        ({"PMI_RANK": "0"}, 0),
+    ],
+)
+def test_tasks_of_slurm_without_mpi(more: dict[str, str], count: int) -> None:
+    assert signals.without_mpi(STEP | more) == count
+    assert signals.without_mpi({"SLURM_JOB_ID": "1", **more}) == 0
+
+
+def test_mpi_starts_in_a_step_of_slurm(tmp_path: Path) -> None:
+    """srun --pty: neither a script, nor the launcher's python, nor a command ended before anything was done."""
+    size = "from mpi4py import MPI; print('size', MPI.COMM_WORLD.size)"
+    (tmp_path / "size.py").write_text(size)
+    for command in (
+        [sys.executable, "-c", f"import tireroad; {size}"],
+        [ROOT / "tireroad", "python", tmp_path / "size.py"],
+        [ROOT / "tireroad", "info"],
+    ):
+        done = subprocess.run(
+            command, env=environment(**STEP), capture_output=True, text=True, timeout=120
+        )
+        assert done.returncode == 0, done.stderr
+        assert "size 1" in done.stdout or "dolfinx" in done.stdout
+    done = subprocess.run(
+        [ROOT / "tireroad", "info"],
+        env=environment(**STEP, SLURM_STEP_NUM_TASKS="4"),
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.returncode == 2 and "srun started 4 processes without MPI" in done.stderr

@@ -158,3 +158,23 @@ def test_check_says_that_a_standing_wheel_meets_no_heights(
     told = explain(load(scene, []))
     assert ("warning: the wheel stands" in told) == said
     assert "no relief" not in told
+
+
+def test_the_log_holds_what_was_read_as_what(scene: Path, capsys: pytest.CaptureFixture) -> None:
+    """One table for check and run: columns, units, codes, and what was assumed."""
+    x, y = np.arange(0.0, 2000.0, 10), np.arange(-200.0, 200.0, 10)
+    z = np.round(np.random.default_rng(1).normal(0, 1, (len(x), len(y))), 3)
+    z[100, 5] = -9999
+    X, Y = np.meshgrid(x, y, indexing="ij")
+    rows = "\n".join(
+        f"{a};{b};{c}" for a, b, c in zip(X.ravel(), Y.ravel(), z.ravel(), strict=True)
+    )
+    (scene.parent / "road.csv").write_text("# NODATA_value -9999\nx [mm];y [mm];Höhe (mm)\n" + rows)
+    told = explain(load(scene, ["road.file=road.csv", "road.holes=fill"]))
+    table = told[told.index("files: what was read as what") :].splitlines()
+    assert (
+        table[2].split()[:4] == ["road.csv", "x", "column", "1"]
+        and 'mm (heading "x [mm]")' in table[2]
+    )
+    assert 'mm (heading "Höhe (mm)")' in table[4] and "no height: -9999" in table[4]
+    assert "x and y and heights in m: assumed" in explain(load(scene))

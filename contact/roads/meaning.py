@@ -1,0 +1,660 @@
+"""What a table of numbers says about itself: form, headings, units, missing values.
+
+Text tables of every kind of road are read through here: the encoding, the separator and the decimal
+mark are found by which of them makes rows of numbers; whatever stands before the numbers (headings,
+a line of units, comments) is searched for the meaning of each column. What the file says goes before
+a default, what contradicts a key is an error that names both, and what is assumed is told.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from tireroad.contact.roads.text_table import NUMBER, Form, Line, first_row, form_of, quoted
+from tireroad.fem.errors import InputError
+
+UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
+"""Metres of the units that a scene can name."""
+
+_LENGTHS = {
+    "m": 1.0, "meter": 1.0, "meters": 1.0, "metre": 1.0, "metres": 1.0, "mtr": 1.0,
+    "dm": 0.1, "decimeter": 0.1, "decimeters": 0.1, "decimetre": 0.1, "decimetres": 0.1, "dezimeter": 0.1,
+    "cm": 1e-2, "centimeter": 1e-2, "centimeters": 1e-2, "centimetre": 1e-2, "centimetres": 1e-2, "zentimeter": 1e-2,
+    "mm": 1e-3, "millimeter": 1e-3, "millimeters": 1e-3, "millimetre": 1e-3, "millimetres": 1e-3,
+    "um": 1e-6, "μm": 1e-6, "μ": 1e-6, "micron": 1e-6, "microns": 1e-6, "micrometer": 1e-6, "micrometers": 1e-6,
+    "micrometre": 1e-6, "micrometres": 1e-6, "mikrometer": 1e-6, "mikron": 1e-6,
+    "nm": 1e-9, "nanometer": 1e-9, "nanometers": 1e-9, "nanometre": 1e-9, "nanometres": 1e-9,
+    "km": 1e3, "kilometer": 1e3, "kilometers": 1e3, "kilometre": 1e3, "kilometres": 1e3,
+    "in": 0.0254, "inch": 0.0254, "inches": 0.0254, "zoll": 0.0254, "''": 0.0254, '"': 0.0254,
+    "ft": 0.3048, "foot": 0.3048, "feet": 0.3048, "yd": 0.9144, "yard": 0.9144, "yards": 0.9144,
+    "mil": 2.54e-5, "mils": 2.54e-5, "thou": 2.54e-5,
+}  # fmt: skip
+_TIMES = {
+    "s", "sec", "secs", "second", "seconds", "sek", "sekunde", "sekunden", "ms", "us", "μs", "ns", "min", "minutes",
+    "h", "hour", "hours",
+}  # fmt: skip
+_OTHERS = {
+    "hz", "khz", "v", "mv", "volt", "volts", "n", "kn", "kg", "pa", "kpa", "mpa", "bar", "%", "deg", "°", "°c", "c", "k",
+    "rad", "m/s", "km/h", "m/s2", "m/s^2", "m/s²", "mm/s", "g", "db", "counts", "count", "digits", "lsb", "px", "pixel",
+    "m/km", "mm/m", "in/mi", "m2", "m²", "mm2", "mm²", "m3",
+}  # fmt: skip
+_PER = re.compile(
+    r"(?:(?P<number>\d+(?:[.,]\d+)?(?:e[-+]?\d+)?)(?:\s*/\s*(?P<by>\d+))?|10\s*(?:\^|\*\*)\s*\(?(?P<power>[-+]?\d+)\)?)"
+    r"\s*[*x×·]?\s*(?P<word>\D.*)",
+    re.IGNORECASE,
+)
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit as it is written; `metres` of a length, None of a time or whatever else."""
+
+    text: str
+    metres: float | None
+    time: bool = False
+
+
+def unit_of(text: str) -> Unit | None:
+    """The unit that a text is, also with a factor (0.1 mm, 1/10 mm, 10^-3 m); None where it is none."""
+    shown = text.strip().strip(".").strip()
+    word = " ".join(shown.replace("µ", "μ").lower().split())
+    if word in _LENGTHS:
+        return Unit(shown, _LENGTHS[word])
+    if word in _TIMES:
+        return Unit(shown, None, time=True)
+    if word in _OTHERS:
+        return Unit(shown, None)
+    match = _PER.fullmatch(word)
+    if match is None or match["word"].strip() not in _LENGTHS:
+        return None
+    if match["power"]:
+        times = 10.0 ** int(match["power"])
+    else:
+        times = float(match["number"].replace(",", ".")) / float(match["by"] or 1)
+    # 25 mm is a length, not a unit.
+    if not (times > 0 and abs(np.log10(times) - round(np.log10(times))) < 1e-9):
+        return None
+    return Unit(shown, times * _LENGTHS[match["word"].strip()])
+
+
+# Headings by what their column holds. The first that fits decides.
+_ROLES: tuple[tuple[str, str], ...] = (
+    (
+        "count",
+        r"|#|index|idx|no|nr|n|num|number|nummer|samples?|sample[ _-]?(?:no|nr|number|index|id)|points?|point[ _-]?(?:no|nr|"
+        r"number|id)|pts?|punkt|id|fid|rows?|lines?|zeile|count(?:er)?|i|k|lfd|lfd\.? ?nr|record|scan|frame|unnamed: \d+"
+        r"|messpunkt|pkt",
+    ),
+    (
+        "time",
+        r"t|time.*|zeit.*|temps|tiempo|tijd|tempo|timestamp.*|date.*|datum|uhrzeit|elapsed.*|seconds?|sec",
+    ),
+    ("x", r"x|x[ _-].*|.*[ _-]x|x(?:pos|coord|koord|value|wert|axis|achse|dist).*"),
+    ("y", r"y|y[ _-].*|.*[ _-]y|y(?:pos|coord|koord|value|wert|axis|achse|dist).*"),
+    ("z", r"z|z[ _-].*|.*[ _-]z|z(?:pos|coord|koord|value|wert|axis|achse|dist).*"),
+    (
+        "x",
+        r"(?:dist|pos|abstand|weg|station|chain|stre[ck]|l[aä]ng|laeng|length|longitud|absci|absz|along|travel|afstand|"
+        r"avst|long\b|lange\b|fahrtr|posi|u$|progressiv).*",
+    ),
+    ("y", r"(?:lateral|width|across|transv|quer|breit|breed|larg|anch|v$).*"),
+    (
+        "z",
+        r"(?:h$|height|h(?:ö|o|oe|�)he|hoehe|depth|prof|elev|alt|tief|tie?fe|ordin|value|wert|messwert|haut|hoog|h(?:ö|o)jd|"
+        r"textur|relief|surface|rough|amplit|cota|quota|heigth|hgt|dz$|level).*",
+    ),
+    (
+        "other",
+        r".*(?:force|kraft|speed|veloc|geschw|temper|accel|angle|winkel|mpd|iri\b|lat$|lon$|latit|gps|press|druck|qualit|"
+        r"intens|valid|flag|status|snr|weight|error|std|sigma|comment|remark|easting|northing).*",
+    ),
+)
+_MATCHES = tuple((role, re.compile(pattern, re.IGNORECASE)) for role, pattern in _ROLES)
+_HARMLESS = re.compile(
+    r"[-+]?\d*|left|right|links|rechts|centre|center|mid(?:dle)?|raw|filtered|measured|laser|calc(?:ulated)?|mean|average|"
+    r"forward|lateral|vertical|longitudinal|transversal|up|upward|iso|relative|abs(?:olute)?|wheel ?path",
+    re.IGNORECASE,
+)
+_BRACKETED = re.compile(r"[\[({<]([^\])}>]*)[\])}>]")
+_PARTED = re.compile(r"\s+in\s+|\s*[,/_:;|-]\s*|\s+")
+_JOINED = re.compile(r"^(x|y|z|height|depth|dist|distance|elevation|h)(mm|cm|dm|um|μm)$", re.I)
+_CAMEL = re.compile(r"^(.*[a-z])(MM|Mm|CM|Cm|DM|Dm|UM|Um|μm)$")
+
+
+def role_of(name: str) -> str:
+    """What a column of that name holds: x, y, z, count, time or other; "" where the name does not tell."""
+    plain = name.replace("µ", "μ").strip().strip("\"'*:.").strip().lower()
+    words = plain.split()
+    if len(words) > 1:
+        plain = " ".join(
+            word for word in words if word[0].isdigit() or not _HARMLESS.fullmatch(word)
+        )
+    return next((role for role, form in _MATCHES if form.fullmatch(plain)), "")
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column: its heading as written ("" where there is none), role, and unit if it is stated.
+
+    `unclear`: a text in the unit's place that is none; `said`: where the unit stands; `name`: the heading without it.
+    """
+
+    title: str = ""
+    role: str = ""
+    unit: Unit | None = None
+    unclear: str = ""
+    said: str = ""
+    headed: bool = False
+    name: str = ""
+
+
+def column_of(title: str, where: str = "") -> Column:
+    """The column under a heading: x [mm], Height (um), z, mm, x_mm, Distance / 0.1 mm, ..."""
+    shown = " ".join(title.strip().strip("\"'").split())
+    said = where or f'heading "{shown}"'
+    inside = [text.strip() for text in _BRACKETED.findall(shown)]
+    name = _BRACKETED.sub(" ", shown).strip()
+    units = [unit for text in inside if (unit := unit_of(text))]
+    odd = [text for text in inside if not unit_of(text) and not _HARMLESS.fullmatch(text)]
+    if not units:
+        name, units, more = _without_unit(name.replace("µ", "μ"))
+        odd += more
+    role = role_of(name)
+    if len({unit.metres for unit in units}) > 1:
+        units, odd = [], [", ".join(unit.text for unit in units)]
+    unit = units[0] if units else None
+    if unit is not None and unit.time and role in ("", "x", "y"):
+        role = "time"
+    unclear = "" if unit else "".join(odd[:1])
+    return Column(shown, role, unit, unclear, said, headed=True, name=name)
+
+
+def _without_unit(plain: str) -> tuple[str, list[Unit], list[str]]:
+    """A heading without brackets, parted into name and unit, and what stands in the unit's place and is none."""
+    for match in (_JOINED.match(plain), _CAMEL.match(plain)):
+        if match and (unit := unit_of(match[2])):
+            return match[1], [unit], []
+    odd: list[str] = []
+    for mark in _PARTED.finditer(plain):
+        name, tail = plain[: mark.start()], plain[mark.end() :]
+        unit, sign = unit_of(tail), mark[0].strip()
+        if not name:
+            continue
+        # x_s and n h are names, x, s is a time; Profile 10 mm may be the tenth, in 0.1 mm is a unit.
+        if unit and (unit.metres or sign in (",", "/", ":", ";", "|")):
+            if not sign and re.match(r"\d+\s*[a-zμ]", tail):
+                return name, [], [tail]
+            return name, [unit], []
+        strange = sign in (",", "/", "|", "in") and not unit and not _HARMLESS.fullmatch(tail)
+        if strange and not odd and role_of(name) in ("x", "y", "z"):
+            odd = [tail]
+    return plain, [], odd
+
+
+@dataclass(frozen=True)
+class Stated:
+    """What the lines before the numbers state: units by role ("" for all), `missing` values, the distance `pitch` m between
+    heights; `unclear`, `unclear_pitch`: a line that states a unit or factor, or a distance, which is not understood.
+    """
+
+    units: dict[str, tuple[Unit, str]] = field(default_factory=dict)
+    missing: tuple[float, ...] = ()
+    pitch: tuple[float, str] | None = None
+    unclear: str = ""
+    unclear_pitch: str = ""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How the numbers of a text are written, in which line they begin, and what is said of their columns.
+
+    `before`: lines above the numbers; `width`: fields in a row.
+    """
+
+    form: Form
+    first: int
+    width: int
+    columns: tuple[Column, ...]
+    stated: Stated
+    before: tuple[Line, ...]
+
+    def of(self, *roles: str) -> list[int]:
+        """Columns whose headings name one of the roles."""
+        return [k for k, one in enumerate(self.columns) if one.role in roles]
+
+    @property
+    def headed(self) -> bool:
+        """Whether there are headings."""
+        return any(column.headed for column in self.columns)
+
+
+def layout_of(head: Sequence[Line], source: str, fewest: int = 3) -> Layout | None:
+    """The layout of the table in the first lines of a text; None where there are no `fewest` rows of numbers.
+
+    InputError for a form that can be read in two ways, and for headings that contradict each other.
+    """
+    rows = [line for line in head if not line.comment]
+    form = form_of(rows, head, source)
+    begin = first_row(rows, form, fewest)
+    if begin is None:
+        return None
+    first = rows[begin]
+    before = tuple(line for line in head if line.number < first.number)
+    width = len(form.fields(first.text))
+    columns, used = _headings(before, form, width)
+    if (
+        not any(one.headed for one in columns)
+        and width > 1
+        and (odd := next((one for one in before if _names_columns(one)), None))
+    ):
+        raise InputError(
+            f"{source}, line {odd.number}: {odd.text[:60]!r} may name the columns, and cannot be parted into {width} names: "
+            "separate them as the numbers are"
+        )
+    stated = _stated([line for line in before if line.number not in used], columns, width, used)
+    return Layout(form, first.number, width, columns, stated, before)
+
+
+def _splits(text: str, form: Form, width: int) -> Iterator[list[str]]:
+    """The ways to part a line into one title for each column: by the numbers' own form, else by others."""
+    own = form.fields(text)
+    if len(own) == width > 1:
+        yield own
+        return
+    for parts in (
+        own,
+        quoted(text, ","),
+        quoted(text, ";"),
+        text.split("\t"),
+        re.split(r"\s{2,}|\t", text.strip()),
+        re.findall(r"[^\s\[({<]+(?:\s*[\[({<][^\])}>]*[\])}>])?", text),
+        text.split(),
+        [part.strip('"') for part in re.findall(r'"[^"]*"|\S+', text)],
+    ):
+        named = [part.strip() for part in parts]
+        if len(named) == width + 1 and not named[-1]:
+            named.pop()
+        if len(named) == width:
+            yield named
+        # x, mm, z, mm: names and units in turn
+        elif len(named) == 2 * width and all(unit_of(part) for part in named[1::2]):
+            yield [f"{name} [{unit}]" for name, unit in zip(named[::2], named[1::2], strict=True)]
+        # R's write.table: no title over the row names
+        elif (
+            len(named) == width - 1 > 1
+            and form.fields(text)[:1] != [""]
+            and all(column_of(name).role in ("x", "y", "z") for name in named)
+        ):
+            yield ["", *named]
+
+
+def _is_units(fields: Sequence[str]) -> bool:
+    """Whether a line holds nothing but units, one or more of them, and blanks."""
+    named = [re.sub(r"^[\[({<]|[\])}>]$", "", text.strip()).strip() for text in fields]
+    known = [bool(unit_of(text)) for text in named if text not in ("", "-")]
+    return bool(known) and all(known)
+
+
+def _headings(
+    before: Sequence[Line], form: Form, width: int
+) -> tuple[tuple[Column, ...], set[int]]:
+    """The columns by the last line of titles above the numbers, and a line of units beside it; the lines that were used."""
+    columns, used = _numbered_titles(before, width) or [Column()] * width, set()
+    if columns[0].headed:
+        used = {line.number for line in before if _NUMBERED.match(line.text)}
+    units: list[tuple[Unit | None, str, str]] = []
+    for line in reversed(before) if not columns[0].headed else ():
+        for named in _splits(line.text, form, width):
+            if width > 1 and all(form.number(text) is not None for text in named if text):
+                continue
+            if not units and _is_units(named):
+                units = [
+                    (unit_of(text.strip("[](){}<> ")), text, f"line {line.number}")
+                    for text in named
+                ]
+                used.add(line.number)
+                break
+            found = [column_of(text) for text in named]
+            if _are_titles(found, line, width):
+                columns = found
+                used.add(line.number)
+                break
+        else:
+            continue
+        if columns[0].headed:
+            break
+    columns = _with_odd_tails(columns)
+    for k, (unit, text, where) in enumerate(units):
+        if unit is None:
+            continue
+        one = columns[k]
+        if one.unit is not None and one.unit.metres != unit.metres:
+            text = f"{one.unit.text} and {text}"
+            columns[k] = replace(one, unit=None, unclear=text)
+        elif one.unit is None:
+            role = "time" if unit.time and one.role in ("", "x", "y") else one.role
+            columns[k] = replace(one, unit=unit, said=where, role=role, unclear="")
+    return tuple(columns), used
+
+
+def _with_odd_tails(columns: list[Column]) -> list[Column]:
+    """The columns; a last word that titles have in common, and that is no name, may be a unit: it is unclear."""
+    plain = [one for one in columns if one.role in ("x", "y", "z") and one.unit is None]
+    tails = [re.split(r"[\s_]+", one.title)[-1] for one in plain if re.search(r"[\s_]", one.title)]
+    if len(tails) < 2 or len(set(tails)) > 1 or role_of(tails[0]) or _HARMLESS.fullmatch(tails[0]):
+        return columns
+    known = re.compile(
+        r"axis|achse|coord\w*|koord\w*|pos\w*|values?|wert|data|direction|\d+|[a-z]?\d+", re.I
+    )
+    if known.fullmatch(tails[0]):
+        return columns
+    return [
+        replace(one, unclear=tails[0]) if one in plain and not one.unclear else one
+        for one in columns
+    ]
+
+
+def _are_titles(found: Sequence[Column], line: Line, width: int) -> bool:
+    """Whether a line above the numbers can be their headings."""
+    titles = [column.name or column.title for column in found if column.role != "count"] or [""]
+    if any(
+        re.search(r"[:=]\s*[-+]?\d|\b\d+(?:[.,]\d+)?\s*[a-zμ]+$", title, re.I) for title in titles
+    ):
+        return False  # Length 12 m, Speed: 30
+    if any(NUMBER.fullmatch(title) for title in titles) and titles[0]:
+        return False  # Position;12.5
+    if _UNIT_WORD.search(line.text) and not _BRACKETED.search(line.text):
+        return False
+    if _STEP.search(line.text) or _SCALE.search(line.text) or _code_in(line.text) is not None:
+        return False  # Sampling interval 0.25 mm
+    known = [column.role for column in found if column.role in ("x", "y", "z", "time")]
+    if width == 1:
+        # A sentence is no heading of a single column.
+        return len(line.text.split()) <= 4 and (bool(known) or found[0].unit is not None)
+    if known:
+        return not line.comment or all(len(column.title.split()) <= 5 for column in found)
+    return not line.comment and any(column.title for column in found) and width <= 20
+
+
+_NUMBERED = re.compile(
+    r"^\W*(?:col(?:umn)?|spalte|colonne|field|channel|kanal)\.?\s*(\d+)\s*[:=.)-]?\s+(.+)$", re.I
+)
+
+
+def _numbered_titles(before: Sequence[Line], width: int) -> list[Column] | None:
+    """Titles in lines such as `Column 1: Distance [mm]`."""
+    found = {
+        int(match[1]): column_of(match[2])
+        for line in before
+        if (match := _NUMBERED.match(line.text))
+    }
+    least = min(found, default=1)
+    if sorted(found) == list(range(least, least + width)):
+        return [found[least + k] for k in range(width)]
+    return None
+
+
+_UNIT_WORD = re.compile(r"\b(?:units?|einheit(?:en)?|unit[ée]s?|eenheid|unidad(?:es)?)\b", re.I)
+_UNIT_TEXT = r"(?:\d[\d.,]*(?:e[-+]?\d+)?(?:\s*/\s*\d+)?\s*|10\s*\^\s*-?\d+\s*)?(?:[a-zμµ]+|''|\")(?:/[a-z\d^²]+)?"
+_IN = re.compile(
+    rf"(?P<what>[^\W\d]\w*)(?:\s+(?:is|are|given|measured|values?|data|coordinates?|sind|stored|written))*\s+in\s+\[?(?P<unit>{_UNIT_TEXT})(?!\w)",
+    re.I,
+)
+_EACH = re.compile(rf"(?P<what>[^\W\d]\w*)\s*[:=]?\s*[\[(]?(?P<unit>{_UNIT_TEXT})[\])]?$", re.I)
+_NUMERIC = r"[-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:e[-+]?\d+)?"
+_NODATA = re.compile(
+    r"\b(?P<what>no[ _-]?data(?:[ _-]?value)?|(?:missing|fill|null|undefined|invalid|dummy)(?:[ _-]?(?:value|wert|code|data|height))?s?"
+    rf"|fehlwerte?)\b\W*?(?:is|are|coded as|as)?\s*[:=]?\s*(?P<value>{_NUMERIC})(?![\w.])",
+    re.I,
+)
+_SCALE = re.compile(
+    rf"\b(?P<what>(?:[\w-]+[ _-])?(?:scale|scaling|scale[ _-]?factor|factor|multiplier|gain|faktor|skalierung))(?:\s*[\[(](?P<in>[^\])]*)[\])])?\s*[:=;\t ]\s*(?P<value>{_NUMERIC})",
+    re.I,
+)
+_STEP = re.compile(
+    r"\b(?:dx|delta[ _-]?x|x[ _-]?(?:step|spacing|increment|interval|resolution)|pitch|point[ _-]?spacing|spacing|"
+    r"(?:sampl\w*|abtast\w*|measur\w*)[ _-]?(?:interval|distance|spacing|step|abstand|pitch|increment)|increment|interval|"
+    r"schrittweite|abtastabstand|step(?:[ _-]?size)?)"
+    rf"(?:\s*[\[(](?P<before>[^\])]*)[\])])?\s*(?:=|:|;|,|\t|is|every)?\s*(?P<value>{_NUMERIC})\s*[\[(]?(?P<after>[a-zμµ'\"]+(?:/\w+)?)?",
+    re.I,
+)
+
+
+def _names_columns(line: Line) -> bool:
+    """Whether the words of a line that is no headings name two columns or more."""
+    words = re.findall(r"[^\W\d_]+", line.text)
+    roles = [role for word in words if (role := role_of(word)) in ("x", "y", "z")]
+    if re.search(r"\d[.,]\d", line.text) or len(set(roles)) < 2 or len(words) > 12:
+        return False  # the y of a matrix, or a sentence
+    if _IN.search(line.text) or _UNIT_WORD.search(line.text):
+        return roles != sorted(roles)  # x in mm, z in um: the order in which columns are taken
+    return True
+
+
+def _stated(
+    before: Sequence[Line], columns: Sequence[Column], width: int, used: set[int]
+) -> Stated:
+    """What lines state that are no headings; `used`: the lines that are."""
+    units: dict[str, tuple[Unit, str]] = {}
+    missing: list[float] = []
+    pitch: tuple[float, str] | None = None
+    unclear = unclear_pitch = ""
+    spoken = any(column.unit or column.unclear for column in columns)
+
+    def state(role: str, unit: Unit, line: Line) -> None:
+        nonlocal unclear
+        where = f"line {line.number}"
+        if role in units and units[role][0].metres != unit.metres:
+            unclear = f"lines {units[role][1].removeprefix('line ')} and {line.number}: units {units[role][0].text} and {unit.text}"
+        units[role] = unit, where
+
+    for line in before:
+        text = line.text
+        if (code := _code_in(text)) is not None:
+            missing.append(code)
+            continue
+        if match := _STEP.search(text):
+            found = unit_of(match["before"] or match["after"] or "")
+            value = float(match["value"].replace(",", "."))
+            if found is not None and found.metres:
+                pitch = value * found.metres, f"line {line.number}"
+            elif found is None:
+                unclear_pitch = unclear_pitch or f"line {line.number}: {text[:60]!r}"
+            continue
+        if match := _SCALE.search(text):
+            if float(match["value"].replace(",", ".")) != 1.0:
+                unclear = unclear or f"line {line.number}: {text[:60]!r}"
+            continue
+        if _UNIT_WORD.search(text):
+            parsed = _units_in(text, width)
+            if not parsed:
+                unclear = unclear or f"line {line.number}: {text[:60]!r}"
+            for role, unit in parsed:
+                state(role, unit, line)
+            continue
+        found_in = list(_IN.finditer(text))
+        below = bool(used) and line.number > max(used) and not found_in  # where units stand
+        if not spoken and not found_in and (below or _mentions_unit(text)):
+            unclear = unclear or f"line {line.number}: {text[:60]!r}"
+        for match in found_in:
+            one = unit_of(match["unit"])
+            role = role_of(match["what"])
+            if one is None and role in ("x", "y", "z"):
+                unclear = unclear or f"line {line.number}: {text[:60]!r}"
+            if one is None or one.metres is None or role in ("count", "time", "other"):
+                continue
+            state(role if role in ("x", "y", "z") else "", one, line)
+    return Stated(units, tuple(missing), pitch, unclear, unclear_pitch)
+
+
+def _mentions_unit(text: str) -> bool:
+    """Whether a line has a unit of length in it that could be a column's: in brackets, or a word such as mm."""
+    words = re.findall(r"[^\W\d_]+", text.replace("µ", "μ"))
+    roles = {role_of(word) for word in words} & {"x", "y", "z"}
+    if len(roles) > 1 or (words and all(unit_of(word) for word in words)):
+        return _has_unit(text)
+    if re.search(r"[:=]\s*[-+]?\d", text) or re.search(r"\d\s*(?:mm|cm|dm|[uμµ]m|m)\b", text):
+        return False  # Lane width: 3.5 m
+    return _has_unit(text)
+
+
+def _has_unit(text: str) -> bool:
+    words = re.findall(r"[^\W\d_]+", text.replace("µ", "μ").lower())
+    inside = any((unit := unit_of(part)) and unit.metres for part in _BRACKETED.findall(text))
+    return inside or any(word in _LENGTHS and len(word) > 1 and word != "in" for word in words)
+
+
+def _code_in(text: str) -> float | None:
+    """The value that a line names as no height. `Missing values: 12` counts them."""
+    match = _NODATA.search(text)
+    if match is None:
+        return None
+    value = float(match["value"].replace(",", "."))
+    counted = match["what"].lower().endswith("s") or match["what"].lower() in (
+        "missing",
+        "invalid",
+        "null",
+    )
+    return None if counted and value >= 0 and value == round(value) and value < 99 else value
+
+
+def _units_in(text: str, width: int) -> list[tuple[str, Unit]]:
+    """(role, unit) of a line that has the word unit in it; empty where it is not understood."""
+    match = _UNIT_WORD.search(text)
+    assert match is not None
+    who = re.sub(r"[^\w]+$", "", text[: match.start()].strip())
+    rest = re.sub(
+        r"^\s*(?:are|is|in|of(?= \w+ (?:is|are)))?\s*[:=;,\t]?\s*", "", text[match.end() :]
+    )
+    rest = rest.strip(" ;,\t\"'")
+    whose = role_of(re.sub(r"[_\s-]+$", "", who)) if who else ""
+    whose = whose if whose in ("x", "y", "z") else ""
+    if re.fullmatch(r"(?:.*[ _-])?lengths?", who, re.I) and (unit := unit_of(rest)):
+        return [("x", unit), ("y", unit)]
+    bare = re.sub(r"^[\[({<]|[\])}>]$", "", rest).strip()
+    if unit := unit_of(bare):
+        return [(whose, unit)]
+    if of := re.match(r"^(?:of\s+)?(\w+)\s*(?:is|are|=|:)?\s*(.+)$", rest, re.I):
+        role, unit = role_of(of[1]), unit_of(re.sub(r"[\[\](){}]", "", of[2]))
+        if role in ("x", "y", "z") and unit:
+            return [(role, unit)]
+    parts = [part.strip() for part in re.split(r"[;,\t]|\band\b|\bund\b", rest) if part.strip()]
+    found: list[tuple[str, Unit]] = []
+    plain = [unit_of(re.sub(r"[\[\](){}]", "", part)) for part in parts]
+    if all(plain):
+        same = {unit.metres for unit in plain if unit}
+        if len(same) == 1 and plain[0]:
+            return [("", plain[0])]
+        roles = {2: ("x", "z"), 3: ("x", "y", "z")}.get(len(parts), ())
+        return [
+            (role, unit)
+            for role, unit in zip(roles, plain, strict=False)
+            if unit and len(parts) == width
+        ]
+    for part in parts:
+        match = _EACH.match(part)
+        role, unit = (role_of(match["what"]), unit_of(match["unit"])) if match else ("", None)
+        if unit is None or role not in ("x", "y", "z"):
+            return []
+        found.append((role, unit))
+    return found
+
+
+def late_statement(line: Line) -> bool:
+    """Whether a comment among or below the numbers states a unit, a factor or a missing value."""
+    text = line.text
+    if _code_in(text) is not None or _UNIT_WORD.search(text):
+        return True
+    if any((unit := unit_of(match["unit"])) and unit.metres for match in _IN.finditer(text)):
+        return True
+    if (match := _SCALE.search(text)) and float(match["value"].replace(",", ".")) != 1.0:
+        return True
+    return any((unit := unit_of(inside)) and unit.metres for inside in _BRACKETED.findall(text))
+
+
+def check_late(lines: Iterable[Line], source: str) -> Iterator[Line]:
+    """The lines that are no comments. InputError for a comment that states a unit below the numbers' beginning."""
+    for line in lines:
+        if not line.comment:
+            yield line
+        elif late_statement(line):
+            raise InputError(
+                f"{source}, line {line.number}: {line.text[:60]!r} among the numbers: what it says of them must stand "
+                "above the first"
+            )
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Metres of a column's numbers, as text for the user, and whether it was assumed."""
+
+    metres: float
+    text: str
+    assumed: bool = False
+    stated: bool = False
+
+
+def scale_of(
+    role: str, column: Column, stated: Stated, given: tuple[str, str | None], source: str
+) -> Scale | None:
+    """The unit of a column: of the file, or of the key (its name and value) `given`; None where neither says.
+
+    InputError where both say and differ, for a unit that is not known, and for one that is no length.
+    """
+    key, value = given
+    what = {"x": "x", "y": "y", "z": "heights"}[role]
+    name = f"road.{key}"
+    if value is None and stated.unclear:
+        raise InputError(
+            f"{source}, {stated.unclear} is not understood, and may state units or a factor: say {name} in [road], "
+            "apply the factor, or remove the line"
+        )
+    if value is None and " and " in column.unclear:
+        raise InputError(
+            f"{source}: {what} are in {column.unclear} by the lines above the numbers: say {name}"
+        )
+    unit, said = column.unit, column.said
+    for other in (role, ""):
+        if other not in stated.units:
+            continue
+        theirs, where = stated.units[other]
+        if unit is None:
+            unit, said = theirs, where
+        elif unit.metres != theirs.metres and other == role:
+            raise InputError(
+                f"{source}: {what} are in {unit.text} by the {said}, and in {theirs.text} by {where}: which is right? "
+                "Correct the file"
+            )
+    if unit is not None and unit.metres is None:
+        other = "a time" if unit.time else "no length"
+        raise InputError(
+            f"{source}: {what} are in {unit.text} ({said}), which is {other}: a road has lengths there"
+        )
+    if unit is None:
+        if column.unclear and value is None:
+            raise InputError(
+                f'{source}: "{column.unclear}" in the {column.said} is no unit that is known: say what {what} are in, '
+                f'{name} = "mm" for example'
+            )
+        return None if value is None else Scale(UNITS[value], f"{value} (road.{key})")
+    assert unit.metres is not None
+    if value is not None and abs(UNITS[value] / unit.metres - 1) > 1e-6:
+        raise InputError(
+            f'{source}: the file says that {what} are in {unit.text} ({said}), and {name} = "{value}": take the key out, '
+            "or correct the file"
+        )
+    return Scale(unit.metres, f"{unit.text} ({said})", stated=True)
+
+
+@dataclass(frozen=True)
+class ReadAs:
+    """What was read of a file as what, for the user: quantity, the place it was in, its unit, and its gaps."""
+
+    quantity: str
+    place: str
+    unit: str
+    remark: str = ""

@@ -1,0 +1,193 @@
+"""Values that stand for a missing height, found by how they lie among the others.
+
+A code is one or two values far from all others, or a value in irregular runs with jumps on both
+sides. It is not a ladder of rounded heights, whose values are evenly spaced; not a cleat, whose runs
+are of one length; and not a clipped plateau, which the heights beside it lead up to.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tireroad.fem.errors import InputError
+
+Array = NDArray[np.float64]
+
+_FEWEST = 20  # known heights
+_SHARE = 0.3  # of the heights: a value more frequent than that is the ground
+_FAR = 0.3  # m from all other heights: no cleat, whatever the number
+_GAP = 5.0  # largest spacings between the other heights
+_JUMP = 20.0  # usual differences of neighbours
+_RUNS = 3
+_CHANCE = 8.0  # as many equal neighbours as expected
+_PIECE = 500_000  # heights that are compared at a time
+_LARGE = 1e6  # and more: 1e10, 1.70141e38, 9.96921e36
+
+
+def _usual_codes() -> Array:
+    """0, -1, nines and other repeated digits as in -9999, 99.99 or 888.8, powers of ten, and limits of integers."""
+    scaled = {"9" * count for count in range(2, 8)} | {"32767", "32768", "65535", "65536"}
+    whole = {one * count for one in "12345678" for count in range(3, 7)}
+    whole |= {"127", "128", "255", "256", "1000", "10000", "100000"}
+    found = [float(one) for one in whole]
+    found += [float(f"{one}e-{k}") for one in scaled for k in range(5) if k < len(one)]
+    return np.unique([0.0, -1.0, *found, *(-one for one in found)])
+
+
+_CODES = _usual_codes()
+
+
+def special(values: Array | np.float64) -> NDArray[np.bool_]:
+    """Which of some numbers (any shape) programs use for "none"."""
+    return np.isin(values, _CODES) | (np.abs(values) >= _LARGE)
+
+
+def codes(z: Array, metre: float) -> list[float]:
+    """Values among heights z (rows, n) in units of `metre` m, nan where missing, that mean there is none.
+
+    Neighbours are those along the second axis.
+    """
+    known = np.isfinite(z)
+    values, counts = np.unique(z[known], return_counts=True)
+    found: list[float] = []
+    while counts.sum() >= _FEWEST and len(values) > 1:
+        more = _far(values, counts, metre)
+        if not more:
+            break
+        found += more
+        kept = ~np.isin(values, more)
+        values, counts = values[kept], counts[kept]
+    if counts.sum() >= _FEWEST and len(values) > 2:
+        found += _in_runs(np.where(known & ~np.isin(z, found), z, np.nan), values, counts)
+    return sorted(found)
+
+
+def _far(values: Array, counts: NDArray[np.intp], metre: float) -> list[float]:
+    """One or two of the lowest and of the highest values that lie apart from all others."""
+    most = _SHARE * counts.sum()
+    for low, high in ((1, 0), (0, 1), (1, 1), (2, 0), (0, 2), (2, 1), (1, 2), (2, 2)):
+        rest = values[low : len(values) - high]
+        if len(rest) < 1:
+            continue
+        outer = [*range(low), *range(len(values) - high, len(values))]
+        if counts[outer].sum() > most:
+            continue
+        gaps = [rest[0] - values[k] if k < low else values[k] - rest[-1] for k in outer]
+        if all(
+            _apart(values[k], int(counts[k]), gap, rest, metre)
+            for k, gap in zip(outer, gaps, strict=True)
+        ):
+            return [float(values[k]) for k in outer]
+    return []
+
+
+def _apart(value: float, count: int, gap: float, rest: Array, metre: float) -> bool:
+    """Whether a value `gap` below or above the others (ascending) is none of them."""
+    spread = float(rest[-1] - rest[0])
+    if spread == 0:  # on an even plate
+        return (
+            bool(special(np.float64(value)))
+            and (gap * metre > _FAR or gap > 100 * max(abs(rest[0]), 1e-12) > 0)
+            and abs(value) >= 99
+        )
+    if not special(np.float64(value)):
+        return gap * metre > _FAR and gap > 3 * spread and count > 1
+    if count == 1 and abs(value) < 99:
+        return False  # a single spike is an outlier
+    spacing = float(np.diff(rest).max())
+    smallest = float(np.diff(rest).min())
+    return gap > spread or (count > 2 and gap > _GAP * spacing and gap > 4 * _GAP * smallest)
+
+
+def _in_runs(z: Array, values: Array, counts: NDArray[np.intp]) -> list[float]:
+    """Values that repeat in irregular runs, between jumps, where the other heights do not."""
+    some = (counts >= 4) & (counts <= _SHARE * counts.sum())
+    if not some.any():
+        return []
+    same = z[:, 1:] == z[:, :-1]
+    if not same.any():
+        return []
+    differ = np.abs(np.diff(z, axis=1))
+    moves = differ[np.isfinite(differ) & (differ > 0)]
+    if not moves.size:
+        return []
+    usual = float(np.median(moves))
+    pairs = np.zeros(len(values))
+    which, often = np.unique(z[:, 1:][same], return_counts=True)
+    pairs[np.searchsorted(values, which)] = often
+    found = []
+    for k in np.flatnonzero(some & (pairs >= 3)):
+        one, marked = float(values[k]), bool(special(values[k]))
+        runs, beside, inside = _runs(z, one)
+        long = runs > 1
+        if not len(beside):
+            continue
+        apart = float(np.median(np.abs(beside - one)))
+        irregular = len(inside) and np.ptp(inside) > max(1, 0.1 * inside.max())
+        total = counts.sum()
+        others = (pairs.sum() - pairs[k] + 1) / max(total - counts[k], 1)
+        expected = counts[k] * max(others, counts[k] / total)  # neighbours that are equal by chance
+        end = k in (0, len(values) - 1)
+        if end and _leads_up(values, k):
+            continue  # clipped, or a plate
+        between_jumps = apart > _JUMP * usual and long.sum() >= _RUNS and (irregular or marked)
+        by_no_chance = pairs[k] > max(_CHANCE * (expected + 0.1), 0.3 * counts[k])
+        if between_jumps or (marked and by_no_chance):
+            found.append(one)
+    return found
+
+
+def _leads_up(values: Array, k: int) -> bool:
+    """Whether the values beside the lowest or highest one are as close to it as they are to each other."""
+    steps = np.diff(values)
+    if k:
+        steps = steps[::-1]
+    return bool(steps[0] <= _GAP * np.median(steps[1:20]))
+
+
+def _runs(z: Array, one: float) -> tuple[NDArray[np.intp], Array, NDArray[np.intp]]:
+    """Lengths of the runs of a value along the rows of z, the heights beside them, and lengths of those inside."""
+    rows = np.flatnonzero((z == one).any(axis=1))
+    lengths, beside, inside = [], [], []
+    for row in z[rows]:
+        at = np.concatenate([[False], row == one, [False]])
+        change = np.diff(at.astype(np.int8))
+        begin, end = np.flatnonzero(change == 1), np.flatnonzero(change == -1)
+        lengths.append(end - begin)
+        within = (begin > 0) & (end < len(row))
+        inside.append((end - begin)[within])
+        beside += [row[begin[begin > 0] - 1], row[end[end < len(row)]]]
+    near = np.concatenate(beside)
+    return np.concatenate(lengths), near[np.isfinite(near)], np.concatenate(inside)
+
+
+def refused(found: list[float], count: int, where: str, source: str) -> InputError:
+    """The error for values that look like codes; `count` heights have them (0: not counted), the first is at `where`."""
+    shown = ", ".join(f"{code:.10g}" for code in found)
+    many = f"{count}, the first {where}" if count else where
+    return InputError(
+        f"{source}: heights of exactly {shown} ({many}) stand apart from the others: if they mean that there is none, say "
+        f"road.missing = [{shown}]; if they are heights, say road.missing = []"
+    )
+
+
+@dataclass(frozen=True)
+class CodeSearch:
+    """Searches rows of heights (m) for codes, which it names in the file's unit of `metre` m; picklable."""
+
+    source: str
+    metre: float
+
+    def __call__(self, z: Array, x: Array, y: Array) -> None:
+        """InputError for a code among z (nx, ny) m at x (nx,), y (ny,) m."""
+        most = max(_PIECE // max(len(y), 1), 2)
+        for first in range(0, len(x), most):
+            part = np.round(z[first : first + most] / self.metre, 9)  # as written
+            if found := codes(part, self.metre):
+                at = np.isin(part, found)
+                i, j = np.argwhere(at)[0]
+                where = f"at x = {x[first + i]:.6g} m, y = {y[j]:.4g} m"
+                raise refused(found, int(at.sum()), where, self.source)
