@@ -284,6 +284,7 @@ MADE = {
     *(f"{name}.csv" for name in ("stiffness", "stiffness_longitudinal", "stiffness_lateral")),
     *(f"{name}.csv" for name in ("footprint", "modes", "contact_force", "spectra", "third_octave")),
     *(f"{name}.csv" for name in ("density", "response", "receptance", "vibration", "sound")),
+    *(f"{name}.csv" for name in ("rolling_modes", "campbell")),
     "response.uff",
     *(f"{name}.xdmf" for name in ("static", "modes", "contact", "motion")),
     *(f"{name}_fields.h5" for name in ("static", "modes", "contact", "motion")),
@@ -361,11 +362,26 @@ def _read(path: Path, reader: Callable[[h5py.File], dict]) -> dict:
 
 
 def write_csv(path: Path, columns: Columns) -> None:
-    """One row of headings, then the numbers to 10 digits, separated by commas; empty where NaN."""
-    values, rows = np.column_stack(list(columns.values())), BytesIO()
-    np.savetxt(rows, values, fmt="%.10g", delimiter=",")
+    """One row of headings, then the numbers to 10 digits, separated by commas; empty where NaN.
+
+    Texts are in quotes.
+    """
+    if any(values.dtype.kind in "OU" for values in columns.values()):
+        rows = zip(*map(_written, columns.values()), strict=True)
+        body = "".join(",".join(row) + "\n" for row in rows).encode()
+    else:  # of millions of numbers
+        stream = BytesIO()
+        np.savetxt(stream, np.column_stack(list(columns.values())), fmt="%.10g", delimiter=",")
+        body = stream.getvalue().replace(b"nan", b"")
     header = ",".join(f'"{heading}"' for heading in columns) + "\n"
-    path.write_bytes(header.encode() + rows.getvalue().replace(b"nan", b""))
+    path.write_bytes(header.encode() + body)
+
+
+def _written(values: NDArray) -> list[str]:
+    """Values of a column as they stand in a CSV file."""
+    if values.dtype.kind in "OU":
+        return [f'"{value}"' for value in values]
+    return ["" if value != value else f"{value:.10g}" for value in values.tolist()]
 
 
 def _table(name: str, columns: Columns) -> dict[str, Callable[[Path], object]]:
@@ -387,11 +403,49 @@ def _parts(name: str, values: NDArray, unit: str) -> Columns:
 
 
 def modes(file: h5py.File) -> dict[str, Callable[[Path], object]]:
-    """modes.csv: number, frequency, residual; modes.xdmf: the first shapes."""
+    """modes.csv: number, name, frequency, damping, effective mass, …; modes.xdmf: the first shapes."""
     frequency = file["frequency"][()]
-    columns = {"mode": np.arange(1, len(frequency) + 1), "frequency [Hz]": frequency}
+    columns = {"mode": np.arange(1, len(frequency) + 1)} | _names(file)
+    columns["frequency [Hz]"] = frequency
+    if "damping" in file:  # not of an earlier version
+        columns["damping ratio [-]"] = file["damping"][()]
+        held = file["effective_mass"][()].T
+        columns |= {f"effective mass {axis} [kg]": held[k] for k, axis in enumerate(AXES)}
+        columns |= {f"effective inertia {axis} [kg m2]": held[3 + k] for k, axis in enumerate(AXES)}
     columns["residual [-]"] = file["residual"][()]
     return _table("modes.csv", columns) | _page(modes_page(file))
+
+
+def rotating(file: h5py.File) -> dict[str, Callable[[Path], object]]:
+    """rolling_modes.csv: name, frequency and damping of each state; campbell.csv: branches over speed."""
+    value = file["eigenvalue"][()]
+    order = np.lexsort((value.real, value.imag))
+    order = order[value.imag[order] >= 0]
+    columns = {"frequency [Hz]": value.imag / (2 * np.pi), "decay rate [1/s]": -value.real}
+    columns |= {"damping ratio [-]": -value.real / np.abs(value)}
+    every = _names(file) | columns
+    files = _table("rolling_modes.csv", {name: held[order] for name, held in every.items()})
+    if "campbell/name" not in file:
+        return files
+    group = file["campbell"]
+    lines, ratio = group["frequency"][()], group["eigenvalue"][()]
+    ratio = -ratio.real / np.abs(ratio)
+    over = {"speed [rad/s]": group["speed"][()]}
+    for k, name in enumerate(group["name"].asstr()):
+        over[f"{k + 1} {name} [Hz]"] = lines[:, k]
+        over[f"{k + 1} {name} damping ratio [-]"] = ratio[:, k]
+    return files | _table("campbell.csv", over)
+
+
+def _names(file: h5py.File) -> Columns:
+    """Columns of the names of modes or states; none of a file of an earlier version."""
+    if "name" not in file:
+        return {}
+    columns: Columns = {key: file[key].asstr()[()] for key in ("name", "motion")}
+    columns["waves around [-]"] = file["wave_number"][()]
+    columns["nodal lines along the tread [-]"] = file["nodal_lines"][()]
+    columns["share of that number of waves [-]"] = file["wave_share"][()]
+    return columns
 
 
 def static(file: h5py.File) -> dict[str, Callable[[Path], object]]:
@@ -557,6 +611,7 @@ READERS: dict[str, Callable[[h5py.File], dict[str, Callable[[Path], object]]]] =
     "static.h5": static,
     "stiffness.h5": stiffness,
     "modes.h5": modes,
+    "rotating.h5": rotating,
     "contact.h5": contact,
     "spectra.h5": spectra,
     "response.h5": response,

@@ -168,8 +168,10 @@ def _heard(results: Results, given: Given) -> list[Fact]:
 def _modes(results: Results, _: Given) -> list[Fact]:
     """The lowest undamped modes of the non-rotating tire."""
     lowest = results.array("modes.h5", "frequency")[:_MODES]
-    named = ", ".join(f"{value:.4g}" for value in lowest)
-    return [("lowest modes, undamped", f"{named} Hz")] if len(lowest) else []
+    name = results.optional("modes.h5", "name")
+    names = [""] * len(lowest) if name is None else [f"{one} " for one in name[:_MODES]]
+    told = ", ".join(f"{one}{value:.4g} Hz" for one, value in zip(names, lowest, strict=True))
+    return [("lowest modes, undamped", told)] if len(lowest) else []
 
 
 # (part of the indicator's name, largest good value, largest usable value); the first match counts.

@@ -138,7 +138,9 @@ class Results:
         return found
 
     def array(self, name: str, path: str) -> NDArray:
-        return self.dataset(name, path)[()]
+        """Numbers, or texts."""
+        found = self.dataset(name, path)
+        return found.asstr()[()] if h5py.check_string_dtype(found.dtype) else found[()]
 
     def optional(self, name: str, path: str) -> NDArray | None:
         try:
