@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.runs.report import live, surface_figures
+from tireroad.runs.report.element_surface import ElementSurface
 from tireroad.runs.report.figures import COLOURS, MUTED, canvas, encode, styled
 from tireroad.runs.report.read import Results, Section, TextTable, attributes, quantity
 from tireroad.runs.report.realism import mean_pressure
@@ -90,8 +91,9 @@ def static(results: Results) -> Section:
         results.attribute(name, "road_height"),
     )
     size = 1e3 * np.linalg.norm(moved, axis=1).max()
+    face = ElementSurface.of(points, quads, results.scene)
     section.show(
-        surface_figures.deformed(points, moved, quads, road),
+        surface_figures.deformed(face.points, face.field(moved), face.quads, road),
         f"Displacement at its true scale, {size:.3g} mm at most. Grey: as made.",
     )
     footprint(results, section)
@@ -208,9 +210,11 @@ def modes(results: Results) -> Section:
     shapes = results.dataset(name, "surface/shape")[:PICTURED]
     names = columns.get("name", columns["mode"])
     titles = [f"{n}: {f}" for n, f in zip(names, columns["frequency"], strict=True)][:PICTURED]
-    picture = surface_figures.modes(points, quads, shapes, titles)
-    normal = surface_figures.outward(points, quads)
-    turned = live.shapes(points, quads, normal, shapes, titles)
+    face = ElementSurface.of(points, quads, results.scene)
+    drawn = face.points, face.quads
+    picture = surface_figures.modes(*drawn, face.field(shapes), titles)
+    normal = surface_figures.outward(*drawn)
+    turned = live.shapes(*drawn, normal, face.field(shapes), titles)
     section.show(picture, "The lowest mode shapes, exaggerated.", turned)
     return section
 
