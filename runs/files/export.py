@@ -577,12 +577,14 @@ def sound(file: h5py.File) -> dict[str, Callable[[Path], object]]:
         ("level_a", "dB(A) re 20 uPa"),
         ("level_error", "dB"),
     ):
-        what = key.replace("level_a", "level, A-weighted,").replace(
-            "level_error", "error of the level"
-        )
+        what = {
+            "level": "sound pressure level",
+            "level_a": "A-weighted sound pressure level",
+            "level_error": "error of the sound pressure level",
+        }[key]
         for name, values in zip(names, file[f"third_octave/{key}"][()], strict=True):
             columns[f"{what} at {name} [{unit}]"] = values
-    columns["sound power [dB re 1 pW]"] = file["power"][()]
+    columns["sound power level [dB re 1 pW]"] = file["power"][()]
     files = _table("sound.csv", columns)
     held = file["signal/pressure"]
     for number, (name, signal) in enumerate(zip(names, held[()], strict=True)):
