@@ -291,13 +291,20 @@ MADE = {
 }
 """The names of all files that an export may write."""
 Columns = dict[str, NDArray]  # heading with unit -> values (n)
+Remark = Callable[[str, str], None]  # name of a file, what cannot be made of it and why
 
 
-def export(directory: Path, uff: bool = False, tir: bool = False) -> list[Path]:
+def export(
+    directory: Path,
+    uff: bool = False,
+    tir: bool = False,
+    remark: Remark = lambda name, text: None,
+) -> list[Path]:
     """Write directory/export/*.csv and *.xdmf from the existing result files; returns the paths.
 
     `uff`: also response.uff, frequency responses as Universal File 58; `tir`: also tire.tir, the tire's
-    figures in the form of MF-Tyre/MF-Swift.
+    figures in the form of MF-Tyre/MF-Swift. Of these two `remark` is told, with the file's name, what cannot be
+    made: the file, or parts of it.
 
     XDMF files refer to the HDF5 results beside `export` and copy no data: do not move that folder.
     Every CSV column names its unit. Each file is written to a temporary name and renamed. Results
@@ -313,12 +320,12 @@ def export(directory: Path, uff: bool = False, tir: bool = False) -> list[Path]:
         if (directory / name).is_file() and name not in others:
             files |= _read(directory / name, reader)
     if uff:
-        files["response.uff"] = partial(Path.write_text, data=_universal(directory, others))
+        files |= _asked("response.uff", remark, lambda: _universal(directory, others))
     if tir:
         from tireroad.runs.files.tir import written  # needs the tire, which no other export does
 
-        files["tire.tir"] = partial(
-            Path.write_text, data=written(directory, others), encoding="utf-8"
+        files |= _asked(
+            "tire.tir", remark, lambda: written(directory, others, partial(remark, "tire.tir"))
         )
     if not files:
         raise InputError(
@@ -341,6 +348,18 @@ def export(directory: Path, uff: bool = False, tir: bool = False) -> list[Path]:
     return [folder / name for name in files]
 
 
+def _asked(
+    name: str, remark: Remark, text: Callable[[], str]
+) -> dict[str, Callable[[Path], object]]:
+    """A file that was asked for, if its text can be made; otherwise `remark` is told why not."""
+    try:
+        data = text()
+    except InputError as error:
+        remark(name, str(error))
+        return {}
+    return {name: partial(Path.write_text, data=data, encoding="utf-8")}
+
+
 def _universal(directory: Path, others: Mapping[str, str]) -> str:
     name = "response.h5"
     text = ""
@@ -351,7 +370,8 @@ def _universal(directory: Path, others: Mapping[str, str]) -> str:
             text = frequency_responses(file, ways)
     if not text:
         raise InputError(
-            f"{directory} has no frequency responses: add [[force]] and [output.receptance] to the scene"
+            f"{directory} has no frequency responses: add [[force]], and [output.receptance] or "
+            "[output.transmissibility], to the scene, and run it again"
         )
     return text
 

@@ -41,6 +41,14 @@ def is_drawn(name: str) -> bool:
     return name in ("axle force z", "contact force z", POWER) or name.startswith(SOUND)
 
 
+def rank(name: str) -> tuple[int, str]:
+    """Sorts quantities as `band_levels` yields them: forces, moments, sound at microphones, its power."""
+    for place, (quantity, *_) in enumerate(_FORCES):
+        if name.startswith(f"{quantity} "):
+            return place, name
+    return len(_FORCES) + (name == POWER), name
+
+
 def band_levels(run: RunResults) -> Iterator[BandLevels]:
     """All third octaves of a run: forces and moments by component, sound at each microphone, its power."""
     if "spectra/third_octave/centre" in run:

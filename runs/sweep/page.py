@@ -32,7 +32,7 @@ from tireroad.runs.files.reader import RunResults
 from tireroad.runs.files.store import sealed
 from tireroad.runs.report.compare import legend_above, pen
 from tireroad.runs.report.figures import Drawing, canvas, drawing, encode, styled
-from tireroad.runs.report.levels import band_levels, is_drawn
+from tireroad.runs.report.levels import band_levels, is_drawn, rank
 from tireroad.runs.report.read import quantity, shown_unit
 from tireroad.runs.scene.load import with_modal
 from tireroad.runs.scene.resolved import dumps, literal
@@ -97,13 +97,15 @@ def gather(sweep: Sweep, folder: Path) -> Gathered:
     )
 
 
-def _place(key: tuple[str, str]) -> tuple[int, str, float]:
+def _place(key: tuple[str, str]) -> tuple[int, tuple[int, str], float]:
     """Sorts headline numbers before levels before errors, and both of these by quantity and band.
 
     Members may have different bands: their first appearance is in no order.
     """
     what, band = _banded(key[0])
-    return (0, "", 0.0) if band is None else (1 + what.startswith(ERROR), what, band)
+    if band is None:
+        return 0, (0, ""), 0.0
+    return 1 + what.startswith(ERROR), rank(what.removeprefix(ERROR)), band
 
 
 def _banded(name: str) -> tuple[str, float | None]:
@@ -407,7 +409,7 @@ def _differences(compared: Levels, width: float) -> str:
     figure, axes = canvas(width, 3.2)
     level, error = compared.differences()
     place = np.arange(len(compared.bands))
-    first, *others = compared.with_bands[:CURVES]
+    _, *others = compared.with_bands[:CURVES]
     for order, number in enumerate(others, start=1):
         there = np.isfinite(level[number])
         axes[0, 0].errorbar(
@@ -421,7 +423,7 @@ def _differences(compared: Levels, width: float) -> str:
             **pen(number),
         )
     axes[0, 0].axhline(0.0, color="#52606d", lw=0.8)
-    axes[0, 0].set(ylabel=f"dB of {compared.names[first]}", xlabel="third-octave band in Hz")
+    axes[0, 0].set(ylabel="difference in dB", xlabel="third-octave band in Hz")
     _ticks(axes[0, 0], [float(band.removesuffix(" Hz")) for band in compared.bands])
     legend_above(axes[0, 0], [compared.names[number] for number in others], width)
     return encode(figure)
