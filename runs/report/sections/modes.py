@@ -186,7 +186,7 @@ def _table(results: Results, file: str, value: NDArray, rising: NDArray) -> tupl
             row = {}
             rows.append((mode, row))
         row[branch] = int(q)
-    head = ("name", "motion", "waves around", "standing", "- branch", "+ branch", "apart")
+    head = ("name", "standing", "- branch", "+ branch", "apart", "waves around", "motion")
     listed, count = [], 0
     for mode, row in rows[:LISTED]:
         first = next(iter(row.values()))
@@ -195,7 +195,7 @@ def _table(results: Results, file: str, value: NDArray, rising: NDArray) -> tupl
         if {"-", "+"} <= row.keys():
             split = (value[row["+"]].imag - value[row["-"]].imag) / 2 / np.pi
             apart = quantity(float(split), "Hz")
-        listed.append((mode, motion[first], str(wave[first]), *each, apart))
+        listed.append((mode, *each, apart, str(wave[first]), motion[first]))
         count += len(row)
     return TextTable(head, listed), count
 

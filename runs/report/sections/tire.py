@@ -190,10 +190,13 @@ def modes(results: Results) -> Section:
     wanted = (("inertia_count", ""), ("rigid_modes", ""))
     section.facts += attributes(results, name, wanted)
     duct(results, section)
+    called = _named(results, name)
     columns = {
         "mode": [str(n + 1) for n in range(min(LISTED, len(frequency)))],
+        **{key: called.pop(key) for key in ("name",) if key in called},
         "frequency": [quantity(float(value), "Hz") for value in frequency[:LISTED]],
-    } | _named(results, name)
+        **called,
+    }
     rows = list(zip(*columns.values(), strict=True))
     section.table = TextTable(tuple(columns), rows)
     if "name" in columns:
@@ -224,14 +227,14 @@ def _named(results: Results, file: str) -> dict[str, list[str]]:
     name = results.optional(file, "name")
     if name is None:  # of an earlier version
         return {}
-    columns = {
-        "name": list(name[:LISTED]),
-        "motion": list(results.array(file, "motion")[:LISTED]),
-        "waves around": [str(n) for n in results.array(file, "wave_number")[:LISTED]],
-        "damping": [ratio(one) for one in results.array(file, "damping")[:LISTED]],
-    }
     carried = results.array(file, "effective_mass")[:LISTED]
-    return columns | {"effective mass at the hub": [_carried(row, carried) for row in carried]}
+    return {
+        "name": list(name[:LISTED]),
+        "damping": [ratio(one) for one in results.array(file, "damping")[:LISTED]],
+        "waves around": [str(n) for n in results.array(file, "wave_number")[:LISTED]],
+        "effective mass at the hub": [_carried(row, carried) for row in carried],
+        "motion": list(results.array(file, "motion")[:LISTED]),
+    }
 
 
 def ratio(value: float) -> str:
