@@ -224,7 +224,7 @@ class ModesStage(Computed[ModalBasis]):
         solver = AUTO if scene.modes.solver == "auto" else scene.modes.solver
         how = {
             "lanczos": f"block Lanczos, {BLOCK} vectors a block, on (A - sigma I)^-1 of each slice",
-            "slepc": "SLEPc's spectrum slicing, Krylov-Schur, options -modes_…",
+            "slepc": "SLEPc's Krylov-Schur on (A - sigma I)^-1 of each slice, options -modes_…",
         }[solver]
         rotation = scene.rotation
         shapes = f"; rotation shapes of {rotation.shape_tolerance:g} and more" if rotation else ""
