@@ -21,6 +21,7 @@ _HOMES = {
     "press": "tireroad.runs.library",
     "modes": "tireroad.runs.library",
     "roll": "tireroad.runs.library",
+    "campbell": "tireroad.runs.library",
     "drive": "tireroad.runs.library",
     "make_road": "tireroad.contact.roads.road",
     "radiate": "tireroad.greens.sound",

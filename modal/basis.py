@@ -19,7 +19,7 @@ from tireroad.fem.wheel import Axle
 from tireroad.modal.corner import Corner, meeting
 from tireroad.modal.solver.fields import between, gram, projected, strain_energies
 from tireroad.modal.solver.slicing import Modes
-from tireroad.modal.waves import Labels
+from tireroad.modal.waves import ModeNames
 
 
 @dataclass(frozen=True)
@@ -183,6 +183,20 @@ class Projection:
         """Natural frequencies of the modes, Hz; 0 for rigid ones."""
         return np.sqrt(np.maximum(self.own_squares[: self.modes], 0.0)) / (2 * np.pi)
 
+    @property
+    def effective_mass(self) -> np.ndarray:
+        """Effective mass of each mode at the hub: x, y, z in kg, then about x, y, z in kg m2, (6, m').
+
+        (int rho phi_k)^2 for modes of unit mass (Clough and Penzien): what a shaken rim feels of a mode; over
+        all modes it adds up to the tire's mass and inertia, but for what the rim holds. Of the m' modes, not of
+        the shapes that joined them; the moments are NaN where the rim's motions are not known.
+        """
+        momentum = np.full((6, self.modes), np.nan)
+        momentum[:3] = self.momentum[:, : self.modes]
+        if self.corner is not None:
+            momentum[3:] = self.corner.mass[: self.modes, 3:].T
+        return momentum**2
+
     def as_elements(self, growth: float = 1.0) -> Projection:
         """The projection with the stiffness of the finite elements, times a `growth`."""
         return replace(self, squares=growth * self.squares, rise=None, band_rise=None)
@@ -328,8 +342,8 @@ class ModalBasis:
     `frequency` (m,) Hz; `shape` kg^-1/2 of the outer face (3 s, m + k), with six more rows for a
     free rim, where k is the number of static shapes that joined the m modes (modal.rotation_shapes);
     `projection`: the small matrices on these same fields. `modes`: the fields on all unknowns, if
-    this process solved for them instead of reading a file; `labels` of an axisymmetric tire;
-    `column`: the air that joined the modes, if this process made it. The signs of eigenvectors, and
+    this process solved for them instead of reading a file; `names`: those of the modes, if
+    they were given any; `column`: the air that joined the modes, if this process made it. The signs of eigenvectors, and
     the vectors of repeated frequencies, belong to one solution: never combine parts of two bases.
     """
 
@@ -337,7 +351,7 @@ class ModalBasis:
     shape: np.ndarray
     projection: Projection
     modes: Modes | None = None
-    labels: Labels | None = None
+    names: ModeNames | None = None
     column: Column | None = None
 
     def first(self, count: int) -> ModalBasis:
@@ -348,7 +362,7 @@ class ModalBasis:
             shape=self.shape[:, :count],
             projection=self.projection.first(count),
             modes=self.modes and self.modes.first(count),
-            labels=self.labels and self.labels.first(count),
+            names=self.names and self.names.at(slice(count)),
             column=self.column,
         )
 

@@ -6,6 +6,7 @@ Omega.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,9 @@ from tireroad.modal.basis import Projection
 from tireroad.modal.damping import Damping
 from tireroad.modal.rotating import matrices, overlap, rotating
 from tireroad.modal.states import StateModes, growing
+from tireroad.modal.waves import ALONE, ModeNames
 
+CLEAR = 0.5  # least share of one wave number times the excess of one direction
 # Stiffness of a rigid motion of a free wheel over Omega^2: zero but for truncation.
 RIGID = 1e-3
 
@@ -24,7 +27,8 @@ RIGID = 1e-3
 class Campbell:
     """Eigenvalues over speed, one column per branch.
 
-    `speed` (v,) rad/s; `eigenvalue` (v, b) complex 1/s, NaN where a branch is in a nearly defective
+    `speed` (v,) rad/s; `name` (b,) of each branch where it begins, or None: branches that veer go on as each other;
+    `eigenvalue` (v, b) complex 1/s, NaN where a branch is in a nearly defective
     block or no longer oscillates; `similarity` (v, b): the share of the branch's state at the
     previous speed, 1 when nothing changes, low where branches veer; `undamped` (v, b) Hz: the
     branches of the same tire without damping, where they were followed.
@@ -34,11 +38,17 @@ class Campbell:
     eigenvalue: np.ndarray
     similarity: np.ndarray
     undamped: np.ndarray | None = None
+    name: np.ndarray | None = None
 
     @property
     def frequency(self) -> np.ndarray:
         """(v, b) Hz in the non-rotating frame."""
         return self.eigenvalue.imag / (2 * np.pi)
+
+    @property
+    def damping(self) -> np.ndarray:
+        """Damping ratios -Re s / |s| (v, b)."""
+        return -self.eigenvalue.real / np.abs(self.eigenvalue)
 
 
 def sweep(
@@ -47,15 +57,17 @@ def sweep(
     inertia: str,
     speeds: np.ndarray,
     branches: int,
+    names: Callable[[StateModes], ModeNames] | None = None,
 ) -> Campbell:
     """Follow the `branches` lowest oscillating states of the first speed through all others.
 
     A state continues in the state at the next speed that shares most of it
     (modal.rotating.overlap), one to one, so that branches cross instead of being cut and rejoined
-    by size. Not collective.
+    by size. `names` gives the states their names. Not collective.
     """
     eigenvalue = np.full((len(speeds), branches), np.nan + 0j)
     similarity = np.full((len(speeds), branches), np.nan)
+    called = None if names is None else _BranchNames(branches, names)
     before, held = None, np.zeros(0, int)
     for k, speed in enumerate(speeds):
         drag, stiffness = matrices(projection, float(speed), damping, inertia)
@@ -68,8 +80,44 @@ def sweep(
         found = held >= 0
         eigenvalue[k, : len(held)][found] = now.eigenvalue[held[found]]
         similarity[k, : len(held)] = share
+        if called is not None:
+            called.see(now, held)
         before = now
-    return Campbell(np.asarray(speeds, float), eigenvalue, similarity)
+    name = None if called is None else called.all
+    return Campbell(np.asarray(speeds, float), eigenvalue, similarity, name=name)
+
+
+class _BranchNames:
+    """The names of branches, each from the first speed at which its state is clear.
+
+    Clear is a state of one wave number that travels one way: at rest, a pair is of both. What never is clear
+    is named where it is clearest, and without a direction if it might as well be the other one's.
+    """
+
+    def __init__(self, branches: int, names: Callable[[StateModes], ModeNames]) -> None:
+        self._names = names
+        self._clearest, self._name = np.full(branches, -1.0), np.full(branches, "", dtype=object)
+
+    def see(self, now: StateModes, held: np.ndarray) -> None:
+        """Take what the states that are `held` (b,), -1 for none, are called at one speed."""
+        branch = np.flatnonzero(held >= 0)
+        if not len(branch):
+            return
+        # Those below decide which is the lowest of its kind; there may be thousands above.
+        lower = now.eigenvalue.imag <= now.eigenvalue.imag[held[branch]].max()
+        found = self._names(now.among(lower)).at(np.cumsum(lower)[held[branch]] - 1)
+        goes = np.where(found.wave > 0, np.abs(found.travel), 1.0)
+        clear = found.share * goes
+        better = (clear > self._clearest[branch]) & (self._clearest[branch] < CLEAR)
+        leans = (clear < CLEAR) & (goes < ALONE)
+        name = [one.rstrip("+-") if so else one for one, so in zip(found.name, leans, strict=True)]
+        self._name[branch[better]] = np.array(name, dtype=object)[better]
+        self._clearest[branch[better]] = clear[better]
+
+    @property
+    def all(self) -> np.ndarray:
+        """The names (b,); empty for a branch that was never seen."""
+        return self._name
 
 
 def _lowest(modes: StateModes, count: int) -> np.ndarray:

@@ -42,6 +42,13 @@ def rates(damping: Damping, projection: Projection) -> np.ndarray:
     return mass + stiffness * projection.squares
 
 
+def ratios(damping: Damping, projection: Projection) -> np.ndarray:
+    """Damping ratios zeta_k = d_k / 2 omega_k (m',) of the m' standing modes; NaN for rigid ones."""
+    circular = 2 * np.pi * projection.frequency
+    given = rates(damping, projection)[: projection.modes]
+    return np.divide(given, 2 * circular, out=np.full(len(circular), np.nan), where=circular > 0)
+
+
 def beyond(damping: Damping, projection: Projection) -> Proportional:
     """The damping of motions that the modes do not contain."""
     if isinstance(damping, StrainEnergy):

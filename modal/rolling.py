@@ -35,6 +35,14 @@ from tireroad.modal.solver import quadratic
 from tireroad.modal.solver.fields import gram
 from tireroad.modal.solver.quadratic import FullModes
 from tireroad.modal.states import StateModes
+from tireroad.modal.waves import (
+    HALF,
+    STILL,
+    WHEEL,
+    FaceWaves,
+    ModeNames,
+    air_waves,
+)
 
 _BORDER = 0.02  # relative: truncation may move a state across a limit by as much
 
@@ -191,8 +199,9 @@ class RollingModes:
     """The decoupled `states` on the fields of `basis`, for a wheel that moves as `turning` says.
 
     `full`: these are states of the full finite-element matrices, and the basis consists of their
-    own fields. `campbell`: eigenvalues over speed, where requested. `figures`: how accurately the
-    states satisfy the problem that they solve (modal.rotating.checks).
+    own fields. `campbell`: eigenvalues over speed, where requested; `names` of the states, where
+    they were given any. `figures`: how accurately the states satisfy the problem that they solve
+    (modal.rotating.checks).
     """
 
     basis: ModalBasis
@@ -200,6 +209,7 @@ class RollingModes:
     turning: Turning
     full: bool = False
     campbell: Campbell | None = None
+    names: ModeNames | None = None
     figures: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -216,6 +226,29 @@ def rolling_modes(basis: ModalBasis, turning: Turning, comm: MPI.Comm) -> Rollin
     """
     states, figures = _decoupled(basis.projection, turning, comm)
     return RollingModes(basis=basis, states=states, turning=turning, figures=figures)
+
+
+def named_states(
+    states: StateModes, shape: np.ndarray, projection: Projection, waves: FaceWaves
+) -> ModeNames:
+    """Names of the states (q,), by their fields on the outer face (modal.waves).
+
+    Or by the air, or the wheel and what carries it, where half of the kinetic energy is in them. `shape` (3 s
+    or more, m) kg^-1/2: the coordinates' fields on the face. Not collective.
+    """
+    order = np.lexsort((states.eigenvalue.real, states.eigenvalue.imag))
+    right, own = states.right[:, order], shape.shape[1]
+    fields = np.tensordot(waves.read(shape), right[:own], 1)
+    given = {int(k): STILL for k in np.flatnonzero(states.eigenvalue[order].imag == 0)}
+    beside, air = own, None
+    if projection.air is not None and len(right) > own:  # full states have none of their own
+        duct, beside = projection.air.duct, own + projection.air.count
+        pressure = duct.pressure[1:].T @ (duct.circular[:, None] * right[own:beside])
+        air = air_waves(projection.air.share(right), pressure[1::2], pressure[2::2])
+    square = np.abs(right) ** 2
+    wheel = square[beside:].sum(axis=0) >= HALF * square.sum(axis=0)
+    given |= {int(k): WHEEL for k in np.flatnonzero(wheel)}
+    return waves.named(fields, given, air).at(np.argsort(order))
 
 
 def decouple(projection: Projection, turning: Turning, comm: MPI.Comm) -> StateModes:

@@ -13,6 +13,7 @@ from tireroad.fem.model import SmallMotions
 from tireroad.fem.parameters import Limits, finite, whole
 from tireroad.fem.static.checkpoint import Journal
 from tireroad.fem.tire.material import CONSTANT, own_moduli
+from tireroad.fem.tire.mesh import NodeGrid
 from tireroad.fem.wheel import Axle, Turning
 from tireroad.modal.basis import ModalBasis, project, with_air, with_corner
 from tireroad.modal.rotation_shapes import with_rotation_shapes
@@ -20,6 +21,7 @@ from tireroad.modal.solver import undamped
 from tireroad.modal.solver.fields import strain_energies
 from tireroad.modal.solver.slicing import Modes
 from tireroad.modal.solver.symmetry import DofPositions
+from tireroad.modal.waves import RIGID, FaceWaves
 
 _COUNT, _UP_TO = Limits(least=1), Limits(least=1e-3)  # -, Hz
 _SAME = 1e-6  # relative difference of the frequencies of one mode in two solutions
@@ -134,6 +136,14 @@ def projected(
         modes=modes,
         column=air,
     )
+
+
+def named(basis: ModalBasis, lattice: NodeGrid) -> ModalBasis:
+    """The basis with the names of its modes, on a tire whose nodes are the `lattice`. Not collective."""
+    rigid = basis.modes.rigid if basis.modes is not None else int((basis.frequency == 0).sum())
+    waves = FaceWaves(lattice)
+    fields = waves.read(basis.shape[:, : len(basis.frequency)])
+    return replace(basis, names=waves.named(fields, dict.fromkeys(range(rigid), RIGID)))
 
 
 _ALIKE = 1e-9  # relative difference of equal squares, which keep their order

@@ -60,6 +60,11 @@ class StateModes:
         )
 
     @property
+    def damping(self) -> np.ndarray:
+        """Damping ratios -Re s / |s| (q,): 1 for what does not oscillate, negative for what grows."""
+        return -self.eigenvalue.real / np.maximum(np.abs(self.eigenvalue), np.finfo(float).tiny)
+
+    @property
     def every(self) -> np.ndarray:
         """All eigenvalues (q + k,) 1/s, those of the block last and with their conjugates."""
         return np.concatenate([self.eigenvalue, np.linalg.eigvals(self.block)])

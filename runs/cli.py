@@ -488,8 +488,19 @@ def _export(args: argparse.Namespace) -> None:
     directory = _results(args.directory)
     from tireroad.runs.files.export import export
 
-    for path in export(directory, uff=args.uff, tir=args.tir):
+    told: list[tuple[str, str]] = []
+    paths = export(
+        directory, uff=args.uff, tir=args.tir, remark=lambda name, text: told.append((name, text))
+    )
+    for path in paths:
         print(path)
+    made = {path.name for path in paths}
+    for name, text in told:
+        if name in made:
+            print(f"{name}: {text}", file=sys.stderr)
+    lacking = [f"no {name}: {text}" for name, text in told if name not in made]
+    if lacking:  # all else is written
+        raise InputError("; ".join(lacking))
 
 
 def _info(args: argparse.Namespace) -> None:

@@ -16,7 +16,7 @@ from __future__ import annotations
 import inspect
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property, wraps
 from typing import Any, ParamSpec, TypeVar, get_args, get_type_hints
@@ -39,6 +39,7 @@ from tireroad.contact.tread.law import TREADS, TreadLaw
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.matrices import probe
 from tireroad.fem.model import SmallMotions, TireModel
+from tireroad.fem.parallel import on_root
 from tireroad.fem.parameters import plain
 from tireroad.fem.sections.torus import Torus
 from tireroad.fem.static.footprint import Footprint
@@ -47,19 +48,25 @@ from tireroad.fem.static.state import StaticState
 from tireroad.fem.static.virtual_work import AT_REST
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import CONSTANT, Material, compound
-from tireroad.fem.wheel import Turning
+from tireroad.fem.wheel import StrainEnergy, Turning
 from tireroad.greens.coupling import Wheel, wheel_of
+from tireroad.greens.outputs import by_momentum
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.greens.responses import make_response
 from tireroad.modal.basis import ModalBasis, same_fields
-from tireroad.modal.rolling import RollingModes, rolling_modes
-from tireroad.modal.standing import standing_modes
+from tireroad.modal.campbell import Campbell, sweep
+from tireroad.modal.damping import ratios
+from tireroad.modal.rolling import RollingModes, named_states, rolling_modes
+from tireroad.modal.standing import named, standing_modes
+from tireroad.modal.states import StateModes
+from tireroad.modal.waves import FaceWaves, ModeNames
 from tireroad.runs.scene.rules import barred_from_contact
 from tireroad.runs.scene.sections.radial import RadialSection, built
 from tireroad.runs.scene.sections.torus import TorusSection
 from tireroad.runs.scene.tables.contact import DRY_ASPHALT
 from tireroad.runs.scene.tables.tire import NEAR_ROAD, TireTable
+from tireroad.runs.stages.corner import BESIDE, MOMENTS, widened
 from tireroad.runs.stages.rolling import grown
 from tireroad.runs.stages.stage import make_tire, rolling_shape
 
@@ -302,6 +309,36 @@ class Standing:
                 "roll: standing has the modes of another tire or static state: take what tireroad.modes(tire, static) returns"
             )
 
+    @cached_property
+    def names(self) -> ModeNames:
+        """Names, motions and wave numbers of the modes (modal.waves)."""
+        names = named(self.basis, self.motions.lattice).names
+        assert names is not None
+        return names
+
+    @property
+    def name(self) -> NDArray[np.object_]:
+        """Names of the modes (m,), texts such as "R2", as testers write them (modal.waves)."""
+        return self.names.name
+
+    @property
+    def wave_number(self) -> NDArray[np.int64]:
+        """Number of waves around the tire (m,) that holds most of each mode."""
+        return self.names.wave
+
+    @property
+    def damping(self) -> Array:
+        """Damping ratios (m,) by the losses of the compounds; NaN where none has any, and of rigid modes."""
+        projection = self.basis.projection
+        if projection.loss_factor is None:
+            return np.full(len(self.frequency), np.nan)
+        return ratios(StrainEnergy(), projection)
+
+    @property
+    def effective_mass(self) -> Array:
+        """Effective mass at the hub (m, 6): x, y, z in kg, then about x, y, z in kg m2."""
+        return self.basis.projection.effective_mass.T
+
 
 @typed
 def modes(
@@ -369,6 +406,32 @@ class RollingTire:
         """Eigenvalues s (q,) 1/s with Im s >= 0: frequency Im s / 2 pi, decay rate -Re s."""
         return self.states.states.eigenvalue
 
+    @property
+    def frequency(self) -> Array:
+        """Frequencies Im s / 2 pi (q,), Hz, in the frame that does not turn."""
+        return self.eigenvalue.imag / (2 * np.pi)
+
+    @property
+    def damping(self) -> Array:
+        """Damping ratios -Re s / |s| (q,)."""
+        return self.states.states.damping
+
+    @cached_property
+    def names(self) -> ModeNames:
+        """Names, motions, wave numbers and directions of travel of the states (modal.waves)."""
+        basis, waves = self.states.basis, FaceWaves(self.standing.motions.lattice)
+        return named_states(self.states.states, basis.shape, basis.projection, waves)
+
+    @property
+    def name(self) -> NDArray[np.object_]:
+        """Names of the states (q,): "R2+" travels with the rotation, "R2-" against it (modal.waves)."""
+        return self.names.name
+
+    @property
+    def wave_number(self) -> NDArray[np.int64]:
+        """Number of waves around the tire (q,) that holds most of each state."""
+        return self.names.wave
+
     @cached_property
     def wheel(self) -> Wheel:
         """The full matrices of the rotating wheel."""
@@ -393,14 +456,46 @@ class RollingTire:
         In all three directions: probes x, y, z of the first point, then of the second, and so on.
         InputError for a point beyond a bead, and without any point.
         """
+        probes = self._probes("at", spots)
+        return self.respond(probes, probes, residual)
+
+    def hub(
+        self, spots: list[tuple[float, float]], frequency: Array, residual: str = "static"
+    ) -> NDArray[np.complex128]:
+        """Force, N/N, and moment about the axle's centre, N m/N, on the held hub per force at the spots.
+
+        (f, 6, 3 k) complex at `frequency` (f,) Hz above 0: Fx, Fy, Fz, Mx, My, Mz for the forces x, y, z at each
+        of the k spots, which are those of `at`. The force is the load less the rate of the tire's momentum
+        (greens.outputs.by_momentum); the moment as in modal.corner.Corner.moments. InputError for frequencies that
+        are not above 0, and for modes with a free rim or a held road.
+        """
+        probes, projection = self._probes("hub", spots), self.standing.basis.projection
+        at = np.atleast_1d(np.asarray(frequency, float))
+        if at.ndim != 1 or not (np.isfinite(at) & (at > 0)).all():
+            raise InputError("hub: frequency must be frequencies in Hz above 0")
+        if projection.corner is None:
+            raise InputError(
+                'hub: these modes have a free rim or a held road, and no force on a held hub: take rim = "fixed", '
+                'road = "forces"'
+            )
+        count = probes.shape[0]
+        loads = sparse.hstack([probes, sparse.csr_matrix((count, BESIDE))], format="csr")
+        response = self.respond(widened(probes, MOMENTS), loads, residual)
+        force = by_momentum(response, np.tile(np.eye(3), len(spots)), at)
+        moment = response.between(slice(count, None), slice(None)).receptance(at)
+        return np.concatenate([force, moment], axis=1)
+
+    def _probes(self, what: str, spots: list[tuple[float, float]]) -> sparse.csr_matrix:
+        """Probes x, y, z (3 k, 3 s) of k points of the outer face. InputError without any point."""
         if not len(spots):
-            raise InputError("at: no point given: take (angle around, angle along section) in rad")
+            raise InputError(
+                f"{what}: no point given: take (angle around, angle along section) in rad"
+            )
         lattice = self.standing.motions.lattice
         rows = [
             probe.directed(probe.spot(lattice, *spot), axis) for spot in spots for axis in np.eye(3)
         ]
-        probes = sparse.csr_matrix(np.stack(rows))
-        return self.respond(probes, probes, residual)
+        return sparse.csr_matrix(np.stack(rows))
 
 
 @typed
@@ -412,6 +507,40 @@ def roll(standing: Standing, turning: Turning) -> RollingTire:
     standing.check()
     comm = standing.motions.body.comm
     return RollingTire(standing=standing, states=rolling_modes(standing.basis, turning, comm))
+
+
+@typed
+def campbell(
+    standing: Standing,
+    turning: Turning,
+    *,
+    speeds: Sequence[float] | None = None,
+    branches: int = 12,
+) -> Campbell:
+    """The Campbell diagram: the `branches` lowest states followed from standstill to higher speeds.
+
+    At `speeds` (v,) rad/s, ascending from 0 or more; by default 21 from 0 to the speed of `turning`, whose
+    damping and inertia hold at each. One static state and one set of modes serve all speeds. The branches of
+    the result have names, frequencies and damping ratios (modal.campbell). InputError for arguments of the
+    wrong kind or out of range. Collective.
+    """
+    if speeds is None:
+        given = np.linspace(0.0, turning.speed, 21 if turning.speed else 1)
+    else:
+        given = np.asarray(speeds, float)
+    steps = np.diff(given) > 0 if given.ndim == 1 and len(given) else np.zeros(1, bool)
+    if not (np.isfinite(given).all() and steps.all() and given[0] >= 0):
+        raise InputError("campbell: speeds must ascend from 0 rad/s or more, each given once")
+    if isinstance(branches, bool) or branches != int(branches) or branches < 1:
+        raise InputError(f"campbell: branches = {branches!r} must be a whole number, 1 or more")
+    basis, comm = standing.basis, standing.motions.body.comm
+    waves = FaceWaves(standing.motions.lattice)
+
+    def names(states: StateModes) -> ModeNames:
+        return named_states(states, basis.shape, basis.projection, waves)
+
+    asked = basis.projection, turning.damping, turning.inertia, given, int(branches), names
+    return on_root(comm, lambda: sweep(*asked))
 
 
 @dataclass(frozen=True, kw_only=True)

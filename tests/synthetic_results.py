@@ -98,6 +98,19 @@ def write_modes(path: Path, around: int, across: int, count: int) -> None:
         put(file, "residual", np.full(count, 3e-11), "-")
         put(file, "surface/points", points, "m")
         put(file, "surface/shape", shape, "kg^-1/2")
+        write_names(file, [f"R{n}" for n in waves], waves)
+        put(file, "damping", 250.0 / (2 * np.pi * frequency), "-")
+        mass = np.where((waves == 1)[:, None], [[6.0, 0.0, 0.0, 0.0, 0.001, 0.0]], 0.0)
+        put(file, "effective_mass", mass, "kg, kg m2")
+
+
+def write_names(file: h5py.File, names: list[str], waves: NDArray) -> None:
+    put(file, "name", np.array(names, dtype=h5py.string_dtype()), "-")
+    motion = ["in plane, symmetric"] * len(names)
+    put(file, "motion", np.array(motion, dtype=h5py.string_dtype()), "-")
+    put(file, "wave_number", waves, "-")
+    put(file, "wave_share", np.full(len(names), 0.9), "-")
+    put(file, "nodal_lines", np.zeros(len(names), int), "-")
 
 
 def write_rotating(path: Path, count: int, unstable: bool = False) -> None:
@@ -112,6 +125,10 @@ def write_rotating(path: Path, count: int, unstable: bool = False) -> None:
         put(file, "frequency", eigenvalue.imag / (2 * np.pi), "Hz")
         put(file, "residual", np.full(eigenvalue.size, 1e-12), "-")
         put(file, "left_residual", np.full(eigenvalue.size, 2e-12), "-")
+        waves = np.tile(np.repeat(np.arange(count) // 2, 2), 2)
+        ways = np.tile(("+", "-"), eigenvalue.size // 2)
+        write_names(file, [f"R{n}{way}" for n, way in zip(waves, ways, strict=True)], waves)
+        put(file, "damping", -eigenvalue.real / np.abs(eigenvalue), "-")
 
 
 def write_contact(path: Path, points: NDArray, steps: int) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import tireroad as tr
+from tireroad.fem.matrices import probe
 from tireroad.fem.model import SmallMotions
 from tireroad.runs.library import RollingTire, in_arguments
 
@@ -185,6 +186,102 @@ def test_a_response_has_one_of_the_known_residuals(rolling) -> None:
 def test_a_response_has_a_point(rolling) -> None:
     with pytest.raises(tr.InputError, match="at: no point given"):
         rolling.at([])
+
+
+def test_modes_and_states_say_what_they_are(rolling, tire) -> None:
+    """The tire's mass and its inertia about the axle bound the effective ones; viscous damping is that asked for."""
+    standing = rolling.standing
+    assert standing.name[:4].tolist() == ["T0", "L1", "L1", "L0"]
+    assert standing.wave_number[:4].tolist() == [0, 1, 1, 0]
+    mass = standing.effective_mass
+    assert mass.shape == (12, 6) and (mass >= 0).all()
+    body = tire.body
+    place, own = body.lattice.points(body.ids), body.nodal_mass()[::3]
+    whole = body.comm.allreduce(own.sum())
+    turned = body.comm.allreduce(own @ (place[:, 0] ** 2 + place[:, 2] ** 2))
+    every = mass.sum(axis=0)
+    assert (0.4 * whole < every[:3]).all() and (every[:3] < whole).all()
+    assert 0.4 * turned < every[4] < turned
+    assert np.isnan(standing.damping).all()  # no compound of it loses
+    oscillates = rolling.frequency > 0
+    size = 500.0 / 2 / np.abs(rolling.eigenvalue[oscillates])
+    np.testing.assert_allclose(rolling.damping[oscillates], size, rtol=0.05)
+    assert {"L1+", "L1-", "R1+", "R1-"} <= set(rolling.name)
+    free = tr.modes(tire, tr.press(tire, inflation=2e5), count=8, rim="free")
+    assert free.name[:6].tolist() == ["rigid"] * 6 and free.name[6] != "rigid"
+    assert np.isnan(free.damping).all()
+
+
+def test_a_pair_splits_as_a_turning_ring_does() -> None:
+    """Yaw, of a belt with inertia Iyy about the axle and Ixx about a diameter: +- Omega (1 - Iyy / 2 Ixx) n."""
+    tire = tr.radial("205/60 R15", segments=16, elements_arc=8)
+    modes = tr.modes(tire, tr.press(tire, inflation=2.2e5), count=12)
+    lines = tr.campbell(modes, tr.Turning(speed=20.0, damping=tr.StrainEnergy()), branches=10)
+    found = dict(zip(lines.name, lines.frequency.T, strict=True))
+    split = (found["L1+"] - found["L1-"])[-1]
+    assert split == pytest.approx(2 * 3.0, abs=0.3)  # (2 pi)^-1 20 rad/s x 0.94
+    ring = (found["R2+"] - found["R2-"])[-1]  # of an inextensible ring n - 2 n / (n^2 + 1) = 1.2
+    assert ring == pytest.approx(2 * 1.2 * 20 / (2 * np.pi), abs=0.3)
+    assert (lines.damping[:, list(lines.name).index("T0")] > 0.05).all()
+    assert lines.speed[0] == 0 and lines.speed[-1] == 20.0 and len(lines.speed) == 21
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"speeds": [10.0, 5.0]}, "speeds must ascend"),
+        ({"speeds": [-1.0, 5.0]}, "speeds must ascend"),
+        ({"speeds": []}, "speeds must ascend"),
+        ({"branches": 0}, "branches = 0 must be a whole number"),
+        ({"branches": 2.5}, "branches = 2.5 must be"),
+    ],
+)
+def test_a_campbell_diagram_refuses(rolling, given: dict, message: str) -> None:
+    with pytest.raises(tr.InputError, match=message):
+        tr.campbell(rolling.standing, tr.Turning(speed=50.0, damping=(500.0, 0.0)), **given)
+
+
+def test_the_hub_carries_a_slow_force_with_its_moment(tire) -> None:
+    """At 0 Hz force and moment about the axle's centre are those of the load at its displaced place.
+
+    On no road, whose static forces move with the tire and have moments of their own, and with the centrifugal
+    forces in the static state, too.
+    """
+    spots = [(0.0, 0.0), (0.7, 0.4)]
+    turning = tr.Turning(speed=50.0, damping=(500.0, 0.0))
+    static = tr.press(tire, inflation=2e5, turning=turning)
+    rolling = tr.roll(tr.modes(tire, static, count=12), turning)
+    found = rolling.hub(spots, np.array([1e-3, 60.0]))
+    assert found.shape == (2, 6, 6)
+    lattice = tire.lattice
+    places = [
+        sum(
+            weight * static.positions[node]
+            for node, weight in enumerate(probe.directed(probe.spot(lattice, *spot), axis)[k::3])
+            if weight
+        )
+        for spot in spots
+        for k, axis in enumerate(np.eye(3))
+    ]
+    expected = np.zeros((6, 6))
+    for column, (place, force) in enumerate(zip(places, np.tile(np.eye(3), (2, 1)), strict=True)):
+        expected[:3, column], expected[3:, column] = force, np.cross(place, force)
+    np.testing.assert_allclose(found[0], expected, atol=1e-4)
+    assert np.abs(found[1] - expected).max() > 0.1
+
+
+def test_the_hub_refuses(rolling, tire, static) -> None:
+    for frequency in (0.0, [-1.0], [np.nan], [[1.0]]):
+        with pytest.raises(tr.InputError, match="hub: frequency must be"):
+            rolling.hub([(0.0, 0.0)], frequency)
+    with pytest.raises(tr.InputError, match="hub: no point given"):
+        rolling.hub([], [10.0])
+    free = tr.roll(
+        tr.modes(tire, static, count=12, road="held"),
+        tr.Turning(speed=0.0, damping=(500.0, 0.0)),
+    )
+    with pytest.raises(tr.InputError, match="hub: these modes have a free rim or a held road"):
+        free.hub([(0.0, 0.0)], [10.0])
 
 
 def test_a_torus_is_of_a_material() -> None:

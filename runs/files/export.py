@@ -284,19 +284,27 @@ MADE = {
     *(f"{name}.csv" for name in ("stiffness", "stiffness_longitudinal", "stiffness_lateral")),
     *(f"{name}.csv" for name in ("footprint", "modes", "contact_force", "spectra", "third_octave")),
     *(f"{name}.csv" for name in ("density", "response", "receptance", "vibration", "sound")),
+    *(f"{name}.csv" for name in ("rolling_modes", "campbell")),
     "response.uff",
     *(f"{name}.xdmf" for name in ("static", "modes", "contact", "motion")),
     *(f"{name}_fields.h5" for name in ("static", "modes", "contact", "motion")),
 }
 """The names of all files that an export may write."""
 Columns = dict[str, NDArray]  # heading with unit -> values (n)
+Remark = Callable[[str, str], None]  # name of a file, what cannot be made of it and why
 
 
-def export(directory: Path, uff: bool = False, tir: bool = False) -> list[Path]:
+def export(
+    directory: Path,
+    uff: bool = False,
+    tir: bool = False,
+    remark: Remark = lambda name, text: None,
+) -> list[Path]:
     """Write directory/export/*.csv and *.xdmf from the existing result files; returns the paths.
 
     `uff`: also response.uff, frequency responses as Universal File 58; `tir`: also tire.tir, the tire's
-    figures in the form of MF-Tyre/MF-Swift.
+    figures in the form of MF-Tyre/MF-Swift. Of these two `remark` is told, with the file's name, what cannot be
+    made: the file, or parts of it.
 
     XDMF files refer to the HDF5 results beside `export` and copy no data: do not move that folder.
     Every CSV column names its unit. Each file is written to a temporary name and renamed. Results
@@ -312,12 +320,12 @@ def export(directory: Path, uff: bool = False, tir: bool = False) -> list[Path]:
         if (directory / name).is_file() and name not in others:
             files |= _read(directory / name, reader)
     if uff:
-        files["response.uff"] = partial(Path.write_text, data=_universal(directory, others))
+        files |= _asked("response.uff", remark, lambda: _universal(directory, others))
     if tir:
         from tireroad.runs.files.tir import written  # needs the tire, which no other export does
 
-        files["tire.tir"] = partial(
-            Path.write_text, data=written(directory, others), encoding="utf-8"
+        files |= _asked(
+            "tire.tir", remark, lambda: written(directory, others, partial(remark, "tire.tir"))
         )
     if not files:
         raise InputError(
@@ -340,6 +348,18 @@ def export(directory: Path, uff: bool = False, tir: bool = False) -> list[Path]:
     return [folder / name for name in files]
 
 
+def _asked(
+    name: str, remark: Remark, text: Callable[[], str]
+) -> dict[str, Callable[[Path], object]]:
+    """A file that was asked for, if its text can be made; otherwise `remark` is told why not."""
+    try:
+        data = text()
+    except InputError as error:
+        remark(name, str(error))
+        return {}
+    return {name: partial(Path.write_text, data=data, encoding="utf-8")}
+
+
 def _universal(directory: Path, others: Mapping[str, str]) -> str:
     name = "response.h5"
     text = ""
@@ -350,7 +370,8 @@ def _universal(directory: Path, others: Mapping[str, str]) -> str:
             text = frequency_responses(file, ways)
     if not text:
         raise InputError(
-            f"{directory} has no frequency responses: add [[force]] and [output.receptance] to the scene"
+            f"{directory} has no frequency responses: add [[force]], and [output.receptance] or "
+            "[output.transmissibility], to the scene, and run it again"
         )
     return text
 
@@ -361,11 +382,26 @@ def _read(path: Path, reader: Callable[[h5py.File], dict]) -> dict:
 
 
 def write_csv(path: Path, columns: Columns) -> None:
-    """One row of headings, then the numbers to 10 digits, separated by commas; empty where NaN."""
-    values, rows = np.column_stack(list(columns.values())), BytesIO()
-    np.savetxt(rows, values, fmt="%.10g", delimiter=",")
+    """One row of headings, then the numbers to 10 digits, separated by commas; empty where NaN.
+
+    Texts are in quotes.
+    """
+    if any(values.dtype.kind in "OU" for values in columns.values()):
+        rows = zip(*map(_written, columns.values()), strict=True)
+        body = "".join(",".join(row) + "\n" for row in rows).encode()
+    else:  # of millions of numbers
+        stream = BytesIO()
+        np.savetxt(stream, np.column_stack(list(columns.values())), fmt="%.10g", delimiter=",")
+        body = stream.getvalue().replace(b"nan", b"")
     header = ",".join(f'"{heading}"' for heading in columns) + "\n"
-    path.write_bytes(header.encode() + rows.getvalue().replace(b"nan", b""))
+    path.write_bytes(header.encode() + body)
+
+
+def _written(values: NDArray) -> list[str]:
+    """Values of a column as they stand in a CSV file."""
+    if values.dtype.kind in "OU":
+        return [f'"{value}"' for value in values]
+    return ["" if value != value else f"{value:.10g}" for value in values.tolist()]
 
 
 def _table(name: str, columns: Columns) -> dict[str, Callable[[Path], object]]:
@@ -387,11 +423,49 @@ def _parts(name: str, values: NDArray, unit: str) -> Columns:
 
 
 def modes(file: h5py.File) -> dict[str, Callable[[Path], object]]:
-    """modes.csv: number, frequency, residual; modes.xdmf: the first shapes."""
+    """modes.csv: number, name, frequency, damping, effective mass, …; modes.xdmf: the first shapes."""
     frequency = file["frequency"][()]
-    columns = {"mode": np.arange(1, len(frequency) + 1), "frequency [Hz]": frequency}
+    columns = {"mode": np.arange(1, len(frequency) + 1)} | _names(file)
+    columns["frequency [Hz]"] = frequency
+    if "damping" in file:  # not of an earlier version
+        columns["damping ratio [-]"] = file["damping"][()]
+        held = file["effective_mass"][()].T
+        columns |= {f"effective mass {axis} [kg]": held[k] for k, axis in enumerate(AXES)}
+        columns |= {f"effective inertia {axis} [kg m2]": held[3 + k] for k, axis in enumerate(AXES)}
     columns["residual [-]"] = file["residual"][()]
     return _table("modes.csv", columns) | _page(modes_page(file))
+
+
+def rotating(file: h5py.File) -> dict[str, Callable[[Path], object]]:
+    """rolling_modes.csv: name, frequency and damping of each state; campbell.csv: branches over speed."""
+    value = file["eigenvalue"][()]
+    order = np.lexsort((value.real, value.imag))
+    order = order[value.imag[order] >= 0]
+    columns = {"frequency [Hz]": value.imag / (2 * np.pi), "decay rate [1/s]": -value.real}
+    columns |= {"damping ratio [-]": -value.real / np.abs(value)}
+    every = _names(file) | columns
+    files = _table("rolling_modes.csv", {name: held[order] for name, held in every.items()})
+    if "campbell/name" not in file:
+        return files
+    group = file["campbell"]
+    lines, ratio = group["frequency"][()], group["eigenvalue"][()]
+    ratio = -ratio.real / np.abs(ratio)
+    over = {"speed [rad/s]": group["speed"][()]}
+    for k, name in enumerate(group["name"].asstr()):
+        over[f"{k + 1} {name} [Hz]"] = lines[:, k]
+        over[f"{k + 1} {name} damping ratio [-]"] = ratio[:, k]
+    return files | _table("campbell.csv", over)
+
+
+def _names(file: h5py.File) -> Columns:
+    """Columns of the names of modes or states; none of a file of an earlier version."""
+    if "name" not in file:
+        return {}
+    columns: Columns = {key: file[key].asstr()[()] for key in ("name", "motion")}
+    columns["waves around [-]"] = file["wave_number"][()]
+    columns["nodal lines along the tread [-]"] = file["nodal_lines"][()]
+    columns["share of that number of waves [-]"] = file["wave_share"][()]
+    return columns
 
 
 def static(file: h5py.File) -> dict[str, Callable[[Path], object]]:
@@ -523,12 +597,14 @@ def sound(file: h5py.File) -> dict[str, Callable[[Path], object]]:
         ("level_a", "dB(A) re 20 uPa"),
         ("level_error", "dB"),
     ):
-        what = key.replace("level_a", "level, A-weighted,").replace(
-            "level_error", "error of the level"
-        )
+        what = {
+            "level": "sound pressure level",
+            "level_a": "A-weighted sound pressure level",
+            "level_error": "error of the sound pressure level",
+        }[key]
         for name, values in zip(names, file[f"third_octave/{key}"][()], strict=True):
             columns[f"{what} at {name} [{unit}]"] = values
-    columns["sound power [dB re 1 pW]"] = file["power"][()]
+    columns["sound power level [dB re 1 pW]"] = file["power"][()]
     files = _table("sound.csv", columns)
     held = file["signal/pressure"]
     for number, (name, signal) in enumerate(zip(names, held[()], strict=True)):
@@ -557,6 +633,7 @@ READERS: dict[str, Callable[[h5py.File], dict[str, Callable[[Path], object]]]] =
     "static.h5": static,
     "stiffness.h5": stiffness,
     "modes.h5": modes,
+    "rotating.h5": rotating,
     "contact.h5": contact,
     "spectra.h5": spectra,
     "response.h5": response,

@@ -99,7 +99,9 @@ class RunResults(Mapping[str, NDArray[Any]]):
         self._known(name)
         file, _, path = name.partition("/")
         with self._opened(file) as opened:
-            return np.asarray(opened[path][()])
+            found = opened[path]
+            texts = h5py.check_string_dtype(found.dtype) is not None
+            return np.asarray(found.asstr()[()] if texts else found[()])
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._listed())

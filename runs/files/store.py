@@ -250,8 +250,10 @@ def sealed(path: Path) -> Iterator[h5py.File]:
 
 
 def put(file: h5py.Group, name: str, array: Any, unit: str, **attributes: Any) -> h5py.Dataset:
-    """Write a dataset with its unit, creating groups as needed."""
-    dataset = file.create_dataset(name, data=np.asarray(array))
+    """Write a dataset of numbers or texts with its unit, creating groups as needed."""
+    values = np.asarray(array)
+    kind = h5py.string_dtype() if values.dtype.kind in "OU" else None
+    dataset = file.create_dataset(name, data=values, dtype=kind)
     dataset.attrs["unit"] = unit
     for key, value in attributes.items():
         dataset.attrs[key] = value

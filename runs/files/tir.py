@@ -9,7 +9,7 @@ tyre model", Vehicle System Dynamics 48 S1 (2010) 337-352.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -23,13 +23,20 @@ from tireroad.runs.scene.load import load
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.version import PROGRAM, VERSION
 
-Row = tuple[str, float, str]
+Row = tuple[str, float | str, str]
+_NEEDS_STIFFNESS = (
+    "VERTICAL_STIFFNESS, the curves of load, effective rolling radius and footprint, and the horizontal stiffnesses "
+    "are left out: add [stiffness] to the scene and run it again"
+)
 
 
-def written(directory: Path, others: Mapping[str, str]) -> str:
+def written(
+    directory: Path, others: Mapping[str, str], remark: Callable[[str], None] = lambda text: None
+) -> str:
     """The text of the file. Raises InputError without a static state. Not collective.
 
-    `others`: results in the folder that are of an earlier run.
+    `others`: results in the folder that are of an earlier run. `remark` is told what is left out because the
+    run did not compute it.
     """
     path = directory / "static.h5"
     if not path.exists() or path.name in others:
@@ -39,9 +46,19 @@ def written(directory: Path, others: Mapping[str, str]) -> str:
         static = {key: float(file.attrs[key]) for key in _STATIC if key in file.attrs}
     stiff = None if "stiffness.h5" in others else directory / "stiffness.h5"
     sections = dict(_sections(scene, static, stiff))
+    if not sections["CONTACT_PATCH"]:
+        remark(_NEEDS_STIFFNESS)
+    if not sections["VERTICAL"]:
+        remark("FNOMIN is left out: the run has no load (static.load, deflection or road_height)")
+    if all(name != "BELT_MASS" for name, *_ in sections["INERTIA"]):
+        remark("the modes and the belt are left out: the tire's inflation does not settle")
     lines = [
         "$ "
         + f"{scene.name}: computed by {PROGRAM} {VERSION}; keys that are absent were not computed",
+        "[MDI_HEADER]",
+        "FILE_TYPE                = 'tir'",
+        "FILE_VERSION             = 3.0",
+        "FILE_FORMAT              = 'ASCII'",
         "[UNITS]",
         *(f"{key:24s} = '{unit}'" for key, unit in _UNITS),
     ]
@@ -50,9 +67,14 @@ def written(directory: Path, others: Mapping[str, str]) -> str:
         if found:
             lines.append(f"[{name}]")
             lines += [
-                f"{key:24s} = {value:.8g}".ljust(48) + f" $ {text}" for key, value, text in found
+                f"{key:24s} = {_shown(value)}".ljust(48) + f" $ {text}"
+                for key, value, text in found
             ]
     return "\n".join(lines) + "\n"
+
+
+def _shown(value: float | str) -> str:
+    return f"'{value}'" if isinstance(value, str) else f"{value:.8g}"
 
 
 _STATIC = (
@@ -76,6 +98,15 @@ _UNITS = (
 def _sections(
     scene: Scene, static: dict[str, float], stiff: Path | None
 ) -> Iterator[tuple[str, list[Row]]]:
+    model: list[Row] = [
+        ("FITTYP", 61.0, "-, parameters as those of MF-Tyre/MF-Swift 6.1"),
+        ("TYRESIDE", "SYMMETRIC", "-"),
+    ]
+    if scene.rotation is not None:
+        turning = scene.rotation.speed * static.get("rolling_radius", 0.0)
+        if travels := scene.rotation.travel_speed or turning:
+            model.append(("LONGVL", travels, "m/s, travelling speed of the run"))
+    yield "MODEL", model
     mesh = scene.tire.ring().section
     radius, width = float(mesh.nodes[:, 0].max()), float(np.ptp(mesh.nodes[:, 1]))
     rim = float(mesh.nodes[np.unique(mesh.side(mesh.rim)), 0].min())
@@ -94,7 +125,7 @@ def _sections(
     )
     ring = _ring(scene)
     modes = {mode.name: mode for mode in ring.rigid_modes()} if ring else {}
-    inertia = [("MASS", static["mass"], "kg, of the tire")]
+    inertia: list[Row] = [("MASS", static["mass"], "kg, of the tire")]
     if modes:
         inertia += [
             ("BELT_MASS", modes["vertical"].inertia, "kg, that moves with the vertical mode"),

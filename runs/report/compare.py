@@ -4,37 +4,45 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from tireroad.contact.results.spectra import SILENT, nominal
+from tireroad.contact.results.spectra import in_band
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.disk import write_text
 from tireroad.runs.files.folder import UNFINISHED
 from tireroad.runs.files.reader import RunResults
-from tireroad.runs.report.figures import CYCLE, FEWEST_BANDS, WIDE, canvas, encode, envelope, styled
-from tireroad.runs.report.read import quantity
+from tireroad.runs.report.figures import (
+    CYCLE,
+    FEWEST_BANDS,
+    WIDE,
+    Drawing,
+    canvas,
+    drawing,
+    encode,
+    envelope,
+    styled,
+)
+from tireroad.runs.report.levels import BandLevels, band_levels, is_drawn
+from tireroad.runs.report.read import quantity, shown_unit
+from tireroad.runs.report.scene_keys import scene_keys
 from tireroad.runs.report.surface_figures import PRESSURE, frame
 from tireroad.runs.version import PROGRAM, VERSION
 
 Array = NDArray[np.float64]
-AXES = ("x", "y", "z")
-LEVELS = (
-    ("axle force", "spectra/third_octave/level", "dB re 1 N"),
-    ("contact force", "spectra/third_octave/contact_level", "dB re 1 N"),
-    ("moment on the hub", "spectra/third_octave/hub_moment_level", "dB re 1 N m"),
-    ("sound pressure", "sound/third_octave/level_a", "dB(A) re 20 uPa"),
-    ("sound power", "sound/power", "dB re 1 pW"),
-)
+_ROUNDING = 1e-9  # relative: a load that is given comes out so near
 MATCHED = 24  # lowest modes of the first run that are matched in the others
 
 
@@ -47,27 +55,29 @@ class Row:
     unit: str
     values: tuple[Any, ...]
 
+    @property
+    def differs(self) -> bool:
+        """Whether the runs differ in it by more than rounding."""
+        return not all(_same(self.values[0], value) for value in self.values)
+
+
+def _same(first: Any, other: Any) -> bool:
+    """Whether two values are equal, numbers but for rounding."""
+    if isinstance(first, float) and isinstance(other, int | float):
+        return math.isclose(first, other, rel_tol=_ROUNDING)
+    return first == other
+
 
 def scene_rows(scenes: Sequence[Mapping[str, Any]]) -> list[Row]:
     """The scene keys whose values differ between runs; None for an absent key."""
-    flat = [dict(_flattened(scene)) for scene in scenes]
+    flat = [{one.path: one for one in scene_keys(scene)} for scene in scenes]
     keys = sorted({key for one in flat for key in one} - {"name"})
-    rows = [Row("scene", key, "", tuple(one.get(key) for one in flat)) for key in keys]
-    return [row for row in rows if any(value != row.values[0] for value in row.values)]
-
-
-def _flattened(table: Mapping[str, Any], path: str = "") -> list[tuple[str, Any]]:
-    found: list[tuple[str, Any]] = []
-    for key, value in table.items():
-        where = f"{path}.{key}" if path else key
-        if isinstance(value, Mapping):
-            found += _flattened(value, where)
-        elif isinstance(value, list) and value and isinstance(value[0], Mapping):
-            for number, one in enumerate(value):
-                found += _flattened(one, f"{where}.{number}")
-        else:
-            found.append((where, value))
-    return found
+    rows = []
+    for key in keys:
+        unit = next(one[key].unit for one in flat if key in one)
+        values = tuple(one[key].value if key in one else None for one in flat)
+        rows.append(Row("scene", key, unit, values))
+    return [row for row in rows if row.differs]
 
 
 def figure_rows(summaries: Sequence[Mapping[str, Any]]) -> list[Row]:
@@ -98,41 +108,22 @@ def cost_rows(summaries: Sequence[Mapping[str, Any]]) -> list[Row]:
 
 
 def level_rows(runs: Sequence[RunResults]) -> list[Row]:
-    """Third-octave levels by quantity, component and band, in dB re the reference in `LEVELS`."""
-    return [
-        row
-        for quantity, path, unit in LEVELS
-        if any(path in run for run in runs)
-        for row in _bands(runs, quantity, path, unit)
-    ]
+    """Third-octave levels by quantity and band (runs.report.levels); None where a run has none."""
+    every = [{one.name: one for one in band_levels(run)} for run in runs]
+    units = {name: one.unit for found in every for name, one in found.items()}
+    return [row for name in units for row in _bands(name, units[name], every)]
 
 
-def _bands(runs: Sequence[RunResults], quantity: str, path: str, unit: str) -> list[Row]:
-    found: list[dict[tuple[int, float], float]] = []
-    for run in runs:
-        own: dict[tuple[int, float], float] = {}
-        centre = path.partition("/")[0] + "/third_octave/centre"
-        if path in run and centre in run and len(run[centre]):
-            heard_at = run[path].T if path.endswith("level_a") else run[path]
-            level = heard_at.reshape(len(run[centre]), -1)  # some have components
-            for band, parts in zip(nominal(run[centre]), level, strict=True):
-                heard = ((axis, float(v)) for axis, v in enumerate(parts) if v > SILENT)
-                own |= {(axis, float(band)): v for axis, v in heard}
-        found.append(own)
-    keys = sorted({key for own in found for key in own})
-    several = any(axis for axis, _ in keys)
-    names: Sequence[str] = AXES
-    if path.startswith("sound/") and several:
-        longest = max(runs, key=lambda run: len(run[path]) if path in run else 0)
-        names = [f"at {name}" for name in longest.attributes("sound")["microphone_names"]]
+def _bands(name: str, unit: str, every: Sequence[Mapping[str, BandLevels]]) -> list[Row]:
+    """Rows of one quantity, ascending, of the bands that any run has."""
+    levels: list[dict[float, float]] = []
+    for found in every:
+        one = found.get(name)
+        pairs = [] if one is None else zip(one.band, one.level, strict=True)
+        levels.append({float(band): float(value) for band, value in pairs if np.isfinite(value)})
     return [
-        Row(
-            f"{quantity} {names[axis]}" if several else quantity,
-            f"{band:g} Hz",
-            unit,
-            tuple(own.get((axis, band)) for own in found),
-        )
-        for axis, band in keys
+        Row(name, f"{band:g} Hz", unit, tuple(own.get(band) for own in levels))
+        for band in sorted({band for own in levels for band in own})
     ]
 
 
@@ -157,10 +148,15 @@ def mode_rows(runs: Sequence[RunResults]) -> list[Row]:
         best = mac.argmax(axis=1)
         found.append(list(run["modes/frequency"][best]))
         least = np.minimum(least, mac.max(axis=1))
+    called = reference["modes/name"] if "modes/name" in reference else [""] * len(frequency)
     return [
-        Row("modes", f"mode {k + 1}, MAC {least[k]:.2f}", "Hz", tuple(float(f[k]) for f in found))
-        for k in range(len(frequency))
+        Row("modes", f"mode {k + 1}{_called(called[k])}, MAC {least[k]:.2f}", "Hz", values)
+        for k, values in enumerate(zip(*([float(f) for f in one] for one in found), strict=True))
     ]
+
+
+def _called(name: str) -> str:
+    return f" {name}" if name else ""
 
 
 def assurance(first: Array, second: Array) -> Array:
@@ -179,41 +175,49 @@ def pen(number: int) -> dict[str, str]:
 
 
 @styled
-def levels_figure(rows: Sequence[Row], names: Sequence[str]) -> str:
+def levels_figure(rows: Sequence[Row], names: Sequence[str], width: float) -> str:
     """Third octaves of every run, and below them the difference from the first, dB."""
     values = np.array([[np.nan if v is None else v for v in row.values] for row in rows])
-    figure, axes = canvas(WIDE, 5.0, 2, sharex=True, gridspec_kw={"height_ratios": (2, 1)})
+    figure, axes = canvas(width, 5.0, 2, sharex=True, gridspec_kw={"height_ratios": (2, 1)})
     place = np.arange(len(rows))
     for number, name in enumerate(names):
         axes[0, 0].plot(place, values[:, number], marker="o", ms=3, label=name, **pen(number))
         if number:
             change = values[:, number] - values[:, 0]
             axes[1, 0].plot(place, change, marker="o", ms=3, **pen(number))
-    axes[0, 0].set_ylabel(rows[0].unit)
-    axes[0, 0].legend(ncols=2, loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize=8)
+    axes[0, 0].set_ylabel(shown_unit(rows[0].unit))
+    legend_above(axes[0, 0], names, width)
     axes[1, 0].axhline(0.0, color="#7b8794", lw=0.8)
-    axes[1, 0].set(ylabel=f"less {names[0]}, dB", xlabel="third-octave band")
-    axes[1, 0].set_xticks(place, [row.name for row in rows], rotation=45)
+    axes[1, 0].set(ylabel=f"less {names[0]}, dB", xlabel="third-octave band in Hz")
+    bands = [row.name.removesuffix(" Hz") for row in rows]
+    axes[1, 0].set_xticks(place, bands, rotation=45)
     return encode(figure)
 
 
+def legend_above(axes: Axes, names: Sequence[str], width: float) -> None:
+    """A legend above the axes, in as many columns as its names leave room for."""
+    longest = max(map(len, names)) + 4
+    columns = int(np.clip(14 * width / longest, 1, 4))
+    axes.legend(ncols=columns, loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize=8)
+
+
 @styled
-def histories_figure(runs: Mapping[str, tuple[Array, Array]]) -> str:
+def histories_figure(runs: Mapping[str, tuple[Array, Array]], width: float) -> str:
     """Forces (nt,) N over time (nt,) s."""
-    figure, axes = canvas(WIDE, 3.0)
+    figure, axes = canvas(width, 3.0)
     for number, (name, (time, force)) in enumerate(runs.items()):
         axes[0, 0].plot(*envelope(time, force), lw=0.9, label=name, **pen(number))
     axes[0, 0].set(xlabel="time in s", ylabel="vertical contact force in N")
-    axes[0, 0].legend(ncols=2, loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize=8)
+    legend_above(axes[0, 0], list(runs), width)
     return encode(figure)
 
 
 @styled
-def footprints(runs: Mapping[str, tuple[Array, Array]]) -> str:
+def footprints(runs: Mapping[str, tuple[Array, Array]], width: float) -> str:
     """Pressure (c,) Pa at contact points (c, 3) m, on one colour scale."""
-    columns = min(len(runs), 3)
+    columns = min(len(runs), 3 if width >= WIDE else 2)
     rows = -(-len(runs) // columns)
-    figure, axes = canvas(WIDE, 2.6 * rows, rows, columns, sharex=True, sharey=True)
+    figure, axes = canvas(width, 2.6 * rows, rows, columns, sharex=True, sharey=True)
     top = 1e-3 * max(pressure.max() for _, pressure in runs.values())
     scale = Normalize(0.0, top)
     every = np.concatenate([points[pressure > 0, :2] for points, pressure in runs.values()])
@@ -235,12 +239,6 @@ def footprints(runs: Mapping[str, tuple[Array, Array]]) -> str:
 
 
 MOST = 12
-# Groups of levels that are drawn, and their names.
-DRAWN = {
-    "axle force z": "vertical axle force",
-    "contact force z": "vertical contact force",
-    "radiated power": "equivalent radiated power",
-}
 
 
 def compare(directories: Sequence[Path], out: Path) -> Path:
@@ -310,20 +308,43 @@ def _page(runs: Sequence[RunResults], names: Sequence[str], groups: dict[str, li
     return pages.get_template("compare.html.j2").render(
         program=f"{PROGRAM} {VERSION}",
         names=names,
-        groups=groups,
+        tables=_tables(groups),
+        scene=groups["scene"],
         figures=_figures(runs, names, groups["levels"]),
         missing=_missing(runs, names),
     )
 
 
+def _tables(groups: Mapping[str, list[Row]]) -> list[tuple[str, list[Row], list[Row]]]:
+    """Title, rows in which the runs differ, and those in which all are the same, of each table."""
+    titles = {
+        "figures": "Headline figures",
+        "modes": "Modes, matched by shape",
+        "levels": "Third octaves",
+        "cost": "Seconds a stage",
+    }
+    return [
+        (
+            title,
+            [row for row in groups[key] if row.differs],
+            [row for row in groups[key] if not row.differs],
+        )
+        for key, title in titles.items()
+        if groups[key]
+    ]
+
+
 def _change(row: Row, index: int) -> str:
     """A value's difference from the first run's: in dB for levels, in percent for other numbers."""
+    if row.name.rpartition(".")[2] == "seed":  # a number that measures nothing
+        return ""
     first, value = row.values[0], row.values[index]
     numbers = all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in (first, value))
-    if index == 0 or not numbers or first == value:
+    if index == 0 or not numbers or _same(first, value):
         return ""
     if row.unit.startswith("dB"):
-        return f"{value - first:+.1f} dB"
+        change = value - first
+        return f"{change:+.1f} dB" if abs(change) >= 0.05 else f"{change:+.1g} dB"
     if not first:
         return ""
     change = 100 * (value / first - 1)
@@ -332,27 +353,41 @@ def _change(row: Row, index: int) -> str:
 
 def _figures(
     runs: Sequence[RunResults], names: Sequence[str], levels: Sequence[Row]
-) -> list[tuple[str, str]]:
+) -> list[Drawing]:
+    """Charts of the third octaves that several runs have, of histories and of footprints."""
     found = []
-    for group, what in DRAWN.items():
+    for group in dict.fromkeys(row.group for row in levels if is_drawn(row.group)):
         rows = [row for row in levels if row.group == group]
-        if len(rows) >= FEWEST_BANDS:  # fewer are in the table
-            found.append((levels_figure(rows, names), f"Third octaves of the {what}."))
+        several = sum(any(row.values[k] is not None for row in rows) for k in range(len(runs))) > 1
+        if len(rows) >= FEWEST_BANDS and several:  # fewer are in the table
+            text = f"Third octaves: {group}."
+            found.append(drawing(partial(levels_figure, rows, names), text))
     histories = {
-        name: (run["contact/time"], run["contact/total_force"][:, 2])
+        name: _valid(run)
         for name, run in zip(names, runs, strict=True)
         if "contact/total_force" in run
     }
     if len(histories) > 1:
-        found.append((histories_figure(histories), "Vertical contact force over time."))
+        text = "Vertical contact force over time, below the limit of each run's spectra."
+        found.append(drawing(partial(histories_figure, histories), text))
     prints = {
         name: (run["static/contact/points"], run["static/contact/pressure"])
         for name, run in zip(names, runs, strict=True)
         if "static/contact/pressure" in run and (run["static/contact/pressure"] > 0).any()
     }
     if len(prints) > 1:
-        found.append((footprints(prints), "Contact pressure at rest, one scale for all."))
+        text = "Contact pressure at rest, one scale for all."
+        found.append(drawing(partial(footprints, prints), text))
     return found
+
+
+def _valid(run: RunResults) -> tuple[Array, Array]:
+    """Time (nt,) s and vertical contact force (nt,) N, as far as it is valid where a limit is known."""
+    time, force = run["contact/time"], run["contact/total_force"]
+    limit = run.attributes("spectra").get("limit") if "spectra/frequency" in run else None
+    if limit is not None and len(time) > 1:
+        force = in_band(force, float(run.attributes("contact")["step"]), float(limit))
+    return time, force[:, 2]
 
 
 def _missing(runs: Sequence[RunResults], names: Sequence[str]) -> list[str]:

@@ -4,7 +4,8 @@ Uses matplotlib's Figure objects only: no window, no global state.
 """
 
 from base64 import b64encode
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from io import BytesIO
 from typing import Any
 
@@ -70,11 +71,26 @@ STYLE = {
 }
 styled = matplotlib.rc_context(STYLE)  # decorator for every figure
 WIDE = 6.3  # inches: widest figure whose text is still readable when a phone shows it in full
+NARROW = 4.2  # inches: of the same on a phone, where pages have room for both
 RANGE_DB = 100.0  # dB: lines further below the highest one of a spectrum are not drawn
 LEAST_RANGE_DB = 20.0  # dB: on a smaller range, tiny differences between bars look large
 
 
 FEWEST_BANDS = 3  # of a chart: fewer are said in numbers
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A figure as data URIs, `wide` and `narrow` for a phone, with its caption."""
+
+    wide: str
+    narrow: str
+    caption: str
+
+
+def drawing(draw: Callable[[float], str], caption: str, wide: float = WIDE) -> Drawing:
+    """The figure that `draw` makes of a width in inches, in both widths."""
+    return Drawing(draw(wide), draw(NARROW), caption)
 
 
 def canvas(width: float, height: float, rows: int = 1, columns: int = 1, **more: Any) -> tuple:

@@ -16,17 +16,24 @@ from typing import Any
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from tireroad.contact.results.spectra import SILENT, deviation, nominal
+from tireroad.contact.results.spectra import SILENT, deviation
 from tireroad.fem.errors import InputError
 from tireroad.runs.files import folder
 from tireroad.runs.files.disk import is_as_signed, is_table_as_signed, write_text
 from tireroad.runs.report import live
-from tireroad.runs.report.read import Absent, Results, Section, bounded, digits, quantity
+from tireroad.runs.report.read import (
+    Absent,
+    Results,
+    Section,
+    about,
+    bounded,
+    digits,
+    quantity,
+)
 from tireroad.runs.report.realism import unusual
+from tireroad.runs.report.scene_keys import scene_keys
 from tireroad.runs.report.sections import forces, modes, sound, spectra, tire
 from tireroad.runs.scene.plan import STAGES
-from tireroad.runs.scene.schema import every_field, key_of, table_of
-from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.version import PROGRAM
 
 Fact = tuple[str, str]
@@ -116,60 +123,68 @@ def _of_spectra(results: Results, name: str) -> Any:
         return None
 
 
-def _levels(results: Results, _: Given) -> list[Fact]:
-    """Levels summed over the bands, the upper bound of their errors, and their frequency limit."""
+def _levels(results: Results, given: Given) -> list[Fact]:
+    """Levels of the vertical forces over all lines up to the frequency limit, and their errors."""
     end = results.attribute("spectra.h5", "limit")
-    found = [("valid up to", quantity(end, "Hz"))] if end else []
-    centre = results.array("spectra.h5", "third_octave/centre")
-    if not len(centre):
-        return found
-    first, last = nominal(centre[[0, -1]])
-    band = f"{first:g} to {last:g} Hz" if last > first else f"{first:g} Hz band"
+    found = []
     held = str(results.attribute("spectra.h5", "axle_force_is") or "")
     axle = "hub force" if held.startswith("force on the hub") else "blocked axle force"
-    for key, what in (("level", axle), ("contact_level", "contact force")):
+    upto = f", to {quantity(end, 'Hz')}" if end else ""
+    for key, what, name in (
+        ("level", axle, "force on the axle"),
+        ("contact_level", "contact force", "contact force"),
+    ):
         level = results.optional("spectra.h5", f"third_octave/{key}")
-        if level is None:
-            continue
-        fact = f"{what} z", "constant: no level"
-        if level[:, 2].max() > SILENT:
+        total = given("spectra", f"level of the vertical {name}")
+        if total is not None:
             error = results.optional("spectra.h5", f"third_octave/{key}_error")
-            text = f"{_summed(level, error)} dB re 1 N"
-            weighted = results.optional("spectra.h5", f"third_octave/{key}_a_weighted")
-            if weighted is not None:
-                text += f", {_summed(weighted, None)} dB(A)"
-            fact = f"{what} z, {band}", text
-        found.insert(-1 if end else len(found), fact)
-    return found
+            text = f"{total:.1f} dB re 1 N, error {about(_error_of(total, level, error))}"
+            weighted = given("spectra", f"A-weighted level of the vertical {name}")
+            text += f"; {weighted:.1f} dB(A) re 1 N" if weighted is not None else ""
+            found.append((f"{what} z{upto}", text.replace("-", "−")))
+        elif level is not None and level[:, 2].max(initial=-np.inf) <= SILENT:
+            found.append((f"{what} z", "constant: no level"))
+    return [*found, ("valid up to", quantity(end, "Hz"))] if end else found
 
 
-def _summed(level: np.ndarray, error: np.ndarray | None) -> str:
-    power = 10 ** (level[:, 2] / 10)
-    text = f"{10 * np.log10(max(power.sum(), 1e-300)):.1f}".replace("-", "−")
-    if error is not None and np.isfinite(error[:, 2]).all():
-        text += f" ± {(power * error[:, 2]).sum() / max(power.sum(), 1e-300):.1f}"
-    return text
+_KNOWN = 0.9  # least part of a total that lies in bands of known error
+
+
+def _error_of(total: float, level: np.ndarray | None, error: np.ndarray | None) -> float:
+    """Upper bound (dB) of the error of a vertical total, by those of the bands; NaN where too little is known."""
+    if level is None or error is None:
+        return np.nan
+    power, off = 10 ** (level[:, 2] / 10), error[:, 2]
+    known = np.isfinite(off)
+    held = power[known].sum()
+    if held < _KNOWN * 10 ** (total / 10):
+        return np.nan
+    return float((power * off)[known].sum() / held)
 
 
 def _heard(results: Results, given: Given) -> list[Fact]:
     """A-weighted levels at the microphones, in the band of the run."""
     names = results.dataset("sound.h5", "microphones").attrs["names"]
-    level, error = (results.array("sound.h5", f"total/{key}") for key in ("level_a", "level_error"))
+    level = results.array("sound.h5", "total/level_a")
+    error = results.optional("sound.h5", "total/level_a_error")
+    error = np.full_like(level, np.nan) if error is None else error
     top = float(results.array("sound.h5", "frequency")[-1])
     return [
         (
-            f"sound at {name}, to {quantity(top, 'Hz')}",
-            f"{value:.1f}" + (f" ± {about:.1f}" if np.isfinite(about) else "") + " dB(A)",
+            f"A-weighted sound pressure level at {name}, to {quantity(top, 'Hz')}",
+            f"{value:.1f} dB(A) re 20 µPa, error {about(off)}",
         )
-        for name, value, about in list(zip(names, level, error, strict=True))[:_HEARD]
+        for name, value, off in list(zip(names, level, error, strict=True))[:_HEARD]
     ]
 
 
 def _modes(results: Results, _: Given) -> list[Fact]:
     """The lowest undamped modes of the non-rotating tire."""
     lowest = results.array("modes.h5", "frequency")[:_MODES]
-    named = ", ".join(f"{value:.4g}" for value in lowest)
-    return [("lowest modes, undamped", f"{named} Hz")] if len(lowest) else []
+    name = results.optional("modes.h5", "name")
+    names = [""] * len(lowest) if name is None else [f"{one} " for one in name[:_MODES]]
+    told = ", ".join(f"{one}{value:.4g} Hz" for one, value in zip(names, lowest, strict=True))
+    return [("lowest modes, undamped", told)] if len(lowest) else []
 
 
 # (part of the indicator's name, largest good value, largest usable value); the first match counts.
@@ -424,24 +439,16 @@ def costs(stages: Mapping) -> list[dict]:
 
 def parameters(scene: Mapping) -> list[tuple[str, list[tuple[str, str]]]]:
     """The scene's tables as (title, [(key, value with unit)]), sub-tables listed separately."""
-    found: list[tuple[str, list[tuple[str, str]]]] = []
+    found: dict[tuple, list[tuple[str, str]]] = {}
+    for one in scene_keys(scene):
+        rows = found.setdefault(one.table, [])
+        rows.append((one.name.replace("_", " "), quantity(one.value, one.unit)))
+    return [(_title(table), rows) for table, rows in found.items() if table]
 
-    def visit(title: str, table: Mapping, kind: type | None) -> None:
-        known = every_field(kind) if kind else {}
-        rows: list[tuple[str, str]] = []
-        if title:
-            found.append((title, rows))
-        for name, value in table.items():
-            part = table_of(known[name]) if name in known else None
-            below, path = part.of if part else None, f"{title}.{name}" if title else name
-            if isinstance(value, dict):
-                visit(path, value, below)
-            elif isinstance(value, list) and value and isinstance(value[0], dict):
-                for number, one in enumerate(value):
-                    visit(f"{path} {number + 1}", one, below)
-            else:
-                key = key_of(known[name]) if name in known else None
-                rows.append((name.replace("_", " "), quantity(value, key.unit if key else "")))
 
-    visit("", scene, Scene)
-    return [(title, rows) for title, rows in found if rows]
+def _title(table: tuple[str | int, ...]) -> str:
+    """A table's name, such as tire.region 1."""
+    text = ""
+    for part in table:
+        text += f" {part + 1}" if isinstance(part, int) else f".{part}" if text else part
+    return text

@@ -32,7 +32,7 @@ def quantity(value: object, unit: str = "") -> str:
     if isinstance(value, (list, tuple)):
         return ", ".join(quantity(part, unit) for part in value)
     if not isinstance(value, (int, float)):
-        return f"{value} {SYMBOLS.get(unit, unit)}".rstrip()
+        return f"{value} {shown_unit(unit)}".rstrip()
     factor, symbol = _prefix(value, unit)
     return f"{digits(value / factor)} {symbol}".rstrip()
 
@@ -45,12 +45,24 @@ def bounded(value: float, error: float | None, unit: str) -> str:
     return f"{digits(value / factor)} ± {digits(float(f'{error / factor:.2g}'))} {symbol}".rstrip()
 
 
+def shown_unit(unit: str) -> str:
+    """A unit of a file as pages write it."""
+    return SYMBOLS.get(unit, unit).replace("uPa", "µPa")
+
+
+def about(error: float) -> str:
+    """An estimated error in dB with its sign, "unknown" where it is NaN; never of 0.0."""
+    if not np.isfinite(error):
+        return "unknown"
+    return f"± {error:.1f}" if error >= 0.05 else f"± {error:.1g}"
+
+
 def _prefix(value: float, unit: str) -> tuple[float, str]:
     """The unit with a prefix that suits `value`, and how many of `unit` it has."""
     for threshold, name, *factor in PREFIXES.get(unit, ()):
         if isfinite(value) and abs(value) >= threshold:
             return (factor[0] if factor else threshold), name
-    return 1.0, SYMBOLS.get(unit, unit)
+    return 1.0, shown_unit(unit)
 
 
 def digits(value: float) -> str:
@@ -138,7 +150,9 @@ class Results:
         return found
 
     def array(self, name: str, path: str) -> NDArray:
-        return self.dataset(name, path)[()]
+        """Numbers, or texts."""
+        found = self.dataset(name, path)
+        return found.asstr()[()] if h5py.check_string_dtype(found.dtype) else found[()]
 
     def optional(self, name: str, path: str) -> NDArray | None:
         try:

@@ -216,10 +216,25 @@ def outward(points: NDArray, quads: NDArray) -> NDArray:
     return normal * (np.where(side < 0, -1.0, 1.0) / np.maximum(length, 1e-300))[:, None]
 
 
+DARKEST = 0.99  # of the touching points lie below the end of the colour scale
+
+
+def darkest(values: NDArray) -> float:
+    """End of a colour scale of pressures or forces: a few points on tips of stones bear many times more."""
+    touching = values[values > 0]
+    return float(np.quantile(touching, DARKEST)) if touching.size else 1e-12
+
+
 @once
 @styled
-def footprints(points: NDArray, maps: Sequence[NDArray], titles: Sequence[str], unit: str) -> str:
-    """Maps (c) of pressure or force at contact points (c, 3) m, two per row, one colour scale."""
+def footprints(
+    points: NDArray,
+    maps: Sequence[NDArray],
+    titles: Sequence[str],
+    unit: str,
+    top: float | None = None,
+) -> str:
+    """Maps (c) of pressure or force at contact points (c, 3) m, two per row, one colour scale to `top`."""
     place = 1e3 * points[:, :2]
     touched = np.any([values > 0 for values in maps], axis=0)
     low, high = frame(place[touched] if touched.any() else place)
@@ -227,8 +242,9 @@ def footprints(points: NDArray, maps: Sequence[NDArray], titles: Sequence[str], 
     rows, panel = -(-len(maps) // columns), (WIDE - 1.6) / columns
     height = np.clip(panel * (high[1] - low[1]) / (high[0] - low[0]) + 0.8, 1.7, 4.5)
     figure, axes = canvas(WIDE, rows * height, rows, columns, sharex=True, sharey=True)
-    top = max(np.nan_to_num(values).max(initial=0.0) for values in maps)
-    scale, mesh = Normalize(0.0, max(top, 1e-12)), triangles(place)
+    largest = max(np.nan_to_num(values).max(initial=0.0) for values in maps)
+    top = max(largest, 1e-12) if top is None else top
+    scale, mesh = Normalize(0.0, top), triangles(place)
     for here, values, title in zip(axes.flat, maps, titles, strict=True):
         if mesh is not None:
             shown = np.nan_to_num(values)
@@ -241,7 +257,8 @@ def footprints(points: NDArray, maps: Sequence[NDArray], titles: Sequence[str], 
         here.label_outer()
         here.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         here.grid(visible=False)
-    figure.colorbar(ScalarMappable(scale, PRESSURE), ax=axes, label=unit, pad=0.01)
+    beyond = "max" if largest > top else "neither"
+    figure.colorbar(ScalarMappable(scale, PRESSURE), ax=axes, label=unit, pad=0.01, extend=beyond)
     return encode(figure, "png")
 
 

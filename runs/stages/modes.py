@@ -20,11 +20,11 @@ from tireroad.fem.model import SmallMotions
 from tireroad.fem.static.state import StaticState
 from tireroad.fem.wheel import Axle
 from tireroad.modal.basis import ModalBasis, Projection, same_fields
-from tireroad.modal.damping import Damping, StrainEnergy
+from tireroad.modal.damping import Damping, StrainEnergy, ratios
 from tireroad.modal.rotation_shapes import up_to
 from tireroad.modal.solver.slicing import Modes, how_many
-from tireroad.modal.standing import projected, solved, with_fields
-from tireroad.modal.waves import Labels, label
+from tireroad.modal.standing import named, projected, solved, with_fields
+from tireroad.modal.waves import ModeNames
 from tireroad.runs.files.store import put
 from tireroad.runs.process import console
 from tireroad.runs.process.mpi import on_root
@@ -58,9 +58,9 @@ _UNITS = {
 }
 
 
-def fill(file, basis: ModalBasis, points: np.ndarray) -> None:
-    """Write a basis; `points` (s, 3) m: the undeformed nodes of the outer face."""
-    m, modes, labels = len(basis.frequency), basis.modes, basis.labels
+def fill(file, basis: ModalBasis, points: np.ndarray, damping: np.ndarray) -> None:
+    """Write a basis; `points` (s, 3) m: the undeformed nodes of the outer face; `damping` ratios (m,)."""
+    m, modes, names = len(basis.frequency), basis.modes, basis.names
     put(file, "frequency", basis.frequency, "Hz")
     put(file, "residual", modes.residual, "-")
     if basis.projection.loss_factor is not None:
@@ -74,13 +74,21 @@ def fill(file, basis: ModalBasis, points: np.ndarray) -> None:
     if len(basis.shape) > face:
         put(file, "rim/translation", basis.shape[face : face + 3].T, "kg^-1/2")
         put(file, "rim/rotation", basis.shape[face + 3 :].T, "rad/(m kg^1/2)")
-    if labels is not None:
-        put(file, "wave_number", labels.wave, "-")
-        put(file, "section_mode", labels.section, "-")
-        put(file, "wave_share", labels.share, "-")
+    fill_names(file, names)
+    put(file, "damping", damping, "-")
+    put(file, "effective_mass", basis.projection.effective_mass.T, "kg, kg m2")
     fill_projection(file, basis.projection)
     file.attrs["inertia_count"] = modes.inertia_count
     file.attrs["rigid_modes"] = modes.rigid
+
+
+def fill_names(file, names: ModeNames) -> None:
+    """Write the names of modes or states, and the waves that they are named by."""
+    put(file, "name", names.name, "-")
+    put(file, "motion", names.motion, "-")
+    put(file, "wave_number", names.wave, "-")
+    put(file, "wave_share", names.share, "-")
+    put(file, "nodal_lines", names.order, "-")
 
 
 def fill_projection(file, projection: Projection) -> None:
@@ -181,7 +189,7 @@ def _size(operators: Operators, count: int) -> float:
     return 24.0 * operators.body.lattice.size * count
 
 
-_NAMED = 8  # modes of an axisymmetric tire shown by name
+_NAMED = 10  # modes shown by name
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -216,7 +224,7 @@ class ModesStage(Computed[ModalBasis]):
         solver = AUTO if scene.modes.solver == "auto" else scene.modes.solver
         how = {
             "lanczos": f"block Lanczos, {BLOCK} vectors a block, on (A - sigma I)^-1 of each slice",
-            "slepc": "SLEPc's spectrum slicing, Krylov-Schur, options -modes_…",
+            "slepc": "SLEPc's Krylov-Schur on (A - sigma I)^-1 of each slice, options -modes_…",
         }[solver]
         rotation = scene.rotation
         shapes = f"; rotation shapes of {rotation.shape_tolerance:g} and more" if rotation else ""
@@ -227,13 +235,15 @@ class ModesStage(Computed[ModalBasis]):
         )
 
     def inputs(self) -> dict:
-        """The static state and the modal table; rotation matrices only if the wheel turns."""
+        """The static state, the modal table, viscous damping; rotation matrices if the wheel turns."""
+        damping = damping_of(self.job)
         return {
             "static": self.static.key,
             "modal": asdict(self.job.scene.modes),
             "rotating": self.job.speed != 0,
             "shapes": self._shapes,
             "cavity": cavity.inputs(self.job),
+            "damping": None if isinstance(damping, StrainEnergy) else damping,
         }
 
     @property
@@ -258,16 +268,15 @@ class ModesStage(Computed[ModalBasis]):
         with record.timing("projection and rotation shapes"):
             given = air, self.job.axle, shapes_of(self.job)
             basis = projected(motions, modes, self.job.speed != 0, *given)
-            labels = _labels(motions, basis.modes.first(modes.count).vectors)
+            basis = named(basis, motions.lattice)
         _describe(record, modes, basis)
         if self._shapes:
             record.headline["rotation shapes that join them"] = (basis.projection.shapes, "-")
         record.headline["damping"] = (_damping(damping_of(self.job), basis.projection), "-")
         if air is not None:
             cavity.describe_air(record, basis.projection.air)
-        if labels is not None:
-            _say_names(basis.frequency, labels)
-        return replace(basis, labels=labels)
+        _say_names(basis)
+        return basis
 
     def end(self, key: str, product: ModalBasis) -> None:
         """Cache the fields for other members of a family. Collective."""
@@ -293,7 +302,8 @@ class ModesStage(Computed[ModalBasis]):
 
     def write(self, file, product: ModalBasis) -> None:
         """Frequencies, traces and the small matrices; not the fields on all unknowns."""
-        fill(file, product, self.static.product.points)
+        damping = ratios(damping_of(self.job), product.projection)
+        fill(file, product, self.static.product.points, damping)
 
     def read(self, file) -> ModalBasis:
         """The basis without its fields on all unknowns."""
@@ -362,21 +372,8 @@ def _damping(given: Damping, projection: Projection) -> str:
     return f"modal strain energy, loss factors {low:.3g} to {high:.3g}"
 
 
-def _say_names(frequency: np.ndarray, labels) -> None:
-    """Show the lowest modes of an axisymmetric tire by name, each pair once."""
-    named = zip(labels.wave, labels.section, frequency, strict=True)
-    first = {(n, k): f for n, k, f in reversed(list(named)) if n >= 0}
-    lowest = sorted(first.items(), key=lambda item: item[1])[:_NAMED]
-    shown = ", ".join(f"({n}, {k}) {f:.4g}" for (n, k), f in lowest)
-    console.say(f"  (wave number, section mode) in Hz: {shown}")
-
-
-def _labels(motions: SmallMotions, vectors: np.ndarray) -> Labels | None:
-    """Wave and section numbers of the modes if there is no road, else None. Collective."""
-    if motions.static.road_height is not None:
-        return None
-    body = motions.body
-    circles = body.lattice.circles(body.ids)
-    nodal = motions.operators.spread(vectors).reshape(-1, vectors.shape[1])
-    points = body.lattice.points(body.ids)
-    return label(body.comm, points, circles, body.nodal_mass(), nodal)
+def _say_names(basis: ModalBasis) -> None:
+    """Show the lowest modes by name."""
+    assert basis.names is not None
+    lowest = zip(basis.names.name[:_NAMED], basis.frequency, strict=False)
+    console.say("  " + ", ".join(f"{name} {value:.4g} Hz" for name, value in lowest))

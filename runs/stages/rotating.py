@@ -30,10 +30,12 @@ from tireroad.modal.campbell import (
     sweep,
 )
 from tireroad.modal.damping import Proportional
-from tireroad.modal.rolling import RollingModes, full_states, rolling_modes
+from tireroad.modal.rolling import RollingModes, full_states, named_states, rolling_modes
 from tireroad.modal.states import StateModes
+from tireroad.modal.waves import FaceWaves, ModeNames
 from tireroad.runs.files.store import put
 from tireroad.runs.stages import cavity, corner
+from tireroad.runs.stages.modes import fill_names
 from tireroad.runs.stages.stage import MUMPS, Computed, Job, Record, Result, Shared, turning_of
 
 _STATES = {"eigenvalue": "1/s", "right": "-", "left": "s", "residual": "-", "left_residual": "-"}
@@ -62,6 +64,10 @@ def fill(file, rolling: RollingModes) -> None:
             values = getattr(states, name)
             put(file, group + name, values[:, mask] if name in _LAST else values[mask], unit)
         put(file, f"{group}frequency", states.eigenvalue[mask].imag / (2 * np.pi), "Hz")
+    if rolling.names is not None:
+        fill_names(file, rolling.names.at(~joined))
+        put(file, "travel", rolling.names.travel[~joined], "-")
+    put(file, "damping", states.damping[~joined], "-")
     if joined.any():
         put(file, "turning/place", np.flatnonzero(joined), "-")
     for name, unit in _BLOCK.items():
@@ -170,7 +176,11 @@ class RotatingStage(Computed[RollingModes]):
             record.warnings.append(_beyond(speed, critical))
         if rolling.states.unstable:
             record.warnings.append(_growth(job, rolling, basis))
-        return replace(rolling, campbell=self._campbell(record))
+        waves = FaceWaves(job.tire.lattice)
+        given = rolling.basis.shape, rolling.basis.projection, waves
+        with record.timing("names"):
+            names = on_root(job.comm, lambda: named_states(rolling.states, *given))
+        return replace(rolling, names=names, campbell=self._campbell(record, waves))
 
     def _where(self, basis: ModalBasis, wave: np.ndarray) -> tuple[int, float]:
         """Number of waves around, and y (m) where it is largest, of coordinates (m,) of the modes."""
@@ -199,18 +209,22 @@ class RotatingStage(Computed[RollingModes]):
         record.warnings += warnings
         return found
 
-    def _campbell(self, record: Record) -> Campbell | None:
+    def _campbell(self, record: Record, waves: FaceWaves) -> Campbell | None:
         """Eigenvalue branches over speed, if the scene asks for them. Collective."""
         wanted, turning = self.job.scene.rotation.campbell, turning_of(self.job)
         if wanted is None:
             return None
         speeds = np.arange(0.0, wanted.to + wanted.step / 2, wanted.step)
-        held = replace(self.modes.product.projection, corner=None)
+        basis = self.modes.product
+        held = replace(basis.projection, corner=None)
+
+        def names(states: StateModes) -> ModeNames:
+            return named_states(states, basis.shape, held, waves)
 
         def both() -> Campbell:
-            free = sweep(held, Proportional(), turning.inertia, speeds, wanted.branches)
-            lines = sweep(held, turning.damping, turning.inertia, speeds, wanted.branches)
-            return replace(lines, undamped=free.frequency)
+            given = turning.inertia, speeds, wanted.branches
+            free = sweep(held, Proportional(), *given)
+            return replace(sweep(held, turning.damping, *given, names), undamped=free.frequency)
 
         with record.timing("campbell"):
             lines = on_root(self.job.comm, both)
@@ -333,5 +347,6 @@ def _fill(file, rolling: RollingModes) -> None:
         put(file, "campbell/frequency", lines.frequency, "Hz")
         put(file, "campbell/similarity", lines.similarity, "-")
         put(file, "campbell/undamped", lines.undamped, "Hz")
+        put(file, "campbell/name", lines.name, "-")
     file.attrs["speed"] = rolling.turning.speed
     file.attrs["first_unstable"] = states.unstable

@@ -205,9 +205,11 @@ class SoundPressure:
 
     `names` and `places` (k, 3) m; `frequency` (f,) Hz, `pressure` (k, f) Pa: complex amplitudes
     for e^{+iwt}, from a Hann window; `centre` (b,) Hz with the third-octave `level` (k, b) dB re
-    20 uPa, A-weighted `weighted` (k, b), its `error` (k, b) dB (NaN: unknown), the sound power
-    `power` (b,) dB re 1 pW and the `efficiency` (b,) of radiation; `total`, `total_weighted`,
-    `total_error` (k,) and `total_power`, its A-weighted value second, (2,): of all lines;
+    20 uPa, A-weighted `weighted` (k, b), its `error` (k, b) dB, NaN where that of the vibration is
+    unknown, and `of_elements` (k, b) dB, what of it is of the boundary elements; the sound power
+    `power` (b,) dB re 1 pW and the `efficiency` (b,) of radiation; `total`, `total_weighted` (k,) and
+    `total_power`, its A-weighted value second, (2,): of all lines; `total_error`,
+    `total_weighted_error` (k,) dB, NaN where bands of unknown error hold more than a tenth of it;
     `directivity` (b, elevations, azimuths) dB re 20 uPa at 7.5 m; `signal` (k, n) Pa at `rate` Hz;
     `solved` (g,) Hz and `weight` (g, k, s) Pa s/m3: pressure per volume velocity at each node of
     the outer face; `share` (k, b, r): of the pressure's square, from each of `REGIONS`; `shares`
@@ -223,11 +225,13 @@ class SoundPressure:
     level: np.ndarray = dataset("dB re 20 uPa", "third_octave/level")
     weighted: np.ndarray = dataset("dB(A) re 20 uPa", "third_octave/level_a")
     error: np.ndarray = dataset("dB", "third_octave/level_error")
+    of_elements: np.ndarray = dataset("dB", "third_octave/element_error")
     power: np.ndarray = dataset("dB re 1 pW")
     efficiency: np.ndarray = dataset("-")
     total: np.ndarray = dataset("dB re 20 uPa", "total/level")
     total_weighted: np.ndarray = dataset("dB(A) re 20 uPa", "total/level_a")
     total_error: np.ndarray = dataset("dB", "total/level_error")
+    total_weighted_error: np.ndarray = dataset("dB", "total/level_a_error")
     total_power: np.ndarray = dataset("dB re 1 pW", "total/power")
     directivity: np.ndarray = dataset("dB re 20 uPa at 7.5 m", "directivity/level")
     signal: np.ndarray = dataset("Pa", "signal/pressure")
@@ -419,17 +423,13 @@ def _sound(
     _, coarse = heard.bands((np.abs(heard.coarse) ** 2 / 2).T)
     _, power = heard.bands(heard.power)
     _, away = heard.bands((np.abs(heard.far) ** 2 / 2).T)
-    error = _errors(paths, centre, 10 * np.log10(coarse / band), of_vibration)
-    every = square.sum(axis=0) / HANN
+    elements = _of_elements(paths, centre, 10 * np.log10(coarse / band))
+    error = np.hypot(elements, _of_vibration(centre, *of_vibration))
+    every, every_weighted = (part.sum(axis=0) / HANN for part in (square, square * ears[:, None]))
     share, shares = _shares(heard)
     elevation, azimuth = angles()
     near = decibels(away * (FAR / PASS_BY) ** 2, PRESSURE**2)
     rate = RATE * 2 ** max(0, math.ceil(math.log2(4 * frequency[-1] / RATE)))
-    known = np.isfinite(error).all(axis=0)
-    loud = band[known]
-    # Errors of bands have one sign and the other: their squares add.
-    total_error = np.linalg.norm(loud * error.T[known], axis=0)
-    total_error /= np.maximum(loud.sum(axis=0), 1e-300)
     return {
         "names": paths.names,
         "places": paths.places,
@@ -439,12 +439,12 @@ def _sound(
         "level": decibels(band, PRESSURE**2).T,
         "weighted": decibels(weighted, PRESSURE**2).T,
         "error": error,
+        "of_elements": elements,
         "power": decibels(power, POWER),
         "total": decibels(every, PRESSURE**2),
-        "total_weighted": decibels((square * ears[:, None]).sum(axis=0) / HANN, PRESSURE**2),
-        "total_error": total_error
-        if len(centre) and known.any()
-        else np.full(len(paths.names), np.nan),
+        "total_weighted": decibels(every_weighted, PRESSURE**2),
+        "total_error": _total_error(band.T, every, error),
+        "total_weighted_error": _total_error(weighted.T, every_weighted, error),
         "total_power": decibels(
             np.array([heard.power.sum(), (heard.power * ears).sum()]) / HANN, POWER
         ),
@@ -459,23 +459,37 @@ def _sound(
     }
 
 
-def _errors(
-    paths: Paths,
-    centre: np.ndarray,
-    coarser: np.ndarray,
-    of_vibration: tuple[np.ndarray, np.ndarray],
-) -> np.ndarray:
-    """Errors (k, b) dB: of the elements, by larger ones (b, k) dB and sources inside, and of the vibration."""
+KNOWN = 0.9  # least part of a total that lies in bands of known error
+
+
+def _total_error(band: np.ndarray, every: np.ndarray, error: np.ndarray) -> np.ndarray:
+    """Error (k,) dB of the sum `every` (k,) of all lines, from those of bands (k, b), Pa2.
+
+    Errors of bands have one sign and the other: their squares add. NaN where bands of unknown error, or what
+    lies in no band, hold more than a tenth.
+    """
+    loud = np.where(np.isfinite(error), band, 0.0)
+    held = loud.sum(axis=1)
+    total = np.linalg.norm(loud * np.nan_to_num(error), axis=1) / np.maximum(held, 1e-300)
+    return np.where(held >= KNOWN * every, total, np.nan)
+
+
+def _of_elements(paths: Paths, centre: np.ndarray, coarser: np.ndarray) -> np.ndarray:
+    """Errors (k, b) dB of the boundary elements, by larger ones (b, k) dB and by sources inside."""
     elements = coarser.T / (COARSER**ORDER - 1)
     solved = paths.near.frequency[1:]
     inside = np.array([np.interp(centre, solved, one) for one in paths.error]).reshape(
         len(paths.names), -1
     )
+    return np.hypot(elements, inside)
+
+
+def _of_vibration(centre: np.ndarray, known: np.ndarray, error: np.ndarray) -> np.ndarray:
+    """Errors (b,) dB of the vibration in the bands, NaN where unknown, from those in `known` (c,) Hz."""
     moved = np.full(len(centre), np.nan)
-    for band, value in zip(*of_vibration, strict=True):
+    for band, value in zip(known, error, strict=True):
         moved[np.isclose(centre, band)] = value
-    whole = np.sqrt(elements**2 + inside**2 + np.nan_to_num(moved) ** 2)
-    return whole if not len(of_vibration[0]) else np.where(np.isnan(moved), np.nan, whole)
+    return moved
 
 
 def _signal(
@@ -547,17 +561,30 @@ def _regions(tire: SoundingTire) -> np.ndarray:
 def _describe(record: Record, found: SoundPressure) -> None:
     """Levels at the microphones with their errors, the CPX level, and the sound power."""
     for k, name in enumerate(found.names):
-        record.headline[f"level at {name}"] = (float(found.total[k]), "dB re 20 uPa")
-        record.headline[f"A-weighted level at {name}"] = (
-            float(found.total_weighted[k]),
-            "dB(A) re 20 uPa",
-        )
-        if np.isfinite(found.total_error[k]):
-            record.headline[f"error of the level at {name}"] = (float(found.total_error[k]), "dB")
+        for kind, total, error, unit in (
+            ("sound pressure level", found.total, found.total_error, "dB"),
+            (
+                "A-weighted sound pressure level",
+                found.total_weighted,
+                found.total_weighted_error,
+                "dB(A)",
+            ),
+        ):
+            record.headline[f"{kind} at {name}"] = (float(total[k]), f"{unit} re 20 uPa")
+            known = np.isfinite(error[k])
+            record.headline[f"error of the {kind} at {name}"] = (
+                (float(error[k]), "dB") if known else ("unknown", "-")
+            )
     if {"cpx front", "cpx rear"} <= set(found.names):
         both = [found.names.index(name) for name in ("cpx front", "cpx rear")]
         mean = 10 * np.log10((10 ** (found.total_weighted[both] / 10)).mean())
-        record.headline["CPX level"] = (float(mean), "dB(A) re 20 uPa")
+        record.headline["A-weighted CPX level"] = (float(mean), "dB(A) re 20 uPa")
+    if found.of_elements.size:
+        largest = float(found.of_elements.max())
+        record.indicators["largest error of a third octave by the boundary elements"] = (
+            largest,
+            "dB",
+        )
     record.headline["sound power level"] = (float(found.total_power[0]), "dB re 1 pW")
     record.headline["A-weighted sound power level"] = (float(found.total_power[1]), "dB(A) re 1 pW")
     record.headline["band"] = (f"{found.frequency[0]:.3g} to {found.frequency[-1]:.4g} Hz", "-")

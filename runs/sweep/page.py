@@ -16,22 +16,24 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from matplotlib.axes import Axes
 from numpy.typing import NDArray
 from scipy import stats
 
-from tireroad.contact.results.spectra import SILENT, nominal
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.disk import replacing, write_text
 from tireroad.runs.files.reader import RunResults
 from tireroad.runs.files.store import sealed
-from tireroad.runs.report.compare import pen
-from tireroad.runs.report.figures import canvas, encode, styled
-from tireroad.runs.report.read import quantity
+from tireroad.runs.report.compare import legend_above, pen
+from tireroad.runs.report.figures import Drawing, canvas, drawing, encode, styled
+from tireroad.runs.report.levels import band_levels, is_drawn, rank
+from tireroad.runs.report.read import quantity, shown_unit
 from tireroad.runs.scene.load import with_modal
 from tireroad.runs.scene.resolved import dumps, literal
 from tireroad.runs.scene.schema import parts
@@ -41,6 +43,7 @@ from tireroad.runs.sweep.definition import Member, Sweep
 from tireroad.runs.version import PROGRAM, VERSION
 
 Array = NDArray[np.float64]
+ERROR = "error of the "
 
 
 @dataclass(frozen=True)
@@ -94,16 +97,22 @@ def gather(sweep: Sweep, folder: Path) -> Gathered:
     )
 
 
-def _place(key: tuple[str, str]) -> tuple[int, float]:
-    """Sorts headline numbers before levels before errors, and both of these by their band.
+def _place(key: tuple[str, str]) -> tuple[int, tuple[int, str], float]:
+    """Sorts headline numbers before levels before errors, and both of these by quantity and band.
 
     Members may have different bands: their first appearance is in no order.
     """
-    what, _, band = key[0].rpartition(", ")
-    for order, kind in enumerate(("axle force ", "error of the axle force "), start=1):
-        if what.startswith(kind):
-            return order, float(band.removesuffix(" Hz"))
-    return 0, 0.0
+    what, band = _banded(key[0])
+    if band is None:
+        return 0, (0, ""), 0.0
+    return 1 + what.startswith(ERROR), rank(what.removeprefix(ERROR)), band
+
+
+def _banded(name: str) -> tuple[str, float | None]:
+    """The quantity and the band (Hz) of a third octave; None as the band of any other figure."""
+    what, _, band = name.rpartition(", ")
+    is_one = "dB" not in band and band.endswith(" Hz") and ": " not in what
+    return (what, float(band.removesuffix(" Hz"))) if is_one else (name, None)
 
 
 def _settings(sweep: Sweep, member: Member) -> dict[str, Any]:
@@ -144,18 +153,12 @@ def _figures(run: RunResults) -> dict[tuple[str, str], float]:
             value = entry.get("value")
             if isinstance(value, int | float) and not isinstance(value, bool):
                 found[f"{stage}: {name}", entry.get("unit", "-")] = float(value)
-    if "spectra/third_octave/level" in run:
-        centres = nominal(run["spectra/third_octave/centre"])
-        level = run["spectra/third_octave/level"]
-        for centre, parts in zip(centres, level, strict=True):
-            for axis, value in zip("xyz", parts, strict=True):
-                if value > SILENT:
-                    found[f"axle force {axis}, {centre:g} Hz", "dB re 1 N"] = float(value)
-        if "spectra/third_octave/level_error" in run:
-            errors = run["spectra/third_octave/level_error"]
-            for centre, parts in zip(centres, errors, strict=True):
-                for axis, value in zip("xyz", parts, strict=True):
-                    found[f"error of the axle force {axis}, {centre:g} Hz", "dB"] = float(value)
+    for one in band_levels(run):
+        for band, value, error in zip(one.band, one.level, one.error, strict=True):
+            if np.isfinite(value):
+                found[f"{one.name}, {band:g} Hz", one.unit] = float(value)
+            if np.isfinite(error):
+                found[f"{ERROR}{one.name}, {band:g} Hz", "dB"] = float(error)
     return found
 
 
@@ -197,18 +200,19 @@ def _numbers(values: Sequence[Any]) -> bool:
     return bool(given) and all(isinstance(v, int | float) for v in given)
 
 
-LEVEL, ERROR = "axle force z, ", "error of the axle force z, "
 _SURE = 0.95
 
 
 @dataclass(frozen=True)
 class Levels:
-    """Levels of groups of members that differ in seeds only.
+    """Levels of a `quantity` of groups of members that differ in seeds only.
 
-    `names`; number of `seeds` that have a level in any band; `level` (g, b) dB re 1 N and its `error` (g, b) dB at the `bands`,
-    NaN where nothing is known.
+    `names`; number of `seeds` that have a level in any band; `level` (g, b) dB in the `unit` and its `error`
+    (g, b) dB at the `bands`, NaN where nothing is known.
     """
 
+    quantity: str
+    unit: str
     names: tuple[str, ...]
     seeds: tuple[int, ...]
     bands: tuple[str, ...]
@@ -227,25 +231,25 @@ class Levels:
         return self.level - self.level[first], both
 
 
-def levels(table: Gathered) -> Levels | None:
-    """Levels of the vertical axle force; None if no member has a finite one."""
-    columns = {column.name: column.values for column in table.columns}
-    bands = tuple(
-        name.removeprefix(LEVEL) for name in columns if name.startswith(LEVEL) and "Hz" in name
-    )
-    level = np.array([columns[LEVEL + band] for band in bands]).T
+def levels(table: Gathered, quantity: str) -> Levels | None:
+    """Third octaves of a quantity (runs.report.levels); None if no member has a finite one."""
+    columns = {column.name: column for column in table.columns}
+    own = [column for name, column in columns.items() if _banded(name)[0] == quantity]
+    level = np.array([column.values for column in own]).T
     if not np.isfinite(level).any():
         return None
-    nothing = np.full(len(level), np.nan)
-    error = np.stack([columns.get(ERROR + band, nothing) for band in bands], axis=1)
+    nothing = SweepColumn("", "", np.full(len(level), np.nan))
+    error = np.stack([columns.get(ERROR + c.name, nothing).values for c in own], axis=1)
     groups = _alike(table)
     found = [_mean(level[members], error[members]) for members in groups.values()]
     return Levels(
+        quantity=quantity,
+        unit=own[0].unit,
         names=tuple(groups),
         seeds=tuple(
             int(np.isfinite(level[members]).any(axis=1).sum()) for members in groups.values()
         ),
-        bands=bands,
+        bands=tuple(f"{_banded(column.name)[1]:g} Hz" for column in own),
         level=np.array([one for one, _ in found]),
         error=np.array([off for _, off in found]),
     )
@@ -287,9 +291,13 @@ SHOWN = (
     "static: deflection",
     "static: load",
     "contact: mean load",
+    "sound: A-weighted CPX level",
+    "sound: A-weighted sound power level",
     "rotating: lowest",
     "modes: lowest",
 )
+_VARIES = 1e-6  # relative
+WIDE = 9.5  # inches
 CURVES = 12  # third-octave spectra that can be distinguished in one figure
 
 
@@ -304,7 +312,7 @@ def write_page(table: Gathered, folder: Path, title: str, failed: Sequence[str])
         title=title,
         program=f"{PROGRAM} {VERSION}",
         table=table,
-        columns=[column for column in table.columns if "Hz" not in column.name],
+        columns=[column for column in table.columns if _banded(column.name)[1] is None],
         figures=_page_figures(table),
         failed=failed,
     )
@@ -317,58 +325,91 @@ def _setting(value: object) -> str:
     return "–" if value is None else value if isinstance(value, str) else literal(value)
 
 
-def _page_figures(table: Gathered) -> list[tuple[str, str]]:
+def _page_figures(table: Gathered) -> list[Drawing]:
     axes = numeric(table.settings)
     found = []
-    bands = [c for c in table.columns if c.name.startswith("axle force z")]
-    if bands:
-        text = "Third octaves of the vertical axle force."
-        if len(table.names) > CURVES:
-            text += f" The first {CURVES} of {len(table.names)} members."
-        found.append((_spectra(bands, table.names), text))
-    compared = levels(table)
-    if compared is not None and len(compared.with_bands) > 1:
-        found.append((_differences(compared), _about(compared)))
+    quantities = dict.fromkeys(_banded(column.name)[0] for column in table.columns)
+    for what in filter(is_drawn, quantities):
+        found += _of_bands(table, what)
     chosen = _chosen(table)
     for key, values in axes.items():
         if chosen and len(set(values[np.isfinite(values)].tolist())) > 1:
-            found.append((_against(key, values, chosen), f"Results over {key}."))
+            text = f"Results over {key}; lines join members that are equal in all other keys."
+            lines = _lines(table, key, values)
+            found.append(drawing(partial(_against, key, values, lines, chosen), text, WIDE))
     if len(axes) == 2:
+        (first, a), (second, b) = axes.items()
         for column in chosen[:2]:
-            (first, a), (second, b) = axes.items()
-            found.append((_map(first, a, second, b, column), f"{column.name} over both axes."))
+            text = f"{column.name} over both axes."
+            found.append(drawing(partial(_map, first, a, second, b, column), text, WIDE))
     return found
+
+
+def _of_bands(table: Gathered, what: str) -> list[Drawing]:
+    """Third octaves of a quantity in all members, and their differences from the first with any."""
+    bands = [column for column in table.columns if _banded(column.name)[0] == what]
+    text = f"Third octaves: {what}."
+    if len(table.names) > CURVES:
+        text += f" The first {CURVES} of {len(table.names)} members."
+    found = [drawing(partial(_spectra, bands, table.names), text, WIDE)]
+    compared = levels(table, what)
+    if compared is not None and len(compared.with_bands) > 1:
+        found.append(drawing(partial(_differences, compared), _about(compared), WIDE))
+    return found
+
+
+def _lines(table: Gathered, key: str, values: Array) -> list[list[int]]:
+    """Members that are equal in all keys but one, in ascending order of its values."""
+    others: dict[str, list[int]] = {}
+    for k in np.argsort(values, kind="stable").tolist():
+        if np.isfinite(values[k]):
+            rest = repr([given[k] for name, given in table.settings.items() if name != key])
+            others.setdefault(rest, []).append(k)
+    return list(others.values())
 
 
 def _chosen(table: Gathered) -> list[SweepColumn]:
     """The columns that are drawn over the axes, in the order of `SHOWN`: those that vary."""
     finite = {c.name: c.values[np.isfinite(c.values)] for c in table.columns if c.name in SHOWN}
-    vary = {name for name, values in finite.items() if len(values) > 1 and np.ptp(values) > 0}
+    # A load that is given comes out equal but for rounding.
+    vary = {
+        name
+        for name, values in finite.items()
+        if len(values) > 1 and np.ptp(values) > _VARIES * np.abs(values).max()
+    }
     columns = [c for c in table.columns if c.name in vary]
     return sorted(columns, key=lambda c: SHOWN.index(c.name))
 
 
 @styled
-def _spectra(bands: Sequence[SweepColumn], names: Sequence[str]) -> str:
-    figure, axes = canvas(9.5, 3.6)
+def _spectra(bands: Sequence[SweepColumn], names: Sequence[str], width: float) -> str:
+    figure, axes = canvas(width, 3.6)
     place = np.arange(len(bands))
-    for number, name in enumerate(names[:CURVES]):
-        levels = [column.values[number] for column in bands]
-        if np.isfinite(levels).any():
-            axes[0, 0].plot(place, levels, marker="o", ms=3, label=name, **pen(number))
-    axes[0, 0].set(ylabel="dB re 1 N, rms", xlabel="third-octave band")
-    axes[0, 0].set_xticks(place, [c.name.partition(", ")[2] for c in bands], rotation=45)
-    axes[0, 0].legend(ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize=7)
+    shown = [k for k in range(min(CURVES, len(names))) if _any(bands, k)]
+    for number in shown:
+        level = [column.values[number] for column in bands]
+        axes[0, 0].plot(place, level, marker="o", ms=3, label=names[number], **pen(number))
+    axes[0, 0].set(ylabel=f"{shown_unit(bands[0].unit)}, rms", xlabel="third-octave band in Hz")
+    _ticks(axes[0, 0], [_banded(column.name)[1] for column in bands])
+    legend_above(axes[0, 0], [names[number] for number in shown], width)
     return encode(figure)
 
 
+def _any(bands: Sequence[SweepColumn], member: int) -> bool:
+    return bool(np.isfinite([column.values[member] for column in bands]).any())
+
+
+def _ticks(axes: Axes, bands: Sequence[float | None]) -> None:
+    axes.set_xticks(np.arange(len(bands)), [f"{band:g}" for band in bands], rotation=45)
+
+
 @styled
-def _differences(compared: Levels) -> str:
+def _differences(compared: Levels, width: float) -> str:
     """Differences in dB from the first that has bands, with error bars."""
-    figure, axes = canvas(9.5, 3.2)
+    figure, axes = canvas(width, 3.2)
     level, error = compared.differences()
     place = np.arange(len(compared.bands))
-    first, *others = compared.with_bands[:CURVES]
+    _, *others = compared.with_bands[:CURVES]
     for order, number in enumerate(others, start=1):
         there = np.isfinite(level[number])
         axes[0, 0].errorbar(
@@ -382,16 +423,16 @@ def _differences(compared: Levels) -> str:
             **pen(number),
         )
     axes[0, 0].axhline(0.0, color="#52606d", lw=0.8)
-    axes[0, 0].set(ylabel=f"dB of {compared.names[first]}", xlabel="third-octave band")
-    axes[0, 0].set_xticks(place, compared.bands, rotation=45)
-    axes[0, 0].legend(ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize=7)
+    axes[0, 0].set(ylabel="difference in dB", xlabel="third-octave band in Hz")
+    _ticks(axes[0, 0], [float(band.removesuffix(" Hz")) for band in compared.bands])
+    legend_above(axes[0, 0], [compared.names[number] for number in others], width)
     return encode(figure)
 
 
 def _about(compared: Levels) -> str:
     """Caption of the figure of differences."""
     text = (
-        "Vertical axle force, difference from the first that has bands, "
+        f"Third octaves: {compared.quantity}, difference from the first that has bands, "
         f"{compared.names[compared.with_bands[0]]}, in dB, with what the runs' error bars tell of it; "
         "where there is no bar nothing is known."
     )
@@ -406,27 +447,36 @@ def _about(compared: Levels) -> str:
 
 
 @styled
-def _against(key: str, values: Array, columns: Sequence[SweepColumn]) -> str:
-    """Every chosen result over one axis, in separate panels."""
+def _against(
+    key: str,
+    values: Array,
+    lines: Sequence[Sequence[int]],
+    columns: Sequence[SweepColumn],
+    width: float,
+) -> str:
+    """Every chosen result over one axis, in separate panels; `lines` join members."""
     count = max(min(len(columns), 4), 1)
-    figure, axes = canvas(9.5, 2.0 * count + 0.4, count, sharex=True)
-    order = np.argsort(values, kind="stable")
+    figure, axes = canvas(width, 2.0 * count + 0.4, count, sharex=True)
     for here, column in zip(axes[:, 0], columns, strict=False):
-        there = order[np.isfinite(values[order]) & np.isfinite(column.values[order])]
-        here.plot(values[there], column.values[there], "o-", ms=4, lw=0.8, color="#0072b2")
-        here.set(title=column.name, ylabel=column.unit)
+        for number, members in enumerate(lines):
+            there = [k for k in members if np.isfinite(column.values[k])]
+            joined = "-" if len(there) > 1 else ""
+            colour = pen(number)["color"]
+            place = values[there], column.values[there]
+            here.plot(*place, marker="o", ls=joined, ms=4, lw=0.8, color=colour)
+        here.set(title=column.name, ylabel=shown_unit(column.unit))
     axes[-1, 0].set_xlabel(key)
     return encode(figure)
 
 
 @styled
-def _map(first: str, a: Array, second: str, b: Array, column: SweepColumn) -> str:
+def _map(first: str, a: Array, second: str, b: Array, column: SweepColumn, width: float) -> str:
     """A result over two axes, coloured at the grid's points."""
-    figure, axes = canvas(6.5, 4.2)
+    figure, axes = canvas(min(width, 6.5), 4.2)
     there = np.isfinite(a) & np.isfinite(b) & np.isfinite(column.values)
     shown = {"c": column.values[there], "s": 320, "marker": "s", "cmap": "cividis"}
     drawn = axes[0, 0].scatter(a[there], b[there], **shown)
     axes[0, 0].set(xlabel=first, ylabel=second)
     axes[0, 0].margins(0.15)
-    figure.colorbar(drawn, ax=axes, label=f"{column.name}, {column.unit}")
+    figure.colorbar(drawn, ax=axes, label=f"{column.name}, {shown_unit(column.unit)}")
     return encode(figure)

@@ -22,7 +22,7 @@ from tireroad.fem.tire.mesh import Torus
 from tireroad.modal.basis import project
 from tireroad.modal.rotating import matrices, rotating
 from tireroad.modal.solver.slicing import Modes
-from tireroad.modal.waves import label
+from tireroad.modal.waves import FaceWaves
 
 R, H, E, RHO = 0.3, 0.003, 4.8e8, 1200.0
 FLAT = 1e3  # m, radius of the section circle: the strip of it in use is flat
@@ -91,9 +91,8 @@ def lowest(operators: Operators, count: int) -> Modes:
 def in_plane(operators: Operators, count: int = 28) -> tuple[Modes, np.ndarray]:
     """Bending modes in the plane with n = 2, 3, 4, and their n."""
     modes, body = lowest(operators, count), operators.body
-    circles = body.lattice.circles(body.ids)
-    points = body.lattice.points(body.ids)
-    wave = label(body.comm, points, circles, operators.mass, modes.vectors).wave
+    waves = FaceWaves(body.lattice)
+    wave = waves.named(waves.read(operators.trace(modes.vectors)), {}).wave
     axial = (operators.mass[:, None] * modes.vectors**2)[1::3].sum(axis=0)
     chosen = np.flatnonzero((axial < 0.5) & np.isin(wave, WAVES))
     return modes.among(chosen), wave[chosen]

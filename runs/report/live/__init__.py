@@ -150,10 +150,18 @@ def shapes(
 
 
 def footprint(
-    points: NDArray, half: NDArray, time: NDArray, values: NDArray, label: str
+    points: NDArray,
+    half: NDArray,
+    time: NDArray,
+    values: NDArray,
+    label: str,
+    top: float,
+    begin: int,
 ) -> dict[str, Any]:
-    """Animation of values (n, c) at points (c, 3) m, squares of half sizes (2,) m, over time, s."""
-    top = float(np.nan_to_num(values).max(initial=0.0)) or 1.0
+    """Animation of values (n, c) at points (c, 3) m, squares of half sizes (2,) m, over time, s.
+
+    The colours end at `top`; it opens at the instant `begin`.
+    """
     touched = (values > 0).any(axis=0)
     near = touched if touched.any() else np.ones(len(points), bool)
     return {
@@ -163,5 +171,6 @@ def footprint(
         "time": packed(time, "f4"),
         "values": packed(np.rint(255 * np.clip(np.nan_to_num(values[:, near]) / top, 0, 1)), "u1"),
         "top": top,
+        "begin": begin,
         "label": label,
     }

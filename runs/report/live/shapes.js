@@ -104,9 +104,9 @@ function drawFootprint(given, box) {
   const { canvas, ink, fit } = canvasIn(box, (high - low) / (right - left), 360);
   const bar = make("div", box), slider = make("input", bar), play = make("button", bar, "play"), told = make("p", box);
   bar.className = "bar-of-buttons"; told.className = "readout"; play.type = "button";
-  Object.assign(slider, { type: "range", min: 0, max: time.length - 1, value: 0 });
+  Object.assign(slider, { type: "range", min: 0, max: time.length - 1, value: given.begin });
   slider.setAttribute("aria-label", "instant");
-  let playing = false, at = -1, place = 0, last = 0, [width, height] = fit();
+  let playing = false, at = -1, place = given.begin, last = 0, [width, height] = fit();
   play.onclick = () => { playing = !playing; play.textContent = playing ? "stop" : "play"; };
   slider.oninput = () => { place = +slider.value; };
   onResize(box, () => { [width, height] = fit(); at = -1; });
@@ -123,6 +123,6 @@ function drawFootprint(given, box) {
       ink.fillStyle = v ? `rgb(${table[v].join(",")})` : "#eef1f4";
       ink.fillRect(x0 + scale * (points[2 * n] - hx - left), scale * (high - points[2 * n + 1] - hy), 2 * scale * hx - 0.5, 2 * scale * hy - 0.5);
     }
-    told.textContent = `${digits(1e3 * time[row])} ms; ${given.label}, darkest ${digits(given.top)}; forward is to the right, ${digits(right - left)} mm shown.`;
+    told.textContent = `${digits(1e3 * time[row])} ms; ${given.label}, darkest ${digits(given.top)} and more; forward is to the right, ${digits(right - left)} mm shown.`;
   });
 }

@@ -242,6 +242,14 @@ def contact(results: Results) -> Section:
     return section
 
 
+def run_in(results: Results) -> float:
+    """What the spectra leave out as run-in, s; 0 where nothing is known of it."""
+    try:
+        return float(results.attribute("spectra.h5", "left_out") or 0.0)
+    except (Absent, InputError):  # a file that is damaged is told of by its own section
+        return 0.0
+
+
 @dataclass(frozen=True)
 class _Valid:
     """Forces (nt, 3) N as far as they are valid, the `words` that say so, and figures of them."""
@@ -259,14 +267,11 @@ def _valid(results: Results, given: Mapping[str, NDArray | None]) -> _Valid:
     """
     forces = {name: values for name, values in given.items() if values is not None}
     try:
-        limit, left_out, step = (
+        limit, step = (
             float(results.attribute(file, name))
-            for file, name in (
-                ("spectra.h5", "limit"),
-                ("spectra.h5", "left_out"),
-                ("contact.h5", "step"),
-            )
+            for file, name in (("spectra.h5", "limit"), ("contact.h5", "step"))
         )
+        left_out = run_in(results)
     except (Absent, InputError, TypeError):  # a file that is damaged is told of by its own section
         limit, left_out, step = np.inf, 0.0, 1.0
     words = f" below {quantity(limit, 'Hz')}" if np.isfinite(limit) else ""
@@ -302,8 +307,13 @@ def sampled(dataset: h5py.Dataset, stride: int) -> NDArray:
 
 
 def pressure_maps(results: Results, section: Section, time: NDArray, vertical: NDArray) -> None:
-    """Add the contact pressure at the minimum, mean, maximum and last vertical force."""
-    mean = int(np.abs(vertical - vertical.mean()).argmin())
+    """Add the contact pressure at the minimum, mean, maximum and last vertical force.
+
+    The mean one is of after the run-in, at which the tire rests on a flat road; the film opens there.
+    """
+    start = min(round(run_in(results) / float(time[0] or 1.0)), len(time) - 1)
+    rolls = vertical[start:]
+    mean = start + int(np.abs(rolls - rolls.mean()).argmin())
     chosen = {"least": int(vertical.argmin()), "mean": mean, "greatest": int(vertical.argmax())}
     chosen["last"] = len(time) - 1
     normal, area = results.dataset("contact.h5", "normal_force"), None
@@ -316,21 +326,21 @@ def pressure_maps(results: Results, section: Section, time: NDArray, vertical: N
     ]
     points = results.array("contact.h5", "points")
     maps = [values for values, _ in shown]
-    picture = surface_figures.footprints(points, maps, titles, shown[0][1])
-    caption = "The footprint while rolling; in the still picture when the force is least, mean, greatest, last."
-    section.show(picture, caption, rolling(points, time, normal, area))
-
-
-def rolling(
-    points: NDArray, time: NDArray, normal: h5py.Dataset, area: NDArray | None
-) -> dict | None:
-    """The animated footprint; None if the area of the points, and so their pressure, is unknown."""
-    if area is None or area.shape != (len(points),) or len(time) < 2:
-        return None
     stride = max(1, -(-len(time) // PLAYED))
-    values, unit = pressure(np.nan_to_num(sampled(normal, stride)), area)
-    half = np.full(2, np.sqrt(np.median(area)) / 2)
-    return live.footprint(points, half, time[::stride], values, unit)
+    played, unit = pressure(np.nan_to_num(sampled(normal, stride)), area)
+    top = surface_figures.darkest(played)
+    picture = surface_figures.footprints(points, maps, titles, unit, top)
+    caption = (
+        "The footprint while rolling; in the still picture when the force is least, mean, greatest, last. "
+        f"{surface_figures.DARKEST:.0%} of the touching points lie within the scale."
+    )
+    known = area is not None and area.shape == (len(points),) and len(time) > 1
+    film = None
+    if known:  # else there are forces, whose points may have any size
+        half = np.full(2, np.sqrt(np.median(area)) / 2)
+        begin = min(round(mean / stride), len(played) - 1)
+        film = live.footprint(points, half, time[::stride], played, unit, top, begin)
+    section.show(picture, caption, film)
 
 
 def histories(

@@ -52,11 +52,15 @@ def eigenvalues(eigenvalue: NDArray) -> str:
 
 @styled
 def campbell_figure(
-    speed: NDArray, damped: NDArray, undamped: NDArray | None, radius: float | None
+    speed: NDArray,
+    damped: NDArray,
+    undamped: NDArray | None,
+    radius: float | None,
+    names: list[str],
 ) -> str:
     """Branches (v, b) Hz over speed (v,) rad/s, in km/h if the rolling `radius` (m) is known.
 
-    Also the lines n Omega / 2 pi, n = 1, 2, ..., at which a stationary road excites.
+    With their `names` at the right end, and the lines n Omega / 2 pi, n = 1, 2, ..., at which a stationary road excites.
     """
     figure, ((axes,),) = canvas(WIDE, 4.2)
     x, label, scale = _axis(speed, radius)
@@ -71,6 +75,11 @@ def campbell_figure(
     axes.plot([], [], color=MUTED, lw=0.6, ls=":", label="n Ω / 2π")
     axes.set(xlabel=label, ylabel="frequency in Hz", ylim=(0.0, highest))
     axes.margins(x=0)
+    for name, place in zip(names, _apart(damped, highest), strict=True):
+        if np.isfinite(place):
+            axes.annotate(
+                name, (x[-1], place), (3, 0), textcoords="offset points", va="center", fontsize=7
+            )
     if scale:
         other = axes.secondary_xaxis("top", functions=(lambda v: v / scale, lambda w: w * scale))
         other.set_xlabel("speed of the wheel in rad/s")
@@ -78,12 +87,27 @@ def campbell_figure(
     return encode(figure)
 
 
+def _apart(lines: NDArray, highest: float) -> NDArray:
+    """Heights (b,) for labels at the ends of lines (v, b), a line of text apart."""
+    place = lines[-1].copy()
+    order = np.argsort(place)  # NaN last
+    least = highest / 34
+    for before, after in zip(order[:-1], order[1:], strict=True):
+        place[after] = max(place[after], place[before] + least)
+    return place
+
+
 def campbell_live(
-    speed: NDArray, damped: NDArray, undamped: NDArray | None, radius: float | None
+    speed: NDArray,
+    damped: NDArray,
+    undamped: NDArray | None,
+    radius: float | None,
+    names: list[str],
 ) -> dict:
     """The same as an interactive chart that names the branch under the pointer."""
     x, label, _ = _axis(speed, radius)
-    curves = {f"branch {k + 1}, damped": column for k, column in enumerate(damped.T)}
+    called = [f"{k + 1}: {name}, damped" for k, name in enumerate(names)]
+    curves = dict(zip(called, damped.T, strict=True))
     colours = [COLOURS[0]] * len(curves)
     dashed: list[str] = []
     if undamped is not None:
@@ -125,26 +149,55 @@ def rotating(results: Results) -> Section:
         )
     rising = np.flatnonzero(value.imag > 0)
     rising = rising[np.argsort(value.imag[rising])]
-    columns = {"residual": results.optional(name, "residual")}
-    columns["left residual"] = results.optional(name, "left_residual")
-    present = {key: column for key, column in columns.items() if column is not None}
-    rows = [
-        (
-            quantity(float(value[q].imag / 2 / np.pi), "Hz"),
-            quantity(float(value[q].real), "1/s"),
-            f"{-100.0 * value[q].real / abs(value[q]):.3g} %".replace("-", "−"),
-            *(quantity(float(column[q])) for column in present.values()),
-        )
-        for q in rising[:LISTED]
-    ]
-    section.table = TextTable(("frequency", "Re s", "of critical damping", *present), rows)
+    section.table, listed = _table(results, name, value, rising)
     tire.resonances(results, section, name, "air_share", value)
-    if len(rising) > LISTED:
-        listed = f"The table lists {LISTED} of {len(rising)} pairs, by frequency."
-        section.notes.append(listed)
+    if section.table.head[0] == "name":
+        section.notes.append(
+            "Names as in the table of modes. In the frame that does not turn a mode has two branches: - travels around "
+            "against the rotation, + with it; what does neither by two thirds stands. Damping in percent of critical."
+        )
+    if len(rising) > listed:
+        section.notes.append(f"The table lists {listed} of {len(rising)} pairs, by frequency.")
     campbell(results, section)
     section.show(eigenvalues(value), "Eigenvalues with Im s ≥ 0.")
     return section
+
+
+def _table(results: Results, file: str, value: NDArray, rising: NDArray) -> tuple[TextTable, int]:
+    """The lowest states, the branches of one mode in one row, and how many states that are.
+
+    `rising` (q,): indices of the oscillating ones of the eigenvalues `value` 1/s, ascending.
+    """
+
+    def told(q: int) -> tuple[str, str]:
+        s = complex(value[q])
+        return quantity(s.imag / 2 / np.pi, "Hz"), tire.ratio(-s.real / abs(s))
+
+    name = results.optional(file, "name")
+    if name is None:  # of an earlier version
+        shown = rising[:LISTED]
+        return TextTable(("frequency", "damping"), [told(q) for q in shown]), len(shown)
+    motion, wave = results.array(file, "motion"), results.array(file, "wave_number")
+    rows: list[tuple[str, dict[str, int]]] = []
+    for q in rising:
+        mode, branch = (name[q][:-1], name[q][-1]) if name[q][-1] in "+-" else (name[q], "")
+        row = next((held for other, held in rows if other == mode and branch not in held), None)
+        if row is None:
+            row = {}
+            rows.append((mode, row))
+        row[branch] = int(q)
+    head = ("name", "standing", "- branch", "+ branch", "apart", "waves around", "motion")
+    listed, count = [], 0
+    for mode, row in rows[:LISTED]:
+        first = next(iter(row.values()))
+        each = [", ".join(told(row[branch])) if branch in row else "–" for branch in ("", "-", "+")]
+        apart = "–"
+        if {"-", "+"} <= row.keys():
+            split = (value[row["+"]].imag - value[row["-"]].imag) / 2 / np.pi
+            apart = quantity(float(split), "Hz")
+        listed.append((mode, *each, apart, str(wave[first]), motion[first]))
+        count += len(row)
+    return TextTable(head, listed), count
 
 
 def campbell(results: Results, section: Section) -> None:
@@ -157,7 +210,9 @@ def campbell(results: Results, section: Section) -> None:
         radius = float(results.attribute("static.h5", "rolling_radius") or 0.0)
     damped = results.array("rotating.h5", "campbell/frequency")
     undamped = results.optional("rotating.h5", "campbell/undamped")
-    given = speed, damped, undamped, radius
+    name = results.optional("rotating.h5", "campbell/name")
+    names = [f"branch {k + 1}" for k in range(damped.shape[1])] if name is None else list(name)
+    given = speed, damped, undamped, radius, names
     text = "Branches followed over speed, on one static state. Solid: damped, as the tire rings"
     if undamped is not None:
         text += (

@@ -23,7 +23,7 @@ from tireroad.runs.report.figures import (
     styled,
     third_octaves,
 )
-from tireroad.runs.report.read import Results, Section, TextTable, digits
+from tireroad.runs.report.read import Results, Section, TextTable, about, digits
 
 FILE = "sound.h5"
 _CHARTED = 4  # microphones in one chart of bars
@@ -38,17 +38,14 @@ def sound(results: Results) -> Section:
     names = [str(name) for name in results.dataset(FILE, "microphones").attrs["names"]]
     frequency = results.array(FILE, "frequency")
     section = Section("Sound beside the tire", _LIMITS)
-    total, weighted, error = (
-        results.array(FILE, f"total/{key}") for key in ("level", "level_a", "level_error")
-    )
     band = f"{digits(float(frequency[0]))} to {digits(float(frequency[-1]))} Hz"
-    section.table = TextTable(
-        ("microphone", f"dB re 20 µPa, {band}", "dB(A)", "error, dB"),
-        [
-            (name, f"{a:.1f}", f"{b:.1f}", f"± {c:.1f}" if np.isfinite(c) else "unknown")
-            for name, a, b, c in zip(names, total, weighted, error, strict=True)
-        ],
-    )
+    columns = [names]
+    for key in ("level", "level_a"):
+        columns.append([f"{value:.1f}" for value in results.array(FILE, f"total/{key}")])
+        error = results.optional(FILE, f"total/{key}_error")
+        columns.append(["unknown"] * len(names) if error is None else [about(e) for e in error])
+    head = (f"sound pressure level, {band}", "dB re 20 µPa", "error, dB", "dB(A) re 20 µPa")
+    section.table = TextTable((*head, "error, dB"), list(zip(*columns, strict=True)))
     power = results.array(FILE, "total/power")
     section.facts.append(("sound power", f"{power[0]:.1f} dB, {power[1]:.1f} dB(A) re 1 pW"))
     centre = results.array(FILE, "third_octave/centre")
@@ -75,13 +72,26 @@ def _bands(results: Results, section: Section, names: list[str], centre: NDArray
     level, error = (
         results.array(FILE, f"third_octave/{key}") for key in ("level_a", "level_error")
     )
+    elements = results.optional(FILE, "third_octave/element_error")
+    caption = "A-weighted sound pressure level in third octaves at the microphones."
+    if np.isfinite(error).any():
+        caption += (
+            " Lines on the bars: estimated error, of the vibration and of the boundary elements."
+        )
+    else:
+        caption += " The error is unknown: that of the vibration was not estimated."
+    if elements is not None:
+        caption += (
+            f" Of the boundary elements alone (by elements of twice the size, and by sources inside whose field is "
+            f"known) it is {elements.max():.1g} dB at most."
+        )
     frequency = results.array(FILE, "frequency")
     few = lines(centre, frequency[1] - frequency[0]) < FEW
-    label = "sound pressure in dB(A) re 20 µPa"
+    label = "sound pressure level in dB(A) re 20 µPa"
     for first in range(0, len(names), _CHARTED):
         some = slice(first, first + _CHARTED)
-        shown, about = level[some].T, error[some].T
-        series = {name: (shown[:, k], about[:, k]) for k, name in enumerate(names[some])}
+        shown, off = level[some].T, error[some].T
+        series = {name: (shown[:, k], off[:, k]) for k, name in enumerate(names[some])}
         drawn = live.bars(
             [f"{c:g}" for c in nominal(centre)],
             series,
@@ -90,11 +100,10 @@ def _bands(results: Results, section: Section, names: list[str], centre: NDArray
             ends=level_range(shown),
             few=few,
         )
-        picture = third_octaves(centre, shown, about, label, few, names[some])
+        picture = third_octaves(centre, shown, off, label, few, names[some])
         section.show(
             picture,
-            "A-weighted third octaves at the microphones. Lines on the bars: estimated error, of the boundary elements "
-            "(by elements of twice the size, and by sources inside whose field is known) and of the contact force.",
+            caption,
             drawn,
         )
 

@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 
 from tireroad.contact.results.spectra import FEW, SILENT, heard, nominal
 from tireroad.runs.report import figures, live
-from tireroad.runs.report.read import Results, Section, TextTable, quantity, without_friction
+from tireroad.runs.report.read import (
+    Results,
+    Section,
+    TextTable,
+    about,
+    quantity,
+    without_friction,
+)
 from tireroad.runs.scene.tables.scene import AccuracyTable
 from tireroad.runs.search.journal import CAUSES, NAME, Trial, read_trials, worst
 from tireroad.runs.search.settings import MARGIN, aim
@@ -89,10 +96,10 @@ def spectra(results: Results) -> Section:
     of = "contact force" if force is None else "axle force"
     contact = results.array(_FILE, "contact_force")
     force = contact if force is None else force
-    about = "Of its variation about the mean, by component."
+    lead = "Of its variation about the mean, by component."
     if without_friction(results):
-        about += " Without friction: x and y come from the road's slope alone."
-    section = Section(f"Spectra of the {of}", about)
+        lead += " Without friction: x and y come from the road's slope alone."
+    section = Section(f"Spectra of the {of}", lead)
     if len(frequency) < 2:
         section.notes.append("A run of one step has no spectrum.")
         return section
@@ -214,7 +221,7 @@ def _in_numbers(
 
 def _bounded(level: float, error: float) -> str:
     known = level > SILENT and np.isfinite(error)
-    return _texts(np.array([level]))[0] + (f" ± {error:.1f}" if known else "")
+    return _texts(np.array([level]))[0] + (f" {about(error)}" if known else "")
 
 
 def few_lines(results: Results, count: int) -> NDArray:
@@ -247,7 +254,7 @@ def _table(
     columns = [[f"{c:g}" for c in nominal(centre)], _texts(level[:, 2])]
     if error is not None:
         head.append("error, dB")
-        columns.append([f"± {e:.1f}" if np.isfinite(e) else "unknown" for e in error[:, 2]])
+        columns.append([about(e) for e in error[:, 2]])
     if weighted is not None:
         head.append("z, dB(A)")
         columns.append(_texts(weighted[:, 2]))

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.runs.report import live, surface_figures
+from tireroad.runs.report.element_surface import ElementSurface
 from tireroad.runs.report.figures import COLOURS, MUTED, canvas, encode, styled
 from tireroad.runs.report.read import Results, Section, TextTable, attributes, quantity
 from tireroad.runs.report.realism import mean_pressure
@@ -90,8 +91,9 @@ def static(results: Results) -> Section:
         results.attribute(name, "road_height"),
     )
     size = 1e3 * np.linalg.norm(moved, axis=1).max()
+    face = ElementSurface.of(points, quads, results.scene)
     section.show(
-        surface_figures.deformed(points, moved, quads, road),
+        surface_figures.deformed(face.points, face.field(moved), face.quads, road),
         f"Displacement at its true scale, {size:.3g} mm at most. Grey: as made.",
     )
     footprint(results, section)
@@ -170,28 +172,37 @@ def pressure(force: NDArray, area: NDArray | None) -> tuple[NDArray, str]:
     ), "pressure in kPa"
 
 
+NAMES = (
+    "R: in the plane of the wheel, symmetric in y; L: out of it, antisymmetric; T: torsional, about the axle; C: air "
+    "in the cavity; then the number of waves around the tire. R0 breathes, R1 moves the belt up or forward, L0 moves "
+    "it sideways, L1 tilts it (yaw, camber). [n,a] is not the lowest of its kind: n waves around, a nodal lines along "
+    "the tread. R7/6: no number of waves holds half of it, 7 and 6 the most."
+)
+
+
 def modes(results: Results) -> Section:
     """The section on the modes of the loaded, non-rotating tire (modes.h5)."""
     name = "modes.h5"
     section = Section("Modes of the loaded tire", "Undamped, not rotating, about the static state.")
-    frequency, residual = results.array(name, "frequency"), results.optional(name, "residual")
+    frequency = results.array(name, "frequency")
     top = quantity(float(frequency.max()), "Hz")
     section.facts = [("modes", quantity(len(frequency))), ("highest frequency", top)]
     wanted = (("inertia_count", ""), ("rigid_modes", ""))
     section.facts += attributes(results, name, wanted)
-    columns = [[quantity(float(value), "Hz") for value in frequency[:LISTED]]]
-    if residual is not None:
-        columns.append([quantity(float(value)) for value in residual[:LISTED]])
-    head = ["mode", "frequency", "residual"][: 1 + len(columns)]
     duct(results, section)
-    wave, number = (results.optional(name, key) for key in ("wave_number", "section_mode"))
-    if wave is not None and number is not None:
-        columns.append([_named(*pair) for pair in zip(wave[:LISTED], number[:LISTED], strict=True)])
-        head.append("wave number, section mode")
+    called = _named(results, name)
+    columns = {
+        "mode": [str(n + 1) for n in range(min(LISTED, len(frequency)))],
+        **{key: called.pop(key) for key in ("name",) if key in called},
+        "frequency": [quantity(float(value), "Hz") for value in frequency[:LISTED]],
+        **called,
+    }
+    rows = list(zip(*columns.values(), strict=True))
+    section.table = TextTable(tuple(columns), rows)
+    if "name" in columns:
+        section.notes.append(NAMES)
     if len(frequency) > LISTED:
         section.notes.append(f"The table lists {LISTED} of {len(frequency)} modes.")
-    numbers = [str(n + 1) for n in range(min(LISTED, len(frequency)))]
-    section.table = TextTable(tuple(head), list(zip(numbers, *columns, strict=True)))
     points, quads = (
         results.array(name, "surface/points"),
         results.borrowed("static.h5", "surface/quads"),
@@ -200,17 +211,53 @@ def modes(results: Results) -> Section:
         section.notes.append("No pictures: static.h5 holds no quads for this surface.")
         return section
     shapes = results.dataset(name, "surface/shape")[:PICTURED]
-    titles = [f"{n + 1}: {quantity(float(f), 'Hz')}" for n, f in enumerate(frequency[:PICTURED])]
-    picture = surface_figures.modes(points, quads, shapes, titles)
-    normal = surface_figures.outward(points, quads)
-    turned = live.shapes(points, quads, normal, shapes, titles)
+    names = columns.get("name", columns["mode"])
+    titles = [f"{n}: {f}" for n, f in zip(names, columns["frequency"], strict=True)][:PICTURED]
+    face = ElementSurface.of(points, quads, results.scene)
+    drawn = face.points, face.quads
+    picture = surface_figures.modes(*drawn, face.field(shapes), titles)
+    normal = surface_figures.outward(*drawn)
+    turned = live.shapes(*drawn, normal, face.field(shapes), titles)
     section.show(picture, "The lowest mode shapes, exaggerated.", turned)
     return section
 
 
-def _named(wave: int, number: int) -> str:
-    """A mode of an axisymmetric tire by wave number and section mode; "-" without a wave number."""
-    return f"{wave}, {number}" if wave >= 0 else "-"
+def _named(results: Results, file: str) -> dict[str, list[str]]:
+    """Columns that say what each mode is: name, motion, wave number, damping, effective mass."""
+    name = results.optional(file, "name")
+    if name is None:  # of an earlier version
+        return {}
+    carried = results.array(file, "effective_mass")[:LISTED]
+    return {
+        "name": list(name[:LISTED]),
+        "damping": [ratio(one) for one in results.array(file, "damping")[:LISTED]],
+        "waves around": [str(n) for n in results.array(file, "wave_number")[:LISTED]],
+        "effective mass at the hub": [_carried(row, carried) for row in carried],
+        "motion": list(results.array(file, "motion")[:LISTED]),
+    }
+
+
+def ratio(value: float) -> str:
+    """A damping ratio in percent of critical damping."""
+    return f"{100.0 * value:.3g} %".replace("-", "−") if np.isfinite(value) else "unknown"
+
+
+def _carried(row: NDArray, every: NDArray) -> str:
+    """The larger ones of the effective masses (6,), beside the largest of all modes (m, 6)."""
+    largest = [np.nanmax(every[:, part], initial=0.0) for part in (slice(0, 3), slice(3, 6))]
+    found = [
+        f"{row[k]:.3g} {unit}{axis}"
+        for k, (unit, axis) in enumerate(_ALONG)
+        if row[k] >= _WORTH * largest[k // 3] > 0
+    ]
+    return ", ".join(found) or "–"
+
+
+_ALONG = (
+    *(("kg in ", axis) for axis in "xyz"),
+    *(("kg m² about ", axis) for axis in "xyz"),
+)
+_WORTH = 0.01  # of the largest effective mass
 
 
 _FILE = "stiffness.h5"

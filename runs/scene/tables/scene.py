@@ -114,8 +114,8 @@ class ModalTable:
     solver: str = choice(
         "auto",
         ("auto", "slepc", "lanczos"),
-        "who finds the modes of each part that symmetry leaves: SLEPc's spectrum slicing, or block Lanczos in slices of "
-        "equal numbers, which auto takes",
+        "who finds the modes in slices of equal numbers, of each part that symmetry leaves: SLEPc's Krylov-Schur with "
+        "one vector, or block Lanczos, which auto takes",
     )
 
     @property

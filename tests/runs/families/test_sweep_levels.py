@@ -4,16 +4,19 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from tireroad.runs.report.levels import POWER, SOUND
 from tireroad.runs.sweep.page import (
     TOTAL,
     Gathered,
     SweepColumn,
     _chosen,
+    _lines,
     _page_figures,
     levels,
     write_page,
 )
 
+FORCE = "axle force z"
 LOUD = np.array([[0.0, 10.0], [1.0, 12.0], [-1.0, 11.0], [0.5, 10.5]])
 
 
@@ -33,11 +36,15 @@ def table(settings: dict, level: np.ndarray, error: np.ndarray | None) -> Gather
     return Gathered(names, settings, tuple(columns), ())
 
 
+def captions(table: Gathered) -> list[str]:
+    return [figure.caption for figure in _page_figures(table)]
+
+
 def test_seeds_are_samples_of_one_road() -> None:
     """Mean power and its confidence, against scipy's interval of the mean; 3 dB more is 3 dB more."""
     level = np.vstack([LOUD, LOUD + 3.0])
     given = {"rotation.speed": (30.0,) * 4 + (60.0,) * 4, "road.seed": (1, 2, 3, 4) * 2}
-    found = levels(table(given, level, None))
+    found = levels(table(given, level, None), FORCE)
     assert found.names == ("rotation.speed = 30.0", "rotation.speed = 60.0")
     assert found.seeds == (4, 4)
     power = 10 ** (LOUD / 10)
@@ -51,7 +58,7 @@ def test_seeds_are_samples_of_one_road() -> None:
 
 def test_what_runs_tell_of_their_errors_adds_up() -> None:
     error = np.array([[0.3, np.nan], [0.4, np.nan]])
-    found = levels(table({"static.load": (1.0, 2.0)}, LOUD[:2], error))
+    found = levels(table({"static.load": (1.0, 2.0)}, LOUD[:2], error), FORCE)
     apart, sure = found.differences()
     np.testing.assert_allclose(apart[1], LOUD[1] - LOUD[0])
     assert sure[1, 0] == pytest.approx(0.5) and np.isnan(sure[1, 1])
@@ -60,25 +67,63 @@ def test_what_runs_tell_of_their_errors_adds_up() -> None:
 def test_a_member_without_results_is_left_out_of_the_mean() -> None:
     level = LOUD.copy()
     level[1] = np.nan
-    found = levels(table({"road.seed": (1, 2, 3, 4)}, level, None))
+    found = levels(table({"road.seed": (1, 2, 3, 4)}, level, None), FORCE)
     kept = 10 ** (LOUD[[0, 2, 3]] / 10)
     np.testing.assert_allclose(found.level[0], 10 * np.log10(kept.mean(axis=0)))
     assert found.seeds == (3,)
-    assert levels(Gathered(("a",), {}, (), ())) is None
+    assert levels(Gathered(("a",), {}, (), ()), FORCE) is None
 
 
 def test_the_caption_counts_the_seeds_that_have_levels() -> None:
     """It counted failed seeds too: "3 to 3 seeds" of a mean over two."""
     level = np.vstack([LOUD[:3], LOUD[:3] + 3.0, np.full((3, 2), np.nan)])
     given = {"damping.mass": (1,) * 3 + (2,) * 3 + (3,) * 3, "road.seed": (1, 2, 3) * 3}
-    assert any("over 3 seeds" in text for _, text in _page_figures(table(given, level, None)))
+    assert any("over 3 seeds" in text for text in captions(table(given, level, None)))
     level[1] = np.nan
-    assert any("over 2 to 3 seeds" in text for _, text in _page_figures(table(given, level, None)))
+    assert any("over 2 to 3 seeds" in text for text in captions(table(given, level, None)))
 
 
 def test_the_page_draws_the_differences() -> None:
-    shown = _page_figures(table({"static.load": (1.0, 2.0, 3.0, 4.0)}, LOUD, None))
-    assert any("difference from the first" in text for _, text in shown)
+    shown = captions(table({"static.load": (1.0, 2.0, 3.0, 4.0)}, LOUD, None))
+    assert any("difference from the first" in text for text in shown)
+
+
+def test_sound_has_third_octaves_as_forces_have() -> None:
+    """At every microphone and of the power; a band in the middle of a headline's name is none."""
+    forces = table({"static.load": (1.0, 2.0, 3.0, 4.0)}, LOUD, None)
+    names = f"{SOUND}cpx front", f"{SOUND}pass-by", POWER
+    sound = [
+        SweepColumn(f"{name}, {band} Hz", "dB re 1 pW", LOUD[:, k] + 60)
+        for name in names
+        for k, band in enumerate((100, 125))
+    ]
+    other = SweepColumn("contact: error of the history up to, 400 Hz", "%", LOUD[:, 0])
+    full = Gathered(forces.names, forces.settings, (other, *forces.columns, *sound), ())
+    shown = captions(full)
+    for name in (FORCE, *names):
+        assert f"Third octaves: {name}." in shown
+        assert any(f"Third octaves: {name}, difference from the first" in text for text in shown)
+        assert levels(full, name).bands == ("100 Hz", "125 Hz")
+    assert len(shown) == 8
+
+
+def test_lines_join_members_that_are_equal_in_all_other_keys() -> None:
+    """A list of members that differ in two keys looked like the effect of one of them."""
+    given = {
+        "static.inflation": (2.2e5, 2.4e5, 2.0e5, 2.2e5, None),
+        "road.kind": ("sine", "sine", "sine", "flat", "flat"),
+        "contact.points": ("auto", "auto", "auto", {"dx": 0.01, "dy": 0.01}, "auto"),
+    }
+    level = np.vstack([LOUD, LOUD[:1]])
+    members = table(given, level, None)
+    values = np.array([2.2e5, 2.4e5, 2.0e5, 2.2e5, np.nan])
+    assert _lines(members, "static.inflation", values) == [[2, 0, 1], [3]]
+
+
+def test_what_was_given_is_no_result() -> None:
+    """The load was drawn over the inflation, a flat line but for rounding."""
+    rounded = SweepColumn("static: load", "N", np.array([4000.0, 4000.0 + 1e-9]))
+    assert _chosen(Gathered(("a", "b"), {}, (rounded,), ())) == []
 
 
 def test_members_without_bands_are_drawn_as_far_as_they_go(recwarn) -> None:
@@ -89,10 +134,10 @@ def test_members_without_bands_are_drawn_as_far_as_they_go(recwarn) -> None:
     bands = table(given, level, None)
     total = SweepColumn(TOTAL, "dB re 1 N", np.array([35.3, 35.2, 35.4, np.nan]))
     full = Gathered(bands.names, given, (total, *bands.columns), ())
-    apart, _ = levels(full).differences()
+    apart, _ = levels(full, FORCE).differences()
     np.testing.assert_allclose(apart[:, 0], [np.nan, 0.0, -2.0, -0.5])
     assert _chosen(full) == [total]
-    shown = [text for _, text in _page_figures(full)]
+    shown = captions(full)
     assert any("first that has bands, m1, in dB" in text for text in shown)
     assert sum(TOTAL in text for text in shown) == 1 and not recwarn.list
 

@@ -16,6 +16,7 @@ from tireroad.runs.files.export import INSTANTS, MADE, SHAPES, export
 CSV = {
     "footprint.csv",
     "modes.csv",
+    "rolling_modes.csv",
     "contact_force.csv",
     "spectra.csv",
     "third_octave.csv",
@@ -74,8 +75,11 @@ def test_all_files_are_written_and_nothing_else(results: Path) -> None:
 
 @pytest.mark.parametrize("name", sorted(CSV))
 def test_every_column_names_its_unit(results: Path, name: str) -> None:
-    for heading in columns(results / "export" / name):
-        assert heading == "mode" or (heading.endswith("]") and " [" in heading)
+    with (results / "export" / name).open(newline="") as stream:
+        head, *rows = csv.reader(stream)
+    for heading, values in zip(head, zip(*rows, strict=True), strict=True):
+        texts = heading in ("mode", "name", "motion")
+        assert texts or (heading.endswith("]") and " [" in heading and np.array(values, float).size)
 
 
 def test_forces_and_spectra_are_those_of_the_results(results: Path) -> None:
@@ -148,6 +152,21 @@ def test_meshio_reads_the_series(results: Path, name: str) -> None:
         assert cells[0].type == ("vertex" if name == "contact" else "quad")
 
 
+def test_modes_and_states_are_exported_by_name(results: Path) -> None:
+    """Every row names its mode and says how damped it is, in the order of the frequencies."""
+    for name, first in (("modes", "R0"), ("rolling_modes", "R0-")):
+        with (results / "export" / f"{name}.csv").open(newline="") as stream:
+            rows = list(csv.DictReader(stream))
+        assert rows[0]["name"] == first and rows[0]["motion"] == "in plane, symmetric"
+        frequency = np.array([float(row["frequency [Hz]"]) for row in rows])
+        assert (np.diff(frequency) >= 0).all()
+        assert all(float(row["damping ratio [-]"]) > 0 for row in rows)
+    with (results / "export" / "modes.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [row["effective mass x [kg]"] for row in rows[:4]] == ["0", "0", "6", "6"]
+    assert "effective inertia y [kg m2]" in rows[0]
+
+
 def test_only_what_is_there_is_exported(tmp_path: Path) -> None:
     directory = write_results(tmp_path / "run")
     for name in ("static.h5", "contact.h5", "response.h5"):
@@ -156,6 +175,7 @@ def test_only_what_is_there_is_exported(tmp_path: Path) -> None:
         "modes.csv",
         "modes.xdmf",
         "modes_fields.h5",
+        "rolling_modes.csv",
         "spectra.csv",
         "third_octave.csv",
     }

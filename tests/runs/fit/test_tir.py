@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+from synthetic_results import sealed, write_results
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.cli import main
@@ -179,3 +181,29 @@ def test_the_curve_of_deflection_and_load(tmp_path: Path) -> None:
 def test_encodings_and_the_end_mark_of_dos(tmp_path: Path, encoding: str) -> None:
     text = "$ Größe\n" + TIR.format(**SI).replace("\n", "\r\n") + "\x1a"
     assert read(tir(tmp_path, text.encode(encoding))).values["mass"] == 9.0
+
+
+def test_what_can_be_is_written_and_the_rest_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    """Without receptances nothing was written, the .tir neither; without [stiffness] it said nothing."""
+    scene = SCENE.replace("[stiffness]\nsteps = 5\n", "[rotation]\nspeed = 70.0\n")
+    write_results(tmp_path)
+    (tmp_path / "scene.toml").write_text(scene)
+    (tmp_path / "response.h5").unlink()
+    with sealed(tmp_path / "static.h5", "a") as file:
+        file.attrs.update(mass=9.2, load=3000.0, rolling_radius=0.306, inflation=2.2e5)
+    assert main(["export", str(tmp_path), "--tir", "--uff"]) == 2
+    told = capsys.readouterr()
+    assert "modes.csv" in told.out and "tire.tir" in told.out and "response.uff" not in told.out
+    assert "no response.uff" in told.err and "[output.receptance]" in told.err
+    assert "tire.tir: VERTICAL_STIFFNESS" in told.err and "[stiffness]" in told.err
+    text = (tmp_path / "export" / "tire.tir").read_text()
+    sections = re.findall(r"^\[(\w+)\]$", text, re.MULTILINE)
+    assert sections[:4] == ["MDI_HEADER", "UNITS", "MODEL", "DIMENSION"]
+    values = tir_values(text)
+    assert float(values["FNOMIN"]) == 3000.0
+    assert float(values["LONGVL"]) == pytest.approx(70.0 * 0.306)
+    assert values["TYRESIDE"] == "SYMMETRIC" and "VERTICAL_STIFFNESS" not in values
+    assert read(tmp_path / "export" / "tire.tir").values["mass"] == pytest.approx(9.2)
+    assert main(["export", str(tmp_path), "--tir"]) == 0

@@ -14,6 +14,7 @@ from tireroad.fem.errors import InputError
 from tireroad.runs.files.disk import signed
 from tireroad.runs.files.reader import RunResults
 from tireroad.runs.report.compare import Row, _change, assurance, compare, level_rows, scene_rows
+from tireroad.runs.report.levels import SOUND
 
 
 def write(folder: Path, load: float, level: float, frequencies: list[float], turn: bool) -> Path:
@@ -57,13 +58,13 @@ def test_table_has_what_differs(pair: list[Path], tmp_path: Path) -> None:
     assert rows["scene", "static.load"]["b"] == "550.0"
     assert float(rows["axle force z", "125 Hz"]["b"]) == 19.0
     assert float(rows["contact force x", "100 Hz"]["b"]) == 5.0
-    assert float(rows["sound power", "100 Hz"]["b"]) == 66.0
-    assert rows["sound power", "100 Hz"]["unit"] == "dB re 1 pW"
-    assert float(rows["sound pressure at cpx rear", "100 Hz"]["b"]) == 86.0
+    assert float(rows["sound power level", "100 Hz"]["b"]) == 66.0
+    assert rows["sound power level", "100 Hz"]["unit"] == "dB re 1 pW"
+    assert float(rows[f"{SOUND}cpx rear", "100 Hz"]["b"]) == 86.0
     assert "+6.0 dB" in page and "+10 %" in page
-    for what in ("vertical axle force", "vertical contact force"):
-        assert f"Third octaves of the {what}." in page
-    assert "Third octaves of the sound power." not in page, "one band is no chart"
+    for what in ("axle force z", "contact force z"):
+        assert f"Third octaves: {what}." in page
+    assert "Third octaves: sound power level." not in page, "one band is no chart"
     # Modes are matched by shape, whatever their order and sign.
     assert float(rows["modes", "mode 1, MAC 1.00"]["b"]) == 51.0
     assert float(rows["modes", "mode 3, MAC 1.00"]["b"]) == 71.0
@@ -131,3 +132,21 @@ def test_large_changes_are_whole_percents() -> None:
     """Twice was +1e+02 %."""
     row = Row("contact", "step", "s", (1.0, 2.0, 1.013, 21.0, 0.0))
     assert [_change(row, k) for k in range(5)] == ["", "+100 %", "+1.3 %", "+2000 %", "-100 %"]
+
+
+def test_rounding_is_no_difference_and_a_seed_has_no_percents() -> None:
+    """A load that was given differed by -1.1e-14 %, a seed of 7 from one of 1 by +600 %."""
+    load = Row("static", "load", "N", (4000.0, 4000.0 * (1 - 1e-15)))
+    assert not load.differs and _change(load, 1) == ""
+    seed = Row("scene", "road.seed", "", (1, 7))
+    assert seed.differs and _change(seed, 1) == ""
+    level = Row("radiation", "error", "dB", (0.03237, 0.03228))
+    assert _change(level, 1) == "-9e-05 dB"
+
+
+def test_what_differs_in_the_scenes_has_its_unit() -> None:
+    (row,) = scene_rows([{"static": {"inflation": p}} for p in (2.2e5, 2.4e5)])
+    assert (row.name, row.unit) == ("static.inflation", "Pa")
+    cords = [{"tire": {"cords": [{"name": "belt", "spacing": s}]}} for s in (1e-3, 2e-3)]
+    (row,) = scene_rows(cords)
+    assert (row.name, row.unit) == ("tire.cords.0.spacing", "m")

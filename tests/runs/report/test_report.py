@@ -10,6 +10,7 @@ from html import unescape
 from html.parser import HTMLParser
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from synthetic_results import sealed, write_results, write_rotating
@@ -94,6 +95,23 @@ def test_numbers_carry_units(results: Path) -> None:
     assert "of [[force]]" not in text
     assert "the scene has no [stiffness] table" in text
     assert "same mesh, load and material as before" in text
+
+
+@pytest.mark.usefixtures("blank")
+def test_modes_have_names_and_the_branches_of_one_mode_stand_in_one_row(results: Path) -> None:
+    text = page(results)
+    assert "<th>effective mass at the hub</th>" in text and "6 kg in x" in text
+    assert "0.001 kg m² about y" in text
+    assert '"R1: 79.29 Hz"' in text  # of the animated shapes
+    with h5py.File(results / "rotating.h5") as file:
+        frequency, name = file["frequency"][:], file["name"].asstr()[:]
+    below, above = (frequency[(name == f"R3{way}") & (frequency > 0)][0] for way in "-+")
+    row = re.search(r"<tr><td>R3</td>.*?</tr>", text[text.index("Modes of the rolling tire") :])
+    assert row is not None
+    cells = re.findall(r"<td>(.*?)</td>", row[0])
+    assert [cells[k] for k in (1, 5, 6)] == ["–", "3", "in plane, symmetric"]
+    assert cells[2].startswith(f"{below:.4g} Hz, ") and cells[3].startswith(f"{above:.4g} Hz, ")
+    assert cells[2].endswith(" %") and cells[4] == f"{above - below:.4g} Hz"
 
 
 @pytest.mark.parametrize("name", TITLES)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import wave
 from pathlib import Path
 from types import SimpleNamespace
@@ -20,7 +21,7 @@ from tireroad.runs.files.export import export
 from tireroad.runs.report.page import write_report
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.pipeline import run_scene
-from tireroad.runs.stages.sound import SoundStage
+from tireroad.runs.stages.sound import SoundStage, _total_error
 
 pytestmark = pytest.mark.slow
 
@@ -100,8 +101,30 @@ def test_levels_and_signals_are_those_of_the_pressure(results: tireroad.RunResul
     share = results["sound/contribution/region"]
     np.testing.assert_allclose(share.sum(axis=2), 1.0, atol=1e-6)
     stage = json.loads((results.directory / "summary.json").read_text())["stages"]["sound"]
-    assert stage["headline"]["level at cpx front"]["value"] == pytest.approx(total[0])
-    assert stage["headline"]["error of the level at cpx front"]["value"] > 0
+    told = stage["headline"]
+    assert told["sound pressure level at cpx front"]["value"] == pytest.approx(total[0])
+    assert told["A-weighted CPX level"]["unit"] == "dB(A) re 20 uPa"
+
+
+def test_what_is_not_estimated_is_unknown_everywhere(results: tireroad.RunResults) -> None:
+    """Without error bars of the vibration the log told the boundary elements' 0.02 dB, the report "± 0.0"."""
+    for name in ("third_octave/level_error", "total/level_error", "total/level_a_error"):
+        assert np.isnan(results[f"sound/{name}"]).all()
+    assert (results["sound/third_octave/element_error"] > 0).all()
+    stage = json.loads((results.directory / "summary.json").read_text())["stages"]["sound"]
+    told = {name: entry["value"] for name, entry in stage["headline"].items() if "error" in name}
+    assert len(told) == 6 and set(told.values()) == {"unknown"}
+    page = write_report(results.directory).read_text()
+    assert "error unknown" in page and not re.search(r"± 0\.0(?!\d)", page)
+    assert "that of the vibration was not estimated" in page
+
+
+def test_errors_of_totals_are_known_where_most_of_them_lies_in_known_bands() -> None:
+    """Of two equal bands and lines in none: squares add; a tenth may be unknown."""
+    band, error = np.array([[1.0, 1.0, 0.1]]), np.array([[0.3, 0.4, np.nan]])
+    assert _total_error(band, np.array([2.1]), error) == pytest.approx(0.25)
+    assert np.isnan(_total_error(band, np.array([2.3]), error)).all()
+    assert np.isnan(_total_error(band, np.array([2.1]), np.full((1, 3), np.nan))).all()
 
 
 def test_the_far_level_is_that_of_the_power(results: tireroad.RunResults) -> None:

@@ -1,0 +1,78 @@
+"""Third-octave levels of a run, under the one name and unit that every page and table has for each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tireroad.contact.results.spectra import SILENT, nominal
+from tireroad.runs.files.reader import RunResults
+
+Array = NDArray[np.float64]
+AXES = ("x", "y", "z")
+SOUND = "A-weighted sound pressure level at "  # a microphone
+POWER = "sound power level"
+# Of spectra.h5, by component: quantity, dataset, unit.
+_FORCES = (
+    ("axle force", "level", "dB re 1 N"),
+    ("contact force", "contact_level", "dB re 1 N"),
+    ("moment on the hub", "hub_moment_level", "dB re 1 N m"),
+)
+
+
+@dataclass(frozen=True)
+class BandLevels:
+    """Levels of one quantity: `name` and `unit`; `band` (b,) Hz, nominal; `level` (b,) dB and its
+    estimated `error` (b,) dB, NaN where there is none or it is unknown.
+    """
+
+    name: str
+    unit: str
+    band: Array
+    level: Array
+    error: Array
+
+
+def is_drawn(name: str) -> bool:
+    """Whether the pages chart the third octaves of a quantity: vertical forces, and sound."""
+    return name in ("axle force z", "contact force z", POWER) or name.startswith(SOUND)
+
+
+def rank(name: str) -> tuple[int, str]:
+    """Sorts quantities as `band_levels` yields them: forces, moments, sound at microphones, its power."""
+    for place, (quantity, *_) in enumerate(_FORCES):
+        if name.startswith(f"{quantity} "):
+            return place, name
+    return len(_FORCES) + (name == POWER), name
+
+
+def band_levels(run: RunResults) -> Iterator[BandLevels]:
+    """All third octaves of a run: forces and moments by component, sound at each microphone, its power."""
+    if "spectra/third_octave/centre" in run:
+        band = nominal(run["spectra/third_octave/centre"])
+        for quantity, key, unit in _FORCES:
+            path = f"spectra/third_octave/{key}"
+            if path in run:
+                level, error = run[path], _error(run, f"{path}_error", run[path])
+                for axis, name in enumerate(AXES):
+                    yield _heard(f"{quantity} {name}", unit, band, level[:, axis], error[:, axis])
+    if "sound/third_octave/level_a" in run:
+        band = nominal(run["sound/third_octave/centre"])
+        level = run["sound/third_octave/level_a"]
+        error = _error(run, "sound/third_octave/level_error", level)
+        for k, name in enumerate(run.attributes("sound")["microphone_names"]):
+            yield _heard(f"{SOUND}{name}", "dB(A) re 20 uPa", band, level[k], error[k])
+        power = run["sound/power"]
+        yield _heard(POWER, "dB re 1 pW", band, power, np.full_like(power, np.nan))
+
+
+def _error(run: RunResults, path: str, level: Array) -> Array:
+    return run[path] if path in run else np.full_like(level, np.nan)
+
+
+def _heard(name: str, unit: str, band: Array, level: Array, error: Array) -> BandLevels:
+    level = np.where(level > SILENT, level, np.nan)
+    return BandLevels(name, unit, band, level, np.where(np.isfinite(level), error, np.nan))
