@@ -1,6 +1,7 @@
 """The resolved scene as text: every default written out, with unit and meaning of each key."""
 
 import json
+import tomllib
 from math import isfinite
 from typing import Any
 
@@ -61,6 +62,11 @@ def _lines(holder: Any, path: str) -> list[str]:
         else:
             below += ["", f"[{inner}]  # {part.doc}", *_lines(value, inner)]
     return own + below
+
+
+def as_toml(table: Any) -> dict[str, Any]:
+    """One table of a scene as TOML has it."""
+    return tomllib.loads("\n".join(["[table]", *_lines(table, "table")]))["table"]
 
 
 def dumps(scene: Scene) -> str:
