@@ -293,6 +293,31 @@ def numbers(doc: str, unit: str, limits: Limits, default: tuple[float, ...] | No
     return parameter(key, default)
 
 
+def factors(doc: str, limits: Limits, *, only_for: OnlyFor = None) -> Any:
+    """A table of finite numbers by free names, each within the limits; absent by default."""
+
+    def read(value: Any) -> dict[str, float]:
+        if not isinstance(value, dict):
+            raise ValueError(f"must be a table of numbers by name, not {described(value)}")
+        result = {}
+        for name, one in value.items():
+            try:
+                result[name] = finite(one)
+                limits.check(result[name], "-")
+            except ValueError as error:
+                raise ValueError(f'"{name}" {error}') from None
+        return result
+
+    key = Key(
+        read=read,
+        doc=doc,
+        values=f"numbers by name, {limits}",
+        optional=True,
+        only_for=only_for,
+    )
+    return parameter(key, None)
+
+
 def texts(doc: str, *, only_for: OnlyFor = None) -> Any:
     """A list of texts, or a single one; empty by default."""
 

@@ -8,13 +8,20 @@ radius R,
 
     length = 2 R (Q_RA2 x + Q_RA1 sqrt(x)),  width = 2 w (Q_RB2 x + Q_RB1 x^(1/3)),  x = F / (C R)
 
-with the section's width w (Besselink, Schmeitz, Pacejka, Vehicle System Dynamics 48 S1, 2010).
+with the section's width w (Besselink, Schmeitz, Pacejka, Vehicle System Dynamics 48 S1, 2010). [DEFLECTION_LOAD_CURVE] holds rows of
+deflection (m) and load (N).
 
 Mass, modes and damping come from Fourier series around the inflated section (fem.sections.inflated,
 a second each); load, stiffness and footprint from the stages static and stiffness on a coarse mesh,
-whose ratio to the default mesh is taken from a last run there. Residuals are logarithms of ratios
-over each figure's tolerance; each parameter is a factor whose logarithm counts as a residual, too,
-over WIDE: what no figure determines stays.
+whose ratio to the default mesh is taken from a last run there.
+
+The factors f_k are those of the most likely tire: they minimise
+
+    sum_i rho(ln(y_i(f) / target_i) / tolerance_i) + sum_k (ln f_k / ln spread_k)^2,
+
+each drawn to 1 by the spread that its quantity has among tires. rho is Huber's: sharp where figures agree with
+one another, linear beyond, so that one that no plausible tire has is left off instead of bending all factors.
+What no figure determines stays; the report gives for each factor the standard deviation that is left.
 """
 
 from __future__ import annotations
@@ -24,7 +31,7 @@ import re
 import tempfile
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -35,9 +42,10 @@ from scipy.optimize import lsq_linear
 
 from tireroad.contact.roads.text_table import opened
 from tireroad.fem.errors import ConvergenceError, InputError
-from tireroad.fem.sections.construction import INFLATION, Construction
+from tireroad.fem.sections.construction import INFLATION
 from tireroad.fem.sections.inflated import InflatedRing
 from tireroad.fem.sections.radial import radial, size
+from tireroad.runs.factors import PARAMETERS, PLAUSIBLE, SCALED, construction
 from tireroad.runs.process import console
 from tireroad.runs.scene.resolved import scene_name
 
@@ -81,14 +89,16 @@ KINDS: Mapping[str, FigureKind] = {
     "footprint_length": FigureKind("m", 0.05, 0.01, 1, "", "at the load"),
     "footprint_width": FigureKind("m", 0.05, 0.01, 1, "", "at the load"),
 }
-LOADS = 0.03  # relative tolerance of the load at a deflection
+LOADS, PRINTS = 0.03, 0.05  # relative tolerance of the load at a deflection, of a footprint's sizes
+ALIKE = 4  # points of a curve from which on their errors are one another's
 MODES = "lateral", "yaw", "windup", "vertical"
 
 
 @dataclass(frozen=True, kw_only=True)
 class FitFigures:
-    """`size`, `inflation` Pa, the `load` N at which stiffness and footprint hold, `values` by KINDS, and
-    `loads`: pairs of deflection m and load N.
+    """`size`, `inflation` Pa, the `load` N at which stiffness and footprint hold, `values` by KINDS,
+    `loads`: pairs of deflection m and load N, `footprints`: load N, length m and width m, and the `rim_width`
+    m; None: that of the size's measuring rim.
     """
 
     size: str
@@ -96,13 +106,32 @@ class FitFigures:
     load: float
     values: Mapping[str, float] = field(default_factory=dict)
     loads: tuple[tuple[float, float], ...] = ()
+    footprints: tuple[tuple[float, float, float], ...] = ()
+    rim_width: float | None = None
     notes: tuple[str, ...] = ()
 
     @property
     def pressed(self) -> bool:
         """Whether there are figures of the tire on the road."""
         modal = {"mass", *(f"{mode}_{what}" for mode in MODES for what in ("frequency", "damping"))}
-        return bool(self.loads or set(self.values) - modal)
+        return bool(self.loads or self.footprints or set(self.values) - modal)
+
+    @property
+    def targets(self) -> dict[str, float]:
+        """The value asked for of each figure by name."""
+        found = {name: self.values[name] for name in KINDS if name in self.values}
+        found |= {_load_name(deflection): load for deflection, load in self.loads}
+        for load, length, width in self.footprints:
+            found |= {_print_name("length", load): length, _print_name("width", load): width}
+        return found
+
+    def tolerance(self, name: str) -> float:
+        """Relative tolerance of a figure; many points of one curve count as `ALIKE` do."""
+        if name in KINDS:
+            return KINDS[name].tolerance
+        is_load = name.startswith(_LOAD_AT)
+        count = len(self.loads) if is_load else len(self.footprints)
+        return (LOADS if is_load else PRINTS) * math.sqrt(max(count / ALIKE, 1.0))
 
 
 def read(path: Path, changes: Sequence[str] = ()) -> FitFigures:
@@ -137,7 +166,7 @@ def _parsed(text: str, path: Path) -> dict:
 
 
 def _from_table(table: dict, path: Path, notes: list[str]) -> FitFigures:
-    known = {"size", "inflation", "load", "loads", *KINDS}
+    known = {"size", "inflation", "load", "loads", "footprints", "rim_width", *KINDS}
     wrong = sorted(set(table) - known)
     if wrong:
         raise InputError(f"{path}: unknown key {wrong[0]}; valid: {', '.join(sorted(known))}")
@@ -147,21 +176,27 @@ def _from_table(table: dict, path: Path, notes: list[str]) -> FitFigures:
     if not isinstance(table["size"], str):
         raise InputError(f"{path}: size must be a text, as in size = {_EXAMPLE['size']}")
     values = {key: _checked(path, key, table[key]) for key in KINDS if key in table}
-    loads = []
-    for pair in table.get("loads", []):
-        if not (isinstance(pair, list) and len(pair) == 2):
-            raise InputError(f"{path}: loads is a list of pairs, [[deflection m, load N], ...]")
-        deflection = _number(path, "loads", pair[0], 1e-4, 0.5)
-        loads.append((deflection, _number(path, "loads", pair[1], 1, 1e6)))
+    rows = _rows(path, "loads", table, "pairs, [[deflection m, load N], ...]", _LOAD_RANGES)
+    loads = tuple((moved, load) for moved, load in rows if moved and load)  # a curve may begin at 0
+    printed = _rows(
+        path, "footprints", table, "rows, [[load N, length m, width m], ...]", _PRINT_RANGES
+    )
+    prints = tuple((load, length, width) for load, length, width in printed)
+    rim = table.get("rim_width")
+    rim = None if rim is None else _number(path, "rim_width", rim, 0.05, 0.5, "m")
     try:
-        radial(table["size"])
+        radial(table["size"], rim_width=rim)
     except InputError as error:
         raise InputError(f"{path}: {str(error).removeprefix('tire.')}") from None
-    if not values and not loads:
-        raise InputError(f"{path}: no figure to fit to; there are: {', '.join(KINDS)}, loads")
+    if not values and not loads and not prints:
+        known_figures = ", ".join(KINDS)
+        raise InputError(
+            f"{path}: no figure to fit to; there are: {known_figures}, loads, footprints"
+        )
     load = table.get("load")
     if load is None:
-        load = loads[-1][1] if loads else 4000.0
+        heaviest = [*(load for _, load in loads), *(row[0] for row in prints)]
+        load = max(heaviest, default=4000.0)
         if any(name.endswith("stiffness") for name in values):
             notes.append(f"load = {load:g} N taken for the load at which stiffness holds")
     return FitFigures(
@@ -169,9 +204,31 @@ def _from_table(table: dict, path: Path, notes: list[str]) -> FitFigures:
         inflation=_number(path, "inflation", table["inflation"], 1e4, 2e6, "Pa"),
         load=_number(path, "load", load, 10, 1e6, "N"),
         values=values,
-        loads=tuple(sorted(loads)),
+        loads=loads,
+        footprints=prints,
+        rim_width=rim,
         notes=tuple(notes),
     )
+
+
+_LOAD_RANGES = ((0.0, 0.5), (0.0, 1e6))
+_PRINT_RANGES = ((10.0, 1e6), (0.01, 1.0), (0.01, 1.0))
+
+
+def _rows(
+    path: Path, key: str, table: dict, form: str, ranges: Sequence[tuple[float, float]]
+) -> tuple[tuple[float, ...], ...]:
+    """Rows of numbers, ascending; each in its range."""
+    given = table.get(key, [])
+    if not isinstance(given, list) or not all(
+        isinstance(row, list) and len(row) == len(ranges) for row in given
+    ):
+        raise InputError(f"{path}: {key} is a list of {form}")
+    rows = [
+        tuple(_number(path, key, one, *limits) for one, limits in zip(row, ranges, strict=True))
+        for row in given
+    ]
+    return tuple(sorted(rows))
 
 
 _EXAMPLE = {"size": '"205/55 R16"', "inflation": "2.4e5   # Pa"}
@@ -368,6 +425,8 @@ def _of_tir(text: str, path: Path, notes: list[str], sized: bool) -> dict[str, A
     loads = _curve(tir, load, notes)
     table: dict[str, Any] = values | {"size": named} | ({"load": load} if load else {})
     table |= {"loads": loads} if loads else {}
+    if (rim := value("RIM_WIDTH")) and not sized:
+        table |= _fitting_rim(named, rim, notes)
     inflation = value("INFLPRES") or value("IP") or value("NOMPRES")
     if inflation is not None:
         return table | {"inflation": inflation}
@@ -375,6 +434,16 @@ def _of_tir(text: str, path: Path, notes: list[str], sized: bool) -> dict[str, A
         f"no INFLPRES in the file: inflation = {INFLATION:g} Pa taken (--set inflation=...)"
     )
     return table | {"inflation": INFLATION}
+
+
+def _fitting_rim(named: str, width: float, notes: list[str]) -> dict[str, float]:
+    """The file's rim, where the size can stand on it."""
+    try:
+        radial(named, rim_width=width)
+    except InputError as error:
+        notes.append(f"RIM_WIDTH not used: {error}")
+        return {}
+    return {"rim_width": width}
 
 
 def _size(path: Path, value: Callable[[str], float | None]) -> tuple[str, float]:
@@ -401,88 +470,46 @@ def _size(path: Path, value: Callable[[str], float | None]) -> tuple[str, float]
     return named, (made.rim + made.height) / radius - 1 if radius else 0.0
 
 
-WIDE = 1.0  # standard deviation of a parameter's logarithm where no figure speaks
 _STEP = 0.1  # of the finite differences, and the largest of an iteration is _TRUST
 _TRUST = 0.5
 _ITERATIONS = 8
+_COMPUTED = 6  # deflections of a run on the road
+_SAME = 5e-7  # a factor that is 1
 _ENOUGH = 0.02  # of a residual: change of the sum's root at which iterations end
 ELEMENTS, ORDER = 26, 2
 COARSE = 20, 20  # elements around, and from bead to bead, of the runs on the road
 
 
-@dataclass(frozen=True)
-class Parameter:
-    """A free factor of the built-in tire: name, range, and what it multiplies."""
-
-    name: str
-    least: float
-    most: float
-    doc: str
-
-
-PARAMETERS = (
-    Parameter("density", 0.6, 1.6, "densities of all compounds"),
-    Parameter("tread", 0.4, 3.0, "modulus of the tread"),
-    Parameter("skim", 0.4, 3.0, "modulus of the belt skim"),
-    Parameter("sidewall", 0.2, 4.0, "moduli of sidewall and ply rubber"),
-    Parameter("apex", 0.1, 4.0, "modulus of the apex"),
-    Parameter("carcass", 0.2, 5.0, "modulus of the carcass cords"),
-    Parameter("dynamic", 0.87, 1.7, "dynamic over static modulus of all compounds"),
-)
 _LOSSES = ("tread", "other")  # factors of the loss factors, fitted to the damping ratios afterwards
-_LOSS = 0.1, 3.0
+_LOSS, _LOSS_SPREAD = (0.1, 3.0), 1.0  # range, and standard deviation of a factor
+_SHARP, _KNEE = 4.0, 0.125  # of rho: weight of a residual, and where it turns linear, in tolerances
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """`factors` by parameter, and each figure with its target, what is `reached` and what the size alone gives."""
+    """`factors` by parameter, each figure as `reached` and as the size alone gives it at the `start`, and the
+    `left` standard deviation of each parameter's logarithm over the one that it has without figures."""
 
     figures: FitFigures
     factors: Mapping[str, float]
     start: Mapping[str, float]
     reached: Mapping[str, float]
+    left: Mapping[str, float] = field(default_factory=dict)
 
     def row(self, name: str) -> tuple[float, float, float]:
         """Target, of the size alone, reached."""
-        return target(self.figures, name), self.start[name], self.reached[name]
+        return self.figures.targets[name], self.start[name], self.reached[name]
 
 
-def target(figures: FitFigures, name: str) -> float:
-    """The value asked for; of loads by "load at ... m"."""
-    loads = {_load_name(deflection): load for deflection, load in figures.loads}
-    return loads[name] if name in loads else figures.values[name]
+_LOAD_AT = "load at "
 
 
 def _load_name(deflection: float) -> str:
-    return f"load at {1e3 * deflection:.4g} mm"
+    return f"{_LOAD_AT}{1e3 * deflection:.4g} mm"
 
 
-def construction(size: str, factors: Mapping[str, float]) -> Construction:
-    """The built-in construction of a size with factors by parameter."""
-    tire = radial(size)
-    own = {
-        "tread": "tread",
-        "skim": "skim",
-        "apex": "apex",
-        "sidewall": "sidewall",
-        "ply": "sidewall",
-    }
-    compounds = {}
-    for name, values in tire.compounds.items():
-        loss = factors.get("tread loss" if name == "tread" else "other loss", 1.0)
-        compounds[name] = dict(values) | {
-            "youngs_modulus": values["youngs_modulus"] * factors.get(own.get(name, ""), 1.0),
-            "density": values["density"] * factors.get("density", 1.0),
-            "dynamic": values["dynamic"] * (factors.get("dynamic", 1.0) if name != "bead" else 1.0),
-            "loss_factor": values["loss_factor"] * loss,
-        }
-    cords = [
-        replace(line, youngs_modulus=line.youngs_modulus * factors.get("carcass", 1.0))
-        if line.name == "carcass"
-        else line
-        for line in tire.cords
-    ]
-    return replace(tire, compounds=compounds, cords=cords)
+def _print_name(what: str, load: float) -> str:
+    return f"footprint {what} at {load:.5g} N"
 
 
 class Model:
@@ -491,16 +518,12 @@ class Model:
     def __init__(self, figures: FitFigures) -> None:
         self.figures, self.ratios = figures, dict[str, float]()
         self._known: dict[str, dict[str, float]] = {}  # figures on the road by scene
-        self.names = [
-            *(name for name in KINDS if name in figures.values and not name.endswith("damping")),
-            *(_load_name(deflection) for deflection, _ in figures.loads),
-        ]
+        self.names = [name for name in figures.targets if not name.endswith("damping")]
 
     def free(self, factors: Mapping[str, float]) -> dict[str, float]:
         """Mass, frequencies and damping ratios of the inflated tire on its rim."""
-        ring = InflatedRing(
-            construction(self.figures.size, factors), ELEMENTS, ORDER, self.figures.inflation
-        )
+        tire = construction(self.figures.size, factors, self.figures.rim_width)
+        ring = InflatedRing(tire, ELEMENTS, ORDER, self.figures.inflation)
         found = {"mass": ring.weight}
         for mode in ring.rigid_modes():
             found[f"{mode.name}_frequency"] = mode.frequency
@@ -525,12 +548,19 @@ class Model:
             text = text.replace(
                 "[tire]\n", f"[tire]\nsegments = {mesh[0]}\nelements_arc = {mesh[1]}\n", 1
             )
-        deflections = [deflection for deflection, _ in self.figures.loads]
-        rows = f"deflections = {deflections}" if len(deflections) > 2 else "steps = 3"
         return (
             f'name = "fit"\n{text}\n[static]\ninflation = {self.figures.inflation}\nload = {self.figures.load}\n'
-            f"error_estimate = false\n[stiffness]\n{rows}\n"
+            f"error_estimate = false\n[stiffness]\n{self._computed()}\n"
         )
+
+    def _computed(self) -> str:
+        """The deflections that are computed, as keys of [stiffness]: a few, between which the curve is smooth."""
+        moved = [deflection for deflection, _ in self.figures.loads]
+        if len(moved) > 2:
+            least, most = moved[0], moved[-1]
+            few = np.unique(np.round(np.linspace(least, most, min(len(moved), _COMPUTED)), 5))
+            return f"deflections = {few.tolist()}"
+        return f"steps = {_COMPUTED if len(self.figures.footprints) > 1 else 3}"
 
     def _read(self, out: Path) -> dict[str, float]:
         with h5py.File(out / "stiffness.h5") as file:
@@ -551,8 +581,11 @@ class Model:
             found[_load_name(there)] = float(at(there))
         loads = np.sort(curve["load"])
         for name in ("length", "width"):
-            values = curve[f"footprint_{name}"][np.argsort(curve["load"])]
-            found[f"footprint_{name}"] = float(np.interp(self.figures.load, loads, values))
+            sizes = curve[f"footprint_{name}"][np.argsort(curve["load"])]
+            over = PchipInterpolator(np.append(0.0, loads), np.append(0.0, sizes), extrapolate=True)
+            found[f"footprint_{name}"] = float(over(self.figures.load))
+            for there, *_ in self.figures.footprints:
+                found[_print_name(name, there)] = float(over(there))
         return found
 
     def all(self, factors: Mapping[str, float]) -> dict[str, float]:
@@ -565,16 +598,13 @@ class Model:
 
     def residuals(self, found: Mapping[str, float]) -> np.ndarray:
         """Logarithms of ratios to the targets over the tolerances."""
+        targets = self.figures.targets
         return np.array(
             [
-                np.log(found[name] / target(self.figures, name)) / _tolerance(name)
+                np.log(found[name] / targets[name]) / self.figures.tolerance(name)
                 for name in self.names
             ]
         )
-
-
-def _tolerance(name: str) -> float:
-    return KINDS[name].tolerance if name in KINDS else LOADS
 
 
 def _run(folder: Path) -> Path:
@@ -602,18 +632,20 @@ def _run(folder: Path) -> Path:
 
 
 def fit(figures: FitFigures) -> Fitted:
-    """The factors of the least sum of squares. Not collective; minutes with figures on the road, else seconds."""
+    """The most likely factors. Not collective; minutes with figures on the road, else seconds."""
     model = Model(figures)
     low, high = (np.log([getattr(one, end) for one in PARAMETERS]) for end in ("least", "most"))
+    drawn = np.diag([1 / one.deviation for one in PARAMETERS])
     place = np.zeros(len(PARAMETERS))
     start = found = model.all({})
     console.say(f"  {figures.size} as built: {_worst(model, found)}")
     jacobian = _jacobian(model, place, found) if model.names else np.zeros((0, len(place)))
     for iteration in range(_ITERATIONS if model.names else 0):
         rest = model.residuals(found)
-        wanted = np.concatenate([-rest, -place / WIDE])
-        matrix = np.vstack([jacobian, np.eye(len(place)) / WIDE])
+        weight = _weights(rest)
+        wanted = np.concatenate([-weight * rest, -drawn @ place])
         bounds = np.maximum(low - place, -_TRUST), np.minimum(high - place, _TRUST)
+        matrix = np.vstack([weight[:, None] * jacobian, drawn])
         step = lsq_linear(matrix, wanted, bounds=bounds).x
         if np.abs(step).max() < 1e-3:
             break
@@ -622,7 +654,7 @@ def fit(figures: FitFigures) -> Fitted:
         # Broyden: the Jacobian that explains what was seen.
         jacobian += np.outer(change - jacobian @ step, step) / (step @ step)
         before, after = (
-            np.hypot(np.linalg.norm(model.residuals(one)), np.linalg.norm(at) / WIDE)
+            _misfit(model.residuals(one), drawn @ at)
             for one, at in ((found, place), (new, place + step))
         )
         console.say(f"  iteration {iteration + 1}: {_worst(model, new)}")
@@ -639,7 +671,27 @@ def fit(figures: FitFigures) -> Fitted:
         console.say(f"  on the default mesh: {_worst(model, found)}")
         start = dict(start) | model.pressed({}, None)
     factors |= _losses(figures, factors)
-    return Fitted(figures, factors, start, found | model.free(factors))
+    weighted = _weights(model.residuals(found))[:, None] * jacobian if model.names else jacobian
+    return Fitted(figures, factors, start, found | model.free(factors), _left(weighted, drawn))
+
+
+def _weights(rest: np.ndarray) -> np.ndarray:
+    """Weights (n,) of the rows whose squares have the slope of rho at the residuals `rest` (n,)."""
+    return _SHARP * np.sqrt(np.minimum(1.0, _KNEE / np.maximum(np.abs(rest), 1e-12)))
+
+
+def _misfit(rest: np.ndarray, drawn: np.ndarray) -> float:
+    """Root of what is minimised."""
+    size = np.abs(rest)
+    rho = _SHARP**2 * np.where(size < _KNEE, size**2, _KNEE * (2 * size - _KNEE))
+    return math.sqrt(float(rho.sum() + drawn @ drawn))
+
+
+def _left(jacobian: np.ndarray, drawn: np.ndarray) -> dict[str, float]:
+    """Standard deviation of each parameter's logarithm with the figures, over that without them."""
+    spread = np.linalg.inv(jacobian.T @ jacobian + drawn @ drawn)
+    shares = np.sqrt(np.diag(spread)) * np.diag(drawn)
+    return {one.name: float(share) for one, share in zip(PARAMETERS, shares, strict=True)}
 
 
 def _corrected(model: Model, place: np.ndarray, found: Mapping[str, float]) -> dict[str, float]:
@@ -670,8 +722,9 @@ def _worst(model: Model, found: Mapping[str, float]) -> str:
     """The figure that is farthest off."""
     if not model.names:
         return "only damping ratios are asked for"
-    off = {name: found[name] / target(model.figures, name) - 1 for name in model.names}
-    name = max(off, key=lambda one: abs(off[one]) / _tolerance(one))
+    targets = model.figures.targets
+    off = {name: found[name] / targets[name] - 1 for name in model.names}
+    name = max(off, key=lambda one: abs(off[one]) / model.figures.tolerance(one))
     return f"{name} {100 * off[name]:+.1f} %, farthest off of {len(off)} figures"
 
 
@@ -688,74 +741,49 @@ def _losses(figures: FitFigures, factors: Mapping[str, float]) -> dict[str, floa
         columns.append(
             [found[name] / figures.values[name] / KINDS[name].tolerance for name in names]
         )
-    matrix = np.vstack([np.array(columns).T, np.eye(2) / WIDE])
-    wanted = np.concatenate([[1 / KINDS[name].tolerance for name in names], np.ones(2) / WIDE])
+    matrix = np.vstack([np.array(columns).T, np.eye(2) / _LOSS_SPREAD])
+    asked = [1 / KINDS[name].tolerance for name in names]
+    wanted = np.concatenate([asked, np.ones(2) / _LOSS_SPREAD])
     best = lsq_linear(matrix, wanted, bounds=_LOSS).x
     return {f"{which} loss": float(value) for which, value in zip(_LOSSES, best, strict=True)}
 
 
 def tire_table(figures: FitFigures, factors: Mapping[str, float]) -> str:
-    """The [tire] of a scene with these factors: size, compounds, carcass cords."""
-    tire = construction(figures.size, factors)
+    """The [tire] of a scene with these factors: size, rim, and factors that are not 1."""
     lines = ["[tire]", 'section = "radial"', f'size = "{figures.size}"']
-    for name, values in tire.compounds.items():
-        lines += [
-            "",
-            "[[tire.region]]",
-            f'name = "{name}"',
-            f"dynamic = {values['dynamic']:.5g}",
-            f"loss_factor = {values['loss_factor']:.4g}",
-            "[tire.region.material]",
-            *(
-                f"{key} = {values[key]:.6g}"
-                for key in ("youngs_modulus", "poisson_ratio", "density")
-            ),
-        ]
-    line = next(one for one in tire.cords if one.name == "carcass")
-    lines += ["", "[[tire.cords]]", 'name = "carcass"', f"angle = {np.degrees(line.angle):g}"]
-    keys = "youngs_modulus", "area", "spacing", "density", "compression"
-    lines += [f"{key} = {getattr(line, key):.6g}" for key in keys]
-    return "\n".join(lines) + "\n"
+    if figures.rim_width is not None:
+        lines.append(f"rim_width = {figures.rim_width:.6g}")
+    scale = [
+        f'"{key}" = {factors[name]:.6g}'
+        for name, keys in SCALED.items()
+        if name in factors and abs(factors[name] - 1) > _SAME
+        for key in keys
+    ]
+    return "\n".join([*lines, *(["", "[tire.scale]", *scale] if scale else [])]) + "\n"
 
 
 def report(found: Fitted) -> str:
     """The figures beside those reached, the factors, and what cannot be reached."""
     figures = found.figures
-    names = [
-        *(name for name in KINDS if name in figures.values),
-        *(_load_name(d) for d, _ in figures.loads),
-    ]
     rows = [("figure", "asked", "as built", "fitted", "off")]
     missed = []
-    for name in names:
+    for name in figures.targets:
         wanted, before, reached = found.row(name)
         off = reached / wanted - 1
-        unit = KINDS[name].unit if name in KINDS else "N"
-        rows.append(
-            (
-                f"{name}, {unit}",
-                f"{wanted:.5g}",
-                f"{before:.5g}",
-                f"{reached:.5g}",
-                f"{100 * off:+.1f} %",
-            )
-        )
-        if abs(off) > 2 * _tolerance(name):
+        values = (f"{wanted:.5g}", f"{before:.5g}", f"{reached:.5g}", f"{100 * off:+.1f} %")
+        rows.append((f"{name}, {_unit(name)}", *values))
+        if abs(off) > 2 * figures.tolerance(name):
             missed.append(f"{name} ({100 * off:+.1f} %)")
-    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
-    lines = [
-        "  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip()
-        for row in rows
-    ]
+    lines = _aligned(rows)
     lines += ["", "factors of the built-in tire's values:"]
-    documents = {one.name: one for one in PARAMETERS}
-    for name, value in found.factors.items():
-        one = documents.get(name)
-        at_end = one and min(value / one.least, one.most / value) < 1.001
-        ending = (
-            f" (at the end of its range, {one.least:g} to {one.most:g})" if one and at_end else ""
+    lines += _aligned([_factor_row(found, name) for name in found.factors])
+    strange = [name for name, value in found.factors.items() if _implausible(value)]
+    if strange:
+        named = ", ".join(f"{name} x {found.factors[name]:.2f}" for name in strange)
+        lines.append(
+            f"outside the plausible range, {1 / PLAUSIBLE:.2f} to {PLAUSIBLE:g}: {named}: look whether such a tire is "
+            "built, and whether the figures are all of one tire and of the same conditions"
         )
-        lines.append(f"  {name:12s} {value:.3f}  {one.doc if one else 'of loss factors'}{ending}")
     lines += [f"  note: {note}" for note in figures.notes]
     lines.append(
         f"not reached within twice the tolerance: {', '.join(missed)}"
@@ -763,6 +791,39 @@ def report(found: Fitted) -> str:
         else "all figures are reached within twice their tolerances"
     )
     return "\n".join(lines)
+
+
+def _unit(name: str) -> str:
+    if name in KINDS:
+        return KINDS[name].unit
+    return "N" if name.startswith(_LOAD_AT) else "m"
+
+
+def _aligned(rows: Sequence[tuple[str, ...]]) -> list[str]:
+    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+    cells = ([cell.ljust(w) for cell, w in zip(row, widths, strict=True)] for row in rows)
+    return ["  ".join(row).rstrip() for row in cells]
+
+
+def _implausible(factor: float) -> bool:
+    return max(factor, 1 / factor) > PLAUSIBLE
+
+
+_STAYS = 0.9  # of its spread without figures is left: they do not determine the factor
+
+
+def _factor_row(found: Fitted, name: str) -> tuple[str, ...]:
+    """Name, value, what is known of it, and what it multiplies."""
+    one = next((one for one in PARAMETERS if one.name == name), None)
+    value = found.factors[name]
+    if one is None:
+        return f"  {name}", f"{value:.3f}", "", "of loss factors"
+    left = found.left.get(name, 1.0)
+    stays = left > _STAYS and abs(math.log(value)) < (1 - _STAYS) * one.deviation
+    known = "no figure determines it" if stays else f"± {100 * left * one.deviation:.0f} %"
+    at_end = min(value / one.least, one.most / value) < 1.001
+    ending = f" (at the end of its range, {one.least:g} to {one.most:g})" if at_end else ""
+    return f"  {name}", f"{value:.3f}", known, f"{one.doc}{ending}"
 
 
 def command(path: Path, out: Path, changes: Sequence[str] = ()) -> str:

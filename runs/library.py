@@ -61,8 +61,9 @@ from tireroad.modal.rolling import RollingModes, named_states, rolling_modes
 from tireroad.modal.standing import named, standing_modes
 from tireroad.modal.states import StateModes
 from tireroad.modal.waves import FaceWaves, ModeNames
+from tireroad.runs.scene.parts import scaled
 from tireroad.runs.scene.rules import barred_from_contact
-from tireroad.runs.scene.sections.radial import RadialSection, built
+from tireroad.runs.scene.sections.radial import RadialSection
 from tireroad.runs.scene.sections.torus import TorusSection
 from tireroad.runs.scene.tables.contact import DRY_ASPHALT
 from tireroad.runs.scene.tables.tire import NEAR_ROAD, TireTable
@@ -100,7 +101,10 @@ _ARGUMENTS = {
     **{f"static.{name}": name for name in ("inflation", "load", "deflection", "road_height")},
     "rotation.speed": "turning.speed",
     **{f"modal.{name}": name for name in ("count", "up_to")},
-    **{f"tire.{name}": name for name in ("size", "grooves", "segments", "elements_arc")},
+    **{
+        f"tire.{name}": name
+        for name in ("size", "grooves", "rim_width", "scale", "segments", "elements_arc")
+    },
     **{f"tire.{name}": name for name in ("footprint_size", "order")},
 }
 _KEYS = re.compile("|".join(rf"(?<![\w.]){re.escape(key)}(?!\w)" for key in _ARGUMENTS))
@@ -211,6 +215,8 @@ def radial(
     size: str = "205/60 R15",
     *,
     grooves: int = 4,
+    rim_width: float | None = None,
+    scale: dict[str, float] | None = None,
     segments: int = 40,
     elements_arc: int = 26,
     footprint_size: float = NEAR_ROAD,
@@ -219,19 +225,26 @@ def radial(
     """The built-in radial passenger tire of a size, without loads (docs/radial-tire.md).
 
     `segments` elements around and `elements_arc` from bead to bead, quadratic; those near the road
-    are `footprint_size` of the others; `grooves` around its tread. Its rubbers have loss factors: with damping =
-    tireroad.StrainEnergy() the rotating tire loses by them. Raises InputError for a size that is
-    none, or a value out of the range that it has in a scene.
+    are `footprint_size` of the others; `grooves` around its tread; `rim_width` m, of the size's measuring rim if
+    None; `scale`: factors on its compounds and cords, as [tire.scale] of a scene: {"tread": 1.1, "belt angle": 0.9}.
+    Its rubbers have loss factors: with damping = tireroad.StrainEnergy() the rotating tire loses by them. Raises
+    InputError for a size that is none, or a value out of the range that it has in a scene.
     """
-    shape = RadialSection(size=size, grooves=grooves, elements_arc=elements_arc)
+    shape = RadialSection(
+        size=size,
+        grooves=grooves,
+        rim_width=rim_width,
+        scale=scale,
+        elements_arc=elements_arc,
+    )
     tire = TireTable(
         section="radial", shape=shape, segments=segments, order=2, footprint_size=footprint_size
     )
     try:
-        built(size, grooves)
+        made = scaled(tire, shape.scale or {})
     except InputError as problem:
         raise InputError(in_arguments(f"radial: {problem}")) from None
-    return make_tire(comm, tire)
+    return make_tire(comm, made)
 
 
 def _check_ranges(torus: Torus) -> None:

@@ -14,49 +14,156 @@ import numpy as np
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections.construction import Construction, CordLine, Layer, Outline, Part
 
-_SIZE = re.compile(r"\s*(\d{3})\s*/\s*(\d{2})\s*Z?R\s*(\d{2})\s*", re.IGNORECASE)
-
+_SIZE = re.compile(
+    r"(?P<use>P|LT)?\s*(?P<width>\d{3})\s*/\s*(?P<ratio>\d{2})\s*(?P<within>[HQSTVWYZ])?\s*R\s*(?P<rim>\d{2})\s?(?P<light>C|LT)?"
+    r"(?:\s*[\s(]\s*(?P<index>\d{2,3})(?:\s*/\s*\d{2,3})?\s*(?P<symbol>[A-Z])?\s*\)?)?"
+    r"(?P<marks>(?:\s+(?:XL|EXTRA\s*LOAD|REINFORCED|SL|M\s?[+&]\s?S|3PMSF|TL|(?:LR?\s?)?[B-F]|\d{1,2}\s?PR))*)",
+    re.IGNORECASE,
+)
 
 RATED_PRESSURE = 2.5e5  # Pa
+_REINFORCED = 2.9e5  # Pa, the pressure of the load indices of reinforced (XL) tires
+_STRONGER = (
+    1.08  # a load index over the size's as a standard tire from which on it is a reinforced one's
+)
+# Speed symbols, km/h (ECE R30).
+SPEEDS = {
+    "F": 80, "G": 90, "J": 100, "K": 110, "L": 120, "M": 130, "N": 140, "P": 150, "Q": 160, "R": 170,
+    "S": 180, "T": 190, "U": 200, "H": 210, "V": 240, "W": 270, "Y": 300,
+}  # fmt: skip
+FIRST_INDEX = 50
+# kg by load index from 50 on (ECE R30, Annex 4).
+CAPACITIES = (
+    190, 195, 200, 206, 212, 218, 224, 230, 236, 243, 250, 257, 265, 272, 280, 290, 300, 307, 315, 325,
+    335, 345, 355, 365, 375, 387, 400, 412, 425, 437, 450, 462, 475, 487, 500, 515, 530, 545, 560, 580,
+    600, 615, 630, 650, 670, 690, 710, 730, 750, 775, 800, 825, 850, 875, 900, 925, 950, 975, 1000, 1030,
+    1060, 1090, 1120, 1150, 1180, 1215, 1250, 1285, 1320, 1360, 1400, 1450, 1500, 1550, 1600, 1650, 1700,
+)  # fmt: skip
+# Width of the measuring rim over that of the section by the least aspect ratio (%) for which it holds (ISO
+# 4000-1), in steps of half an inch.
+RIM_OVER_WIDTH = ((75, 0.70), (60, 0.75), (50, 0.80), (45, 0.85), (30, 0.90), (0, 0.92))
+HALF_INCH, _SAME = 0.0127, 1e-6
+# Width of the theoretical rim, on which a section has its nominal width, over that: from an aspect ratio of 50 % up, and
+# below. Usual are 0.70 and 0.85; ECE R30 leaves the factor to the maker.
+THEORETICAL_RIM, _LOW = (0.74, 0.87), 48  # -, %
+WIDENS = 0.4  # section width over rim width, m/m: 5 mm for half an inch (ECE R30)
+OTHER_RIMS = 0.0254  # m, an inch: how much narrower or wider a rim may be than the measuring rim
 
 
 @dataclass(frozen=True)
 class Size:
-    """Section `width`, section `height` and `rim` radius, all in m."""
+    """`nominal` section width, section `height` and `rim` radius, all in m.
 
-    width: float
+    `index` and `symbol`: load index and speed symbol where they are given; `reinforced`: marked so;
+    `light_truck`: LT or C.
+    """
+
+    nominal: float
     height: float
     rim: float
+    index: int | None = None
+    symbol: str | None = None
+    reinforced: bool = False
+    light_truck: bool = False
 
-    def rated_load(self, inflation: float = RATED_PRESSURE) -> float:
-        """Load (N) that the size is rated for at an `inflation` (Pa), as a standard, not a reinforced tire.
+    @property
+    def ratio(self) -> float:
+        """Height of the section over its nominal width."""
+        return self.height / self.nominal
 
-        1.95e-3 width^0.86 height^0.89 rim diameter^0.63 kg, in mm, at 250 kPa: within 4.3 % (standard
-        deviation 1.7 %) of the load indices of 41 sizes from 145/80 R13 to 275/40 R19.  Below that pressure
-        its 0.8th power, as in the tables of tire standards; above, no more.
+    @property
+    def width(self) -> float:
+        """Width (m) of the section on the measuring rim: nominal on the theoretical rim, and wider by 0.4 of the rest."""
+        theoretical = THEORETICAL_RIM[round(100 * self.ratio) < _LOW] * self.nominal
+        return self.nominal + WIDENS * (self.measuring_rim - theoretical)
+
+    @property
+    def measuring_rim(self) -> float:
+        """Width (m) between the flanges of the rim on which tires of this size are measured (ISO 4000-1)."""
+        percent = round(100 * self.ratio)
+        share = next(share for least, share in RIM_OVER_WIDTH if percent >= least)
+        return HALF_INCH * round(share * self.nominal / HALF_INCH)
+
+    @property
+    def speed(self) -> float | None:
+        """Speed (m/s) of the speed symbol."""
+        return None if self.symbol is None else SPEEDS[self.symbol] / 3.6
+
+    @property
+    def rated_pressure(self) -> float | None:
+        """Inflation (Pa) at which the rated load holds; None for a light truck's index: it is on the tire."""
+        if self.index is not None and self.light_truck:
+            return None
+        heavier = self.index is not None and self._capacity > _STRONGER * self._standard_load
+        return _REINFORCED if self.reinforced or heavier else RATED_PRESSURE
+
+    @property
+    def _capacity(self) -> float:
+        """Load (N) of the load index."""
+        assert self.index is not None, "the size gives no load index"
+        return 9.81 * CAPACITIES[self.index - FIRST_INDEX]
+
+    @property
+    def _standard_load(self) -> float:
+        """Load (N) that sizes like this one are rated for as standard, not reinforced tires, at 250 kPa.
+
+        1.95e-3 width^0.86 height^0.89 rim diameter^0.63 kg, in mm: within 4.3 % (standard deviation
+        1.7 %) of the load indices of 41 sizes from 145/80 R13 to 275/40 R19.
         """
-        width, height, diameter = 1e3 * self.width, 1e3 * self.height, 2e3 * self.rim
-        index = 1.950e-3 * width**0.8634 * height**0.8949 * diameter**0.6315
-        return 9.81 * index * min(inflation / RATED_PRESSURE, 1.0) ** 0.8
+        width, height, diameter = 1e3 * self.nominal, 1e3 * self.height, 2e3 * self.rim
+        return 9.81 * 1.950e-3 * width**0.8634 * height**0.8949 * diameter**0.6315
+
+    def rated_load(self, inflation: float | None = None) -> float:
+        """Load (N) that the tire is rated for at an `inflation` (Pa); None: at its rated pressure.
+
+        By its load index where that is given, else as a standard tire of that size. Below the rated
+        pressure its 0.8th power, as in the tables of tire standards; above, no more.
+        """
+        most = self._standard_load if self.index is None else self._capacity
+        if inflation is None or self.rated_pressure is None:
+            return most
+        return most * min(inflation / self.rated_pressure, 1.0) ** 0.8
 
     def inflation_for(self, load: float) -> float:
-        """Least inflation (Pa) at which a `load` (N) is rated; at most 250 kPa."""
-        return RATED_PRESSURE * min(load / self.rated_load(), 1.0) ** 1.25
+        """Least inflation (Pa) at which a `load` (N) is rated; at most the rated pressure."""
+        most = self.rated_pressure or RATED_PRESSURE
+        return most * min(load / self.rated_load(), 1.0) ** 1.25
 
 
 def size(text: str) -> Size:
     """Parse 205/60 R15: section width in mm, height over width in %, rim diameter in inches.
 
-    Raises InputError for another format or a size out of range."""
-    found = _SIZE.fullmatch(text)
+    Also with P or LT before it, C after it, load index, speed symbol and marks: P205/60R15 91V,
+    LT245/75R16 120/116S, 255/40 ZR17 (98W) XL. Of two load indices the first, of single tires, counts.
+    Raises InputError for another format or a size out of range.
+    """
+    shown = f'tire.size = "{text[:40]}"'
+    found = _SIZE.fullmatch(text.strip())
     if not found:
-        raise InputError(f'tire.size = "{text[:40]}": must be like "205/60 R15"')
-    width, ratio, inches = (int(part) for part in found.groups())
+        raise InputError(
+            f'{shown}: must be like "205/60 R15", "P205/60R15 91V" or "LT245/75R16 120/116S"'
+        )
+    width, ratio, inches = (int(found[part]) for part in ("width", "ratio", "rim"))
     if not (125 <= width <= 355 and 25 <= ratio <= 85 and 10 <= inches <= 24):
         raise InputError(
-            f'tire.size = "{text[:40]}": from 125 to 355 mm wide, 25 to 85 % high, on rims of 10 to 24 inches'
+            f"{shown}: from 125 to 355 mm wide, 25 to 85 % high, on rims of 10 to 24 inches"
         )
-    return Size(width / 1e3, width * ratio / 1e5, inches * 0.0254 / 2)
+    index, last = int(found["index"] or 0), FIRST_INDEX + len(CAPACITIES) - 1
+    if index and not FIRST_INDEX <= index <= last:
+        raise InputError(f"{shown}: load index {index} must lie from {FIRST_INDEX} to {last}")
+    symbol = (found["symbol"] or (found["within"] or "").replace("Z", "").replace("z", "")).upper()
+    if symbol and symbol not in SPEEDS:
+        raise InputError(f"{shown}: speed symbol {symbol} must be one of {', '.join(SPEEDS)}")
+    marks = " ".join(found["marks"].upper().split())
+    return Size(
+        width / 1e3,
+        width * ratio / 1e5,
+        inches * 0.0254 / 2,
+        index=index or None,
+        symbol=symbol or None,
+        reinforced=bool(re.search(r"\b(XL|EXTRA ?LOAD|REINFORCED)\b", marks)),
+        light_truck=bool(found["light"]) or (found["use"] or "").upper() == "LT",
+    )
 
 
 STEEL = {"youngs_modulus": 190e9, "area": 0.246e-6, "spacing": 1.25e-3, "density": 7850.0}
@@ -82,12 +189,16 @@ COMPOUNDS = {
 }
 
 FLANGE = 0.016  # m above the rim; below it the rim holds the tire
-RIM = 0.383  # half width of the rim over the section's width
+# How far the flange leads the face outwards: m, and at most this share of the wall's overhang over the rim.
+LEAN = 0.0105, 0.38
 WIDEST = 0.60  # of the section's height
 APEX = 0.5  # of the length from the flange to the widest point
 TREAD = 0.325  # half width of the crown over the section's width, at an aspect ratio of 60 %
-CROWN = 0.13  # drop of the crown at its edge over its half width
-ROUND = 2.6  # exponent of that drop over the half width: flat in the middle, rounder to the edges
+WIDER = 0.25  # by how much that grows for an aspect ratio lower by 1
+CROWN = 0.0704  # drop of the crown at its edge over the section's height
+# Exponent of that drop over the half width, from an aspect ratio of 55 % up; below, it goes with the ratio's inverse:
+# crowns of low sections are flat in the middle and round at their edges.
+ROUND, FLATTER = 2.6, 0.55
 SHOULDER = 0.075, 0.030  # how far out and down the shoulder reaches from there, over the width
 LOWEST = (
     0.4,
@@ -95,8 +206,9 @@ LOWEST = (
 )  # largest drop of the crown and of the shoulder over the height above the widest point
 BELT_2 = 0.9  # its width over that of belt 1, which ends at the edge of the crown
 GROOVES, MOST_GROOVES = 4, 8  # around the tread
+GROOVED = "tread"  # the compound that they cut
 GROOVE = 0.07  # width of each over that of the crown: 9.3 mm for 205/60 R15
-LEAST_HEIGHT = 0.055  # m of a section; less leaves no sidewall above the flange
+LEAST_HEIGHT = 0.057  # m of a section; less leaves no sidewall above the flange
 
 
 class _Stations(NamedTuple):
@@ -111,8 +223,10 @@ class _Stations(NamedTuple):
     end: float
 
 
-def radial(text: str, grooves: int = GROOVES) -> Construction:
-    """The construction for a size. Raises InputError for an invalid size or too low a section.
+def radial(text: str, grooves: int = GROOVES, rim_width: float | None = None) -> Construction:
+    """The construction for a size on a rim of `rim_width` m between its flanges, by default its measuring rim.
+
+    Raises InputError for an invalid size, too low a section, or a rim that does not fit.
 
     The circumferential `grooves`, as deep as the tread, take the share 1 - l = 0.07 `grooves` of it, which
     is spread over its width: E and density times l. That is exact for stretch and shear along ribs. Across
@@ -126,7 +240,7 @@ def radial(text: str, grooves: int = GROOVES) -> Construction:
             f'tire.size = "{text[:40]}": its section is {1e3 * tire.height:.0f} mm high; the built-in '
             f"construction needs {1e3 * LEAST_HEIGHT:.0f} mm"
         )
-    outline = Outline(_outline(tire))
+    outline = Outline(_outline(tire, _rim(tire, rim_width)))
     at = _stations(tire, outline)
     return Construction(
         outline=outline,
@@ -140,19 +254,28 @@ def radial(text: str, grooves: int = GROOVES) -> Construction:
         ),
         cords=_cords(at),
         compounds={
-            name: _rubber(values, 1 - GROOVE * grooves if name == "tread" else 1.0)
-            for name, values in COMPOUNDS.items()
+            name: _filling(rubber(name), land(grooves) if name == GROOVED else 1.0)
+            for name in COMPOUNDS
         },
         tread=at.shoulder,
         held=at.held,
     )
 
 
-def _rubber(values: tuple[float, ...], land: float) -> dict[str, float]:
-    """Values by name of a compound that fills the share `land` of its layer."""
+def land(grooves: int) -> float:
+    """Share of its layer that the tread between so many grooves fills."""
+    return 1 - GROOVE * grooves
+
+
+def rubber(name: str) -> dict[str, float]:
+    """Values by name of a compound."""
     names = ("youngs_modulus", "poisson_ratio", "density", "dynamic", "loss_factor", "exponent")
-    found = dict(zip(names, values, strict=True))
-    return found | {key: land * found[key] for key in ("youngs_modulus", "density")}
+    return dict(zip(names, COMPOUNDS[name], strict=True))
+
+
+def _filling(values: dict[str, float], share: float) -> dict[str, float]:
+    """Values of a layer of which a compound fills a `share`."""
+    return values | {key: share * values[key] for key in ("youngs_modulus", "density")}
 
 
 def _layers(at: _Stations) -> tuple[Layer, ...]:
@@ -183,19 +306,37 @@ def _layers(at: _Stations) -> tuple[Layer, ...]:
     )
 
 
-def _outline(tire: Size) -> np.ndarray:
-    """Points (r, y) of the outer face from the crown to the heel of the bead."""
-    top, w, flat = tire.rim + tire.height, tire.width, _flat(tire)
-    widest, rim = tire.rim + WIDEST * tire.height, RIM * tire.width
+def _rim(tire: Size, width: float | None) -> float:
+    """The rim's width in m, of its measuring rim if None."""
+    if width is None:
+        return tire.measuring_rim
+    least, most = (tire.measuring_rim + sign * OTHER_RIMS for sign in (-1, 1))
+    if not least * (1 - _SAME) <= width <= most * (1 + _SAME):
+        raise InputError(
+            f"tire.rim_width = {width:g} m: rims for a section of {1e3 * tire.nominal:.0f} mm are {least:.4f} to "
+            f"{most:.4f} m wide (measuring rim {tire.measuring_rim:.4f} m)"
+        )
+    return width
+
+
+def _outline(tire: Size, rim_width: float) -> np.ndarray:
+    """Points (r, y) of the outer face from the crown to the heel of the bead.
+
+    On another rim than the measuring rim the section is wider by 0.4 of what the rim is wider.
+    """
+    top, flat = tire.rim + tire.height, _flat(tire)
+    w = tire.width + WIDENS * (rim_width - tire.measuring_rim)
+    widest, rim = tire.rim + WIDEST * tire.height, rim_width / 2
     upper = top - widest
-    drop = min(CROWN * flat, LOWEST[0] * upper)
+    drop = min(CROWN * tire.height, LOWEST[0] * upper)
+    power = ROUND * max(FLATTER / tire.ratio, 1.0)
     y = flat * np.array([0, 0.25, 0.5, 0.75, 0.92])
-    crown = np.stack([top - drop * (y / flat) ** ROUND, y], axis=-1)
+    crown = np.stack([top - drop * (y / flat) ** power, y], axis=-1)
     middle = np.array([widest, 0.5 * w])
-    out, down = (part * w for part in SHOULDER)
+    out, down = (part * tire.nominal for part in SHOULDER)
     down = min(drop + down, LOWEST[1] * upper)
     above = _leaving(middle, np.array([top - down, min(flat + out, 0.47 * w)]))
-    lean = min(0.009, 0.044 * w)  # of the flange, outwards
+    lean = min(LEAN[0], LEAN[1] * (0.5 * w - rim))
     below = _leaving(middle, np.array([tire.rim + FLANGE, rim + lean]))
     seat = [(tire.rim + FLANGE / 2, rim + lean / 3), (tire.rim, rim)]
     return np.concatenate([crown, above[::-1], [middle], below, seat])
@@ -211,8 +352,7 @@ def _leaving(middle: np.ndarray, end: np.ndarray) -> np.ndarray:
 
 def _flat(tire: Size) -> float:
     """Half width of the crown up to its rounded shoulder, m: larger for low aspect ratios."""
-    ratio = tire.height / tire.width
-    return float(np.clip(TREAD + 0.3 * (0.6 - ratio), 0.27, 0.45)) * tire.width
+    return float(np.clip(TREAD + WIDER * (0.60 - tire.ratio), 0.27, 0.45)) * tire.nominal
 
 
 def _stations(tire: Size, outline: Outline) -> _Stations:

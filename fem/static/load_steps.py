@@ -656,6 +656,6 @@ def with_cause(
     return ConvergenceError(
         f"static: rotation.speed = {rolling.speed:g} rad/s lies beyond the critical speed, up to which the tire has "
         f"a steady rolling shape: at rest it converges, at this speed it does not ({error.fact.removeprefix('static: ')}). "
-        "Lower the speed, raise the inflation or stiffen the material; static.steady_rolling = false takes the "
+        "The rolling shape has the moduli at rest and no losses, which carry a real tire further. Lower the speed, raise the inflation or stiffen the material; static.steady_rolling = false takes the "
         "shape at rest, whose rotating stage reports the critical speed."
     )

@@ -17,13 +17,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
 from tireroad.fem.errors import InputError
-from tireroad.fem.parameters import Parameters, Registry, plain
+from tireroad.fem.parameters import Parameters, Registry, keys, plain
 
 if TYPE_CHECKING:
     from ufl.core.expr import Expr
@@ -58,6 +58,23 @@ class MaterialLaw(Parameters):
     def poisson(self) -> float:
         """Poisson's ratio at zero strain: (3 K - 2 G) / (6 K + 2 G)."""
         return (3 * self.bulk - 2 * self.shear) / (6 * self.bulk + 2 * self.shear)
+
+    def times(self, factor: float) -> Self:
+        """The law of `factor` times the energy, which its parameters in Pa are multiplied by."""
+        values = {
+            item.name: getattr(self, item.name)
+            for item, key in keys(type(self))
+            if key.unit == "Pa"
+        }
+        return replace(
+            self,
+            **{
+                name: tuple(factor * one for one in value)
+                if isinstance(value, tuple)
+                else factor * value
+                for name, value in values.items()
+            },
+        )
 
     @staticmethod
     def energy(C: Expr, *coefficients: Expr) -> tuple[Expr, Expr]:

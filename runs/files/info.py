@@ -11,6 +11,7 @@ import numpy as np
 from tireroad.fem.errors import InputError
 from tireroad.runs.files import disk
 from tireroad.runs.files.store import verify
+from tireroad.runs.scene.parts import in_lines, listed
 
 LONG = 96  # longest attribute text printed in full
 
@@ -45,7 +46,12 @@ def describe(file: Path, as_json: bool = False) -> str:
         with h5py.File(file, "r") as opened:
             if as_json:
                 return json.dumps(_held(file, opened, whole), indent=1)
-            lines = (*_head(file, opened, whole), *_attributes(opened), *_datasets(opened))
+            lines = (
+                *_head(file, opened, whole),
+                *_attributes(opened),
+                *_tire(opened),
+                *_datasets(opened),
+            )
             return "\n".join(_printable(line) for line in lines)
     except Exception as error:  # HDF5 and h5py raise all kinds of errors on a damaged foreign file
         raise InputError(f"{file} is damaged: {type(error).__name__}: {error}") from error
@@ -119,6 +125,19 @@ def _attributes(file: h5py.File) -> Iterator[str]:
     width = max(len(name) for name in file.attrs)
     for name in file.attrs:
         yield f"  {name:<{width}}  {_value(name, file.attrs[name])}"
+
+
+def _tire(file: h5py.File) -> Iterator[str]:
+    """Compounds and cords of the tire, where the scene of the run has them all."""
+    text = file.attrs.get("scene")
+    try:
+        tables = tomllib.loads(text) if isinstance(text, str) else {}
+        lines = in_lines(listed(tables.get("tire", {})))
+    except (InputError, KeyError, TypeError, ValueError):
+        return  # a scene of another version, or damaged
+    if lines:
+        yield ""
+        yield from lines
 
 
 def _value(name: str, value: object) -> str:

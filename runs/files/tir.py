@@ -261,7 +261,7 @@ class _AsRun:
                 "loss_factor": one.loss_factor,
                 "spectrum": one.spectrum,
             }
-            for name, one in shape.rubbers(scene.tire).items()
+            for name, one in shape.in_layers(scene.tire).items()
         }
 
     def section(self, elements: int, order: int) -> SectionMesh:

@@ -25,6 +25,7 @@ from tireroad.runs.report.read import (
     Absent,
     Results,
     Section,
+    TextTable,
     about,
     bounded,
     digits,
@@ -33,6 +34,8 @@ from tireroad.runs.report.read import (
 from tireroad.runs.report.realism import unusual
 from tireroad.runs.report.scene_keys import scene_keys
 from tireroad.runs.report.sections import forces, modes, sound, spectra, tire
+from tireroad.runs.report.sections.speeds import speeds
+from tireroad.runs.scene.parts import Listing, listed
 from tireroad.runs.scene.plan import STAGES
 from tireroad.runs.version import PROGRAM
 
@@ -274,7 +277,8 @@ def render(directory: Path) -> str:
     stages = summary.get("stages", {})
     ended = [("run", text)] if (text := folder.ending(summary)) else []
     judged = verdicts(summary.get("stages_known", {}))
-    sections, left_out, provenance = build_sections(directory, scene, stages, problems)
+    known = summary.get("stages_known", {})
+    sections, left_out, provenance = build_sections(directory, scene, known, problems)
     with Results(directory, scene) as results:
         facts, strange = answer(results, summary.get("stages_known", {})), unusual(results)
         short = too_short(results)
@@ -303,6 +307,7 @@ def render(directory: Path) -> str:
         judged=judged,
         costs=costs(stages),
         parameters=parameters(scene),
+        built_of=[(title, TextTable(head, rows)) for title, head, rows in built_of(scene)],
         provenance=provenance,
         sections=sections,
         left_out=left_out,
@@ -394,6 +399,8 @@ def build_sections(
             try:
                 sections.append(build(results))
                 provenance = provenance or short_attributes(results, name)
+                if name == "rotating.h5" and (ends := speeds(results, stages)) is not None:
+                    sections.append(ends)
             except Absent as absence:
                 skipped = stages.get(name.removesuffix(".h5"), {}).get("reason")
                 reason = results.left_out.get(name) or skipped or str(absence)
@@ -437,8 +444,22 @@ def costs(stages: Mapping) -> list[dict]:
     return rows
 
 
+def built_of(scene: Mapping) -> list[Listing]:
+    """Compounds and cords of a tire that has them all in its scene; empty for others, and for a damaged scene."""
+    try:
+        return listed(scene.get("tire", {}))
+    except (InputError, KeyError, TypeError, ValueError):
+        return []
+
+
 def parameters(scene: Mapping) -> list[tuple[str, list[tuple[str, str]]]]:
-    """The scene's tables as (title, [(key, value with unit)]), sub-tables listed separately."""
+    """The scene's tables as (title, [(key, value with unit)]), sub-tables listed separately.
+
+    Without the compounds and cords that `built_of` lists.
+    """
+    if built_of(scene):
+        tire = {k: v for k, v in scene["tire"].items() if k not in ("region", "cords")}
+        scene = {**scene, "tire": tire}
     found: dict[tuple, list[tuple[str, str]]] = {}
     for one in scene_keys(scene):
         rows = found.setdefault(one.table, [])

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 import numpy as np
 
 from tireroad.fem.errors import InputError
-from tireroad.fem.sections.radial import RATED_PRESSURE, size
+from tireroad.fem.sections.radial import size
 from tireroad.runs.report.read import Absent, Results, digits, quantity
 
 _LOWEST = 6  # modes whose damping is checked
@@ -117,9 +117,11 @@ def _rating(results: Results) -> Iterator[str]:
         return
     own = size(tire["size"])
     if load > _OVERLOAD * own.rated_load(inflation):
-        needed = own.inflation_for(load)
+        most = own.rated_load()
         remedy = (
-            f"{quantity(needed, 'Pa')} would do" if needed < RATED_PRESSURE else "too much for it"
+            f"{quantity(own.inflation_for(load), 'Pa')} would do"
+            if load < most
+            else "too much for it"
         )
         yield (
             f"load {quantity(load, 'N')} on {tire['size']} at {quantity(inflation, 'Pa')}, rated for "

@@ -19,9 +19,11 @@ from pathlib import Path
 from typing import Any
 
 from tireroad.contact.choices import USABLE
+from tireroad.contact.tread.laws.elastic import ElasticTread
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Key, ParameterError, described, second_digit
 from tireroad.runs.scene import rules
+from tireroad.runs.scene.parts import with_parts
 from tireroad.runs.scene.plan import meets_road, skipped
 from tireroad.runs.scene.resolved import literal, scene_name
 from tireroad.runs.scene.schema import (
@@ -49,9 +51,11 @@ from tireroad.runs.scene.tables.scene import (
     filled,
     rubbed,
 )
-from tireroad.runs.scene.tables.tire import SECTIONS, check_series
+from tireroad.runs.scene.tables.tire import SECTIONS, TireTable, check_series
 
 LARGEST = 1_000_000
+
+Say = Callable[[str], object]
 
 
 def read_text(path: Path) -> str:
@@ -162,9 +166,6 @@ def _given(path: Path_, changed: Set[Path_]) -> bool:
     return any(path[: len(one)] == one or one[: len(path)] == path for one in changed)
 
 
-Say = Callable[[str], object]
-
-
 def by_section(raw: dict[str, Any]) -> None:
     """Set what follows from the kind of section: a mesh's section, a section's tread."""
     tire, contact = raw.get("tire"), raw.get("contact")
@@ -175,6 +176,21 @@ def by_section(raw: dict[str, Any]) -> None:
     kind = tire.get("section")
     if isinstance(contact, dict) and isinstance(kind, str) and kind in SECTIONS:
         contact.setdefault("tread", SECTIONS[kind].tread_law)
+
+
+def with_merged(scene: Scene, raw: dict[str, Any], source: Source, say: Say) -> Scene:
+    """Merge the stated compounds and cords into those of the tire, once [tire] is found right."""
+    if "tire" in source.broken():
+        return scene
+    check_series(scene.tire, source)
+    scene.tire.shape.check(scene.tire, source)
+    if "tire" in source.broken():
+        return scene
+
+    def read(merged: dict[str, Any]) -> TireTable:
+        return _table(TireTable, merged, ("tire",), source)
+
+    return replace(scene, tire=with_parts(scene.tire, _keys_in(raw, "tire"), read, source, say))
 
 
 BAND_EDGE = 10**0.05  # upper edge of a third octave over its middle
@@ -283,6 +299,28 @@ def _unheard(wanted: float, speed: float, scene: Scene) -> float:
     return round(count * digit, 9)
 
 
+TREAD_RUBBER = (
+    1e7  # Pa: contact.youngs_modulus of a radial tire, whose own tread is taken for usual
+)
+
+
+def with_tread_rubber(scene: Scene, raw: dict[str, Any], say: Say) -> Scene:
+    """Rubber of the contact of a radial tire where the scene leaves it open: as much stiffer as its tread."""
+    contact, stiffer = scene.contact, scene.tire.shape.tread_over_own(scene.tire)
+    if contact is None or stiffer is None or "youngs_modulus" in _keys_in(raw, "contact"):
+        return scene
+    if not isinstance(contact.law, ElasticTread):
+        return scene
+    modulus = float(f"{TREAD_RUBBER * stiffer:.6g}")
+    times = (
+        f", {stiffer:.4g} times that of a usual tread as the tire's own is" if stiffer != 1 else ""
+    )
+    say(f"contact.youngs_modulus = {modulus:g} Pa, of tread rubber{times}")
+    return replace(
+        scene, contact=replace(contact, law=replace(contact.law, youngs_modulus=modulus))
+    )
+
+
 def with_speed(scene: Scene) -> Scene:
     """Set the wheel's speed for a travel speed until the static state gives its rolling radius."""
     rotation = scene.rotation
@@ -384,13 +422,12 @@ def load(
         source.add(
             ("name",), f"must be letters, digits, '.', '_', '-', not {described(scene.name)}"
         )
+    scene = with_merged(scene, raw, source, say)
     scene = with_band(rubbed(filled(scene)), raw, say)
     scene = replace(scene, tire=scene.tire.with_elements(scene.static.on_road))
     if "tire" not in source.broken():
-        check_series(scene.tire, source)
-        scene.tire.shape.check(scene.tire, source)
-    if "tire" not in source.broken():
-        scene = with_points(with_speed(with_damping(scene)), raw, say)
+        scene = with_tread_rubber(with_damping(scene), raw, say)
+        scene = with_points(with_speed(scene), raw, say)
     scene = with_outputs(with_road(scene, say), say)
     scene = with_modal(scene, until)
     if not source.broken() & {"tire", "modal"}:

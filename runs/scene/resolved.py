@@ -2,6 +2,7 @@
 
 import json
 import re
+import tomllib
 from math import isfinite
 from typing import Any
 
@@ -67,6 +68,11 @@ def _lines(holder: Any, path: str) -> list[str]:
         else:
             below += ["", f"[{inner}]  # {part.doc}", *_lines(value, inner)]
     return own + below
+
+
+def as_toml(table: Any) -> dict[str, Any]:
+    """One table of a scene as TOML has it."""
+    return tomllib.loads("\n".join(["[table]", *_lines(table, "table")]))["table"]
 
 
 def dumps(scene: Scene) -> str:

@@ -108,7 +108,7 @@ def _outer(tire: TireTable, ring: Ring) -> Influence:
     """Influence of the crown's compound: a half-space if it is the whole wall, else a layer."""
     section = ring.section
     cell = section.outer[len(section.outer) // 2, 0]
-    material = tire.shape.rubbers(tire)[section.regions[section.region[cell]]]
+    material = tire.shape.in_layers(tire)[section.regions[section.region[cell]]]
     modulus = material.dynamic * material.law.youngs
     middle = section.nodes[section.cells].mean(axis=1)
     low, high = np.sort(section.nodes[section.cells[cell], 1])[[0, -1]]

@@ -115,7 +115,7 @@ def road_shape(scene: Scene) -> RoadShape:
 
 def make_body(comm: MPI.Comm, tire: TireTable, section: Ring) -> Body:
     """The finite-element body, undeformed. Collective."""
-    return Body(comm, section, tire.shape.rubbers(tire), cords=tire.shape.cords(tire))
+    return Body(comm, section, tire.shape.in_layers(tire), cords=tire.shape.cords(tire))
 
 
 @dataclass(frozen=True)

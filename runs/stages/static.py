@@ -305,11 +305,12 @@ class StaticStage(Computed[StaticState]):
     def write(self, file, product: StaticState) -> None:
         """Mesh, displacement, outer face and footprint."""
         fill(file, product, self.job.tire)
-        if taken := self._from_file():
+        tire = self.job.scene.tire
+        if tire.shape.fingerprint(tire) and (taken := self._from_file()):
             file.attrs["from_file"] = "\n".join(taken)
 
     def _from_file(self) -> list[str]:
-        """What the tire's file gives to the run and what of it is not used, as `check` prints it."""
+        """What the tire is made of, of a file what of it is used and what not, as `check` prints it."""
         tire = self.job.scene.tire
         return tire.shape.described(tire)
 

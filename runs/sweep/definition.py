@@ -245,7 +245,11 @@ def _named(keys: Sequence[str], rows: Sequence[tuple[Any, ...]]) -> list[Member]
     members = []
     for number, row in enumerate(rows, start=1):
         settings = dict(zip(keys, row, strict=True))
-        parts = [f"{key.rpartition('.')[2]}-{_short(value)}" for key, value in settings.items()]
+        # A key of [tire.scale] may have blanks: they are none of a folder's name.
+        parts = [
+            f"{key.rpartition('.')[2].replace(' ', '_')}-{_short(value)}"
+            for key, value in settings.items()
+        ]
         members.append(Member("_".join([f"{number:0{digits}d}", *parts])[:80], settings))
     return members
 

@@ -17,7 +17,12 @@ class ElasticTread(TreadLaw):
     """An isotropic rubber."""
 
     youngs_modulus: float = number(
-        3.4e8, "Pa", "Young's modulus of the tread; rubber has about 1e7", least=1e3, most=1e13
+        3.4e8,
+        "Pa",
+        "Young's modulus of the tread; rubber has about 1e7, and so has a radial tire where this is absent, times what its "
+        "tread is stiffer than built in",
+        least=1e3,
+        most=1e13,
     )
     shears = True
     poisson_ratio: float = number(0.49, "-", "Poisson's ratio of the tread", least=-0.99, most=0.5)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -13,15 +13,16 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import choice, filename, flag, number, text, texts
 from tireroad.runs.scene.schema import Source
 from tireroad.runs.scene.tables.tire import (
+    Parts,
     Proportions,
     SectionKind,
+    changed,
     cords_of,
     losses_of,
     proportions_of,
     region_of,
     section_kind,
     spelt,
-    stated,
 )
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from tireroad.fem.sections.mesh2d import Ring, SectionMesh
     from tireroad.fem.tire.cords import Cords
     from tireroad.fem.tire.material import Material
-    from tireroad.runs.scene.tables.tire import CordsTable, TireTable
+    from tireroad.runs.scene.tables.tire import CordsTable, MaterialTable, TireTable
 
 
 def _keys(tire: TireTable) -> FileSection:
@@ -144,19 +145,60 @@ def _material(tire: TireTable, name: str, rubber: Rubber | None) -> Material:
     Its properties in small motions are those that the [[tire.region]] states, else likewise
     those of the file's compound, else those of [tire].
     """
+    return changed(_of_file(tire, rubber), region_of(tire, name))
+
+
+def _of_file(tire: TireTable, rubber: Rubber | None) -> Material:
+    """The compound of a region of the file, with what the file leaves open from [tire]."""
     from tireroad.fem.tire.material import Material, compound
 
-    region = region_of(tire, name)
-    change = losses_of(tire)
-    if rubber is not None:
-        change |= stated(rubber.dynamic, rubber.loss_factor, rubber.spectrum)
-    change |= losses_of(region)
-    if region is not None and region.material is not None:
-        return Material(law=region.material.law, density=region.material.density, **change)
+    wall = _wall(tire)
+    small = losses_of(tire)
     if rubber is None:
-        return Material(law=tire.material.law, density=tire.material.density, **change)
-    density = tire.material.density if rubber.density is None else rubber.density
-    return compound(rubber.model, density, **rubber.coefficients, **change)
+        return Material(law=wall.law, density=wall.density, **small)
+    density = wall.density if rubber.density is None else rubber.density
+    return compound(rubber.model, density, **rubber.coefficients, **small | _small_motions(rubber))
+
+
+def _wall(tire: TireTable) -> MaterialTable:
+    assert tire.material is not None, "a file leaves materials to [tire.material]"
+    return tire.material
+
+
+def _small_motions(rubber: Rubber) -> dict[str, Any]:
+    """What a file's compound has of small motions: a ratio not 1, a loss factor not 0, a spectrum."""
+    given = {
+        "dynamic": rubber.dynamic,
+        "loss_factor": rubber.loss_factor,
+        "spectrum": rubber.spectrum,
+    }
+    neutral = {"dynamic": 1.0, "loss_factor": 0.0, "spectrum": None}
+    return {key: value for key, value in given.items() if value != neutral[key]}
+
+
+def file_parts(tire: TireTable) -> Parts:
+    """Compounds and cords of the file, as tables of a scene; of a region or line without, the scene's."""
+    from tireroad.runs.scene.parts import compound_table, material_table
+
+    own = own_section(tire)
+    compounds, wall = {}, _wall(tire)
+    for name, rubber in zip(own.mesh.regions, own.rubbers, strict=True):
+        material = _of_file(tire, rubber)
+        model = wall.model if rubber is None else rubber.model
+        compounds[name] = compound_table(name, material.law, model, material.density, {})
+    cords = {
+        ply.name: {
+            key: value for key, value in vars(ply).items() if key != "sides" and value is not None
+        }
+        | {"angle": _degrees(ply.angle)}
+        for ply in own.plies
+    }
+    elsewhere = {"material": material_table(wall.law, wall.model, wall.density)}
+    return Parts(compounds, cords, elsewhere, {})
+
+
+def _degrees(angle: float) -> float:
+    return round(float(np.degrees(angle)), 10)
 
 
 def given_cords(tire: TireTable) -> list[CordsTable]:
@@ -266,6 +308,9 @@ class FileSection(SectionKind):
 
     def ring(self, tire: TireTable) -> Ring:
         return own_ring(tire)
+
+    def parts(self, tire: TireTable) -> Parts:
+        return file_parts(tire)
 
     def rubbers(self, tire: TireTable) -> dict[str, Material]:
         return own_materials(tire)

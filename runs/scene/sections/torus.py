@@ -14,8 +14,14 @@ from tireroad.fem.sections.mesh2d import PlyLine, RegionPatch, Ring
 from tireroad.fem.sections.torus import Torus
 from tireroad.runs.scene.schema import Source
 from tireroad.runs.scene.tables.tire import (
+    AROUND_CROWN,
+    CORDS_ARC,
+    CORDS_DEPTH,
+    WHOLE_WALL,
+    Parts,
     Proportions,
     SectionKind,
+    changed,
     cords_of,
     losses_of,
     section_kind,
@@ -24,7 +30,7 @@ from tireroad.runs.scene.tables.tire import (
 if TYPE_CHECKING:
     from tireroad.fem.tire.cords import Cords
     from tireroad.fem.tire.material import Material
-    from tireroad.runs.scene.tables.tire import RegionTable, TireTable
+    from tireroad.runs.scene.tables.tire import CordsTable, RegionTable, TireTable
 
 # Default (segments, elements along the arc) by order. Largest error of the 28 lowest frequencies of
 # the unloaded torus, E = 480 MPa, against Fourier series around (bench.parts.harmonics): 28 x 16
@@ -131,7 +137,7 @@ class TorusSection(SectionKind):
     def _check_cords(self, tire: TireTable, which: int, source: Source) -> None:
         """Check that a line of cords lies within the wall and has a unique name."""
         cords, place = tire.cords[which], ("tire", "cords", str(which))
-        low, high = cords.arc
+        depth, (low, high) = _place(cords)
         taken = [other.name for other in tire.cords[:which]]
         wall = f"tire.thickness = {self.thickness:g} m"
         problems = (
@@ -144,8 +150,8 @@ class TorusSection(SectionKind):
             ),
             (
                 "depth",
-                cords.depth > self.thickness,
-                f"= {cords.depth:g} m lies outside the wall: at most {wall}",
+                depth > self.thickness,
+                f"= {depth:g} m lies outside the wall: at most {wall}",
             ),
             (
                 "area",
@@ -186,6 +192,14 @@ class TorusSection(SectionKind):
     def coarser(self, tire: TireTable) -> TorusSection:
         return replace(self, elements_arc=self.elements_arc // 2)
 
+    def parts(self, tire: TireTable) -> Parts:
+        from tireroad.runs.scene.parts import material_table
+
+        wall = tire.material
+        assert wall is not None, "a torus has a wall of one material"
+        lies = {"depth": CORDS_DEPTH, "arc": list(CORDS_ARC)}
+        return Parts({}, {}, {"material": material_table(wall.law, wall.model, wall.density)}, lies)
+
     def rubbers(self, tire: TireTable) -> dict[str, Material]:
         return {"wall": rubber(tire)} | {
             patch(i, region).name: rubber(tire, region) for i, region in enumerate(tire.region)
@@ -212,9 +226,10 @@ class TorusSection(SectionKind):
         return [patch(i, region) for i, region in enumerate(tire.region)]
 
     def _plies(self, tire: TireTable) -> list[PlyLine]:
+        places = ((line.name, *_place(line)) for line in tire.cords)
         return [
-            PlyLine(c.name, tuple(np.radians(c.arc)), 1 - c.depth / self.thickness)
-            for c in tire.cords
+            PlyLine(name, tuple(np.radians(arc)), 1 - depth / self.thickness)
+            for name, depth, arc in places
         ]
 
 
@@ -228,23 +243,24 @@ def _note(
             return
 
 
+def _place(line: CordsTable) -> tuple[float, tuple[float, float]]:
+    """Depth (m) and arc (deg) of a line of cords."""
+    return CORDS_DEPTH if line.depth is None else line.depth, line.arc or CORDS_ARC
+
+
 def patch(which: int, region: RegionTable) -> RegionPatch:
     """The part of the section described by a [[tire.region]]."""
-    from tireroad.runs.scene.tables.tire import AROUND_CROWN
-
     low, high = np.radians(region.arc or AROUND_CROWN)
     sides = {"left": ((-high, -low),), "right": ((low, high),)}
-    arcs = sides.get(region.side, sides["left"] + sides["right"])
-    return RegionPatch(f"tire.region {which}", arcs, region.depth)
+    arcs = sides.get(region.side or "both", sides["left"] + sides["right"])
+    return RegionPatch(f"tire.region {which}", arcs, region.depth or WHOLE_WALL)
 
 
 def rubber(tire: TireTable, region: RegionTable | None = None) -> Material:
     """The compound of the wall, or of one of its regions, which has from [tire] what it does not
     say."""
     from tireroad.fem.tire.material import Material
-    from tireroad.runs.scene.tables.tire import MaterialTable
 
-    own = None if region is None else region.material
-    table = own or tire.material or MaterialTable()
-    losses = losses_of(tire) | losses_of(region)
-    return Material(law=table.law, density=table.density, **losses)
+    assert tire.material is not None, "a torus has a wall of one material"
+    wall = Material(law=tire.material.law, density=tire.material.density, **losses_of(tire))
+    return changed(wall, region)

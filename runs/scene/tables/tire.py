@@ -8,7 +8,7 @@ keys, `check`, the key reference and the range tests derive from it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -17,7 +17,7 @@ import numpy as np
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Limits, Parameters, Registry, numbers
 from tireroad.fem.sections.mesh2d import SIZE
-from tireroad.fem.tire.material import CONSTANT, MATERIALS, MaterialLaw, Spectrum, power_law, prony
+from tireroad.fem.tire.material import CONSTANT, MATERIALS, MaterialLaw, power_law, prony
 from tireroad.runs.scene.schema import (
     Source,
     Variants,
@@ -59,6 +59,25 @@ class Proportions:
     through: int
 
 
+Raw = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What a section is built of, as tables of a scene: `compounds` by name, of [[tire.region]], and lines
+    of `cords` by name, of [[tire.cords]].
+
+    `elsewhere`: the table of a region or line of any other name, a key each. `whole`: written back in
+    full.
+    """
+
+    compounds: Mapping[str, Raw]
+    cords: Mapping[str, Raw]
+    region_elsewhere: Raw
+    cords_elsewhere: Raw
+    whole: bool = False
+
+
 class SectionKind(Parameters):
     """Base class of the kinds of section. Methods take the scene's [tire], which has the kind.
 
@@ -90,9 +109,25 @@ class SectionKind(Parameters):
         """The ring of elements from the revolved section."""
         raise NotImplementedError
 
+    def parts(self, tire: TireTable) -> Parts:
+        """What the section is built of, over which the scene's [[tire.region]] and [[tire.cords]] are merged."""
+        return Parts({}, {}, {}, {})
+
+    def as_scaled(self) -> Self:
+        """The kind once [tire.scale] is in the compounds and cords."""
+        return self
+
     def rubbers(self, tire: TireTable) -> dict[str, Material]:
         """The compound of each region of the section, by name."""
         raise NotImplementedError
+
+    def in_layers(self, tire: TireTable) -> dict[str, Material]:
+        """The compounds as they fill their layers: without what grooves take of them."""
+        return self.rubbers(tire)
+
+    def tread_over_own(self, tire: TireTable) -> float | None:
+        """Dynamic modulus of the tread over that which the section has by itself; None where it has none."""
+        return None
 
     def cords(self, tire: TireTable) -> list[Cords]:
         """The cords on the plies of the section."""
@@ -104,8 +139,9 @@ class SectionKind(Parameters):
 
     def rubber(self, tire: TireTable) -> tuple[float, float, float]:
         """Dynamic modulus (Pa), Poisson's ratio and density (kg/m³) of the wall, for estimates."""
+        assert tire.material is not None, "a kind without a wall of one material has its own"
         law = tire.material.law
-        return tire.dynamic * law.youngs, law.poisson, tire.material.density
+        return (tire.dynamic or 1.0) * law.youngs, law.poisson, tire.material.density
 
     def free_unknowns(self, tire: TireTable) -> int:
         """Displacement unknowns of the mesh, without those held by the rim."""
@@ -184,7 +220,9 @@ class CavityTable:
 
 
 NEAR_ROAD = 0.2  # footprint_size with a road
-AROUND_CROWN = (0.0, 45.0)  # deg: arc of a region of a torus that has none
+# Of a torus: arc (deg) and depth of a region that has none, and place of a line of cords.
+AROUND_CROWN, WHOLE_WALL = (0.0, 45.0), (0.0, 1.0)
+CORDS_DEPTH, CORDS_ARC = 0.006, (-45.0, 45.0)  # m, deg
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -196,17 +234,17 @@ class MaterialTable(Variants):
 
 def _dynamic():
     return number(
-        1.0,
+        None,
         "-",
-        "dynamic modulus, used for the modes, over the static modulus",
+        "dynamic modulus, used for the modes, over the static modulus; absent: that of the compound, 1 in a torus",
         least=0.01,
         most=100,
     )
 
 
-def _exponent(default: float | None = None):
+def _exponent():
     return number(
-        default,
+        None,
         "-",
         "growth of the dynamic modulus with the frequency's power; absent: that of the compound, 0 in a torus",
         least=0,
@@ -225,7 +263,13 @@ def _times():
 
 
 def _loss_factor():
-    return number(0.0, "-", "loss factor tan δ of the rubber, used for the modes", least=0, most=2)
+    return number(
+        None,
+        "-",
+        "loss factor tan δ of the rubber, used for the modes; absent: that of the compound, 0 in a torus",
+        least=0,
+        most=2,
+    )
 
 
 @dataclass(frozen=True)
@@ -243,21 +287,27 @@ class RegionTable:
         most=175,
         absent=True,
     )
-    side: str = choice("both", ("both", "left", "right"), "side of the crown; left: y < 0")
-    depth: tuple[float, float] = vector(
-        (0.0, 1.0),
+    side: str | None = choice(
+        None,
+        ("both", "left", "right"),
+        "side of the crown; left: y < 0; of a torus only, where absent is both",
+    )
+    depth: tuple[float, float] | None = vector(
+        WHOLE_WALL,
         "-",
-        "start and end through the wall, from 0 at the inner face to 1 at the outer face",
+        "start and end through the wall, from 0 at the inner face to 1 at the outer face; of a torus only, where "
+        "absent is all of it",
         least=0,
         most=1,
+        absent=True,
     )
     material: MaterialTable | None = table(
         MaterialTable,
-        "material of the region; absent: that of the file, or of [tire.material] in a torus",
+        "material of the region; what is absent stays that of the compound, in a torus that of [tire.material]",
         optional=True,
     )
-    dynamic: float = _dynamic()
-    loss_factor: float = _loss_factor()
+    dynamic: float | None = _dynamic()
+    loss_factor: float | None = _loss_factor()
     exponent: float | None = _exponent()
     prony_shares: tuple[float, ...] = _shares()
     prony_times: tuple[float, ...] = _times()
@@ -267,18 +317,23 @@ class RegionTable:
 class CordsTable:
     name: str = text(
         "ply",
-        "name of this line of cords in results and messages; the name of a line of a file or of the radial tire replaces "
-        "its cords",
+        "name of this line of cords in results and messages; of a file or the radial tire that of the line that it "
+        "changes, of which stays what it leaves out",
     )
-    depth: float = number(
-        0.006, "m", "depth under the outer face of the undeformed wall", least=0, most=5
+    depth: float | None = number(
+        None,
+        "m",
+        f"depth under the outer face of the undeformed wall; of a torus only, where absent is {CORDS_DEPTH:g}",
+        least=0,
+        most=5,
     )
-    arc: tuple[float, float] = vector(
-        (-45.0, 45.0),
+    arc: tuple[float, float] | None = vector(
+        CORDS_ARC,
         "deg",
-        "start and end, measured from the crown; y < 0 first",
+        "start and end, measured from the crown; y < 0 first; of a torus only, where absent is -45 to 45",
         least=-180,
         most=180,
+        absent=True,
     )
     angle: float = number(
         20.0,
@@ -330,9 +385,13 @@ class TireTable(Variants):
         least=SIZE.least,
         most=SIZE.most,
     )
-    material: MaterialTable = table(MaterialTable, "material of the wall")
-    dynamic: float = _dynamic()
-    loss_factor: float = _loss_factor()
+    material: MaterialTable | None = table(
+        MaterialTable,
+        "material of the wall, or of what a file leaves open; absent: its defaults, in a radial tire none",
+        optional=True,
+    )
+    dynamic: float | None = _dynamic()
+    loss_factor: float | None = _loss_factor()
     exponent: float | None = _exponent()
     prony_shares: tuple[float, ...] = _shares()
     prony_times: tuple[float, ...] = _times()
@@ -347,6 +406,11 @@ class TireTable(Variants):
         "the air inside; absent: none in a torus, else this table's defaults",
         optional=True,
     )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.material is None and "material" not in self.shape.without:
+            object.__setattr__(self, "material", MaterialTable())
 
     def with_elements(self, on_road: bool) -> TireTable:
         """The tire with open mesh keys set; on a road, elements are smaller at the footprint."""
@@ -386,21 +450,28 @@ def region_of(tire: TireTable, name: str) -> RegionTable | None:
     return next((r for r in tire.region if r.name and r.name.upper() == name.upper()), None)
 
 
-def stated(dynamic: float, loss_factor: float, spectrum: Spectrum | None) -> dict[str, Any]:
-    """Those of the properties in small motions that a part states: a ratio not 1, a loss factor not 0."""
-    given = {"dynamic": dynamic, "loss_factor": loss_factor, "spectrum": spectrum}
-    neutral = {"dynamic": 1.0, "loss_factor": 0.0, "spectrum": None}
-    return {key: value for key, value in given.items() if value != neutral[key]}
-
-
 def losses_of(part: TireTable | RegionTable | None) -> dict[str, Any]:
     """What [tire] or a region states of small motions. A Prony series gives all of it."""
     if part is None:
         return {}
     if part.prony_shares or part.prony_times:
-        return stated(*prony(part.prony_shares, part.prony_times))
+        return dict(zip(_SMALL_MOTIONS, prony(part.prony_shares, part.prony_times), strict=True))
     law = None if part.exponent is None else power_law(part.exponent)
-    return stated(part.dynamic, part.loss_factor, law)
+    given = dict(zip(_SMALL_MOTIONS, (part.dynamic, part.loss_factor, law), strict=True))
+    return {key: value for key, value in given.items() if value is not None}
+
+
+_SMALL_MOTIONS = "dynamic", "loss_factor", "spectrum"
+
+
+def changed(compound: Material, region: RegionTable | None) -> Material:
+    """A compound with what a region states."""
+    if region is None:
+        return compound
+    material = region.material
+    if material is not None:
+        compound = replace(compound, law=material.law, density=material.density)
+    return replace(compound, **losses_of(region))
 
 
 def check_series(tire: TireTable, source: Source) -> None:
@@ -414,8 +485,9 @@ def check_series(tire: TireTable, source: Source) -> None:
             prony(part.prony_shares, part.prony_times)
         except InputError as wrong:
             source.add((*path, "prony_shares"), f"with prony_times: {wrong}")
-        if part.exponent is not None:
-            source.add((*path, "exponent"), "and prony_shares exclude each other")
+        for key in ("dynamic", "loss_factor", "exponent"):
+            if getattr(part, key) is not None:
+                source.add((*path, key), "and prony_shares exclude each other")
 
 
 def proportions_of(ring: Ring, drawn: SectionMesh) -> Proportions:

@@ -215,7 +215,92 @@ def test_the_size_says_its_rated_load(text, index):
     assert tire.inflation_for(2 * tire.rated_load()) == 2.5e5
 
 
-@pytest.mark.parametrize("text", ["", "205", "205/60 15", "999/99 R99", "205/60 R15 extra"])
+@pytest.mark.parametrize(
+    ("text", "inches", "width"),
+    [
+        ("155/65 R14", 4.5, 157),
+        ("175/65 R14", 5.0, 177),
+        ("185/60 R14", 5.5, 189),
+        ("195/65 R15", 6.0, 201),
+        ("205/60 R15", 6.0, 209),
+        ("205/55 R16", 6.5, 214),
+        ("225/45 R17", 7.5, 225),
+        ("225/40 R18", 8.0, 230),
+        ("255/40 R17", 9.0, 260),
+        ("275/35 R20", 9.5, 278),
+        ("LT245/75R16", 7.0, 248),
+    ],
+)
+def test_the_size_says_its_measuring_rim_and_width(text, inches, width):
+    """Measuring rims and design section widths (mm) as makers list them: rims exactly, widths within 2 %."""
+    tire = size(text)
+    assert tire.measuring_rim == pytest.approx(0.0254 * inches)
+    assert 1e3 * tire.width == pytest.approx(width, rel=0.02)
+
+
+@pytest.mark.parametrize("wider", [-0.0127, 0.0, 0.0127])
+def test_the_rim_that_is_given_holds_the_beads(wider):
+    """Its heels lie at half its width; the section is wider by 0.4 of what the rim is wider."""
+    tire = size("255/40 R17")
+    rim = tire.measuring_rim + wider
+    mesh = radial("255/40 R17", rim_width=rim).section(26)
+    line = mesh.nodes[mesh.chain(mesh.outer)]
+    assert np.abs(line[[0, -1], 1]) == pytest.approx(rim / 2)
+    assert np.ptp(line[:, 1]) == pytest.approx(tire.width + 0.4 * wider, rel=0.01)
+    own = radial("255/40 R17").section(26)
+    assert (wider == 0) == np.array_equal(own.nodes, mesh.nodes)
+
+
+def test_a_rim_that_does_not_fit_is_told():
+    with pytest.raises(InputError, match=r"tire\.rim_width = 0\.1 m: rims for a section of 205 mm"):
+        radial("205/60 R15", rim_width=0.1)
+
+
+@pytest.mark.parametrize(
+    ("text", "same", "index", "symbol", "newton"),
+    [
+        ("P205/60R15 91V", "205/60 R15", 91, "V", 615 * 9.81),
+        ("205/60R15 91V XL", "205/60 R15", 91, "V", 615 * 9.81),
+        ("205/60 ZR 15", "205/60 R15", None, None, None),
+        ("205/60VR15", "205/60 R15", None, "V", None),
+        ("p205/60r15 91h M+S", "205/60 R15", 91, "H", 615 * 9.81),
+        ("255/40 ZR17 (98W) XL", "255/40 R17", 98, "W", 750 * 9.81),
+        ("LT245/75R16", "245/75 R16", None, None, None),
+        ("LT245/75R16 120/116S", "245/75 R16", 120, "S", 1400 * 9.81),
+        ("LT245/75R16 120/116S E", "245/75 R16", 120, "S", 1400 * 9.81),
+        ("195/75 R16C 107/105R", "195/75 R16", 107, "R", 975 * 9.81),
+    ],
+)
+def test_sizes_as_people_write_them(text, same, index, symbol, newton):
+    """The same tire; load index and speed symbol are taken, of single tires."""
+    tire, plain = size(text), size(same)
+    assert (tire.width, tire.height, tire.rim) == (plain.width, plain.height, plain.rim)
+    assert (tire.index, tire.symbol) == (index, symbol)
+    assert tire.rated_load() == pytest.approx(newton or plain.rated_load())
+
+
+def test_an_index_beyond_a_standard_tire_s_is_a_reinforced_tire_s():
+    """98 for 94: at 290 kPa, and less below; the speed of W is 270 km/h."""
+    tire = size("255/40 R17 98W")
+    assert tire.rated_pressure == 2.9e5 and size("255/40 R17 94W").rated_pressure == 2.5e5
+    assert tire.rated_load(2.5e5) == pytest.approx((2.5 / 2.9) ** 0.8 * 750 * 9.81)
+    assert 3.6 * tire.speed == pytest.approx(270)
+    assert size("LT245/75R16 120/116S").rated_pressure is None
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "205",
+        "205/60 15",
+        "999/99 R99",
+        "205/60 R15 extra",
+        "205/60 R15 91X",
+        "205/60 R15 300V",
+        "205/60 R1591V5",
+    ],
+)
 def test_no_size_is_told(text):
     with pytest.raises(InputError, match=r"tire\.size"):
         size(text)

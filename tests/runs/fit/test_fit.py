@@ -11,7 +11,18 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.sections.inflated import InflatedRing
 from tireroad.runs import fit as fitting
 from tireroad.runs.cli import main
-from tireroad.runs.fit import KINDS, FitFigures, Model, construction, fit, read, report, tire_table
+from tireroad.runs.factors import PLAUSIBLE
+from tireroad.runs.fit import (
+    KINDS,
+    FitFigures,
+    Model,
+    construction,
+    deflection_curve,
+    fit,
+    read,
+    report,
+    tire_table,
+)
 from tireroad.runs.scene.load import load
 
 FACTORS = {"density": 0.9, "sidewall": 0.7, "apex": 0.5, "carcass": 0.8}
@@ -98,6 +109,51 @@ def test_what_cannot_be_reached_is_said(coarse: None) -> None:
     assert "at the end of its range" in told
 
 
+@pytest.mark.slow
+def test_what_no_figure_determines_stays(coarse: None) -> None:
+    """Mass alone: 6 % less is the density's; the other factors are 1, and it is said that nothing determines them."""
+    found = fit(FitFigures(size="205/60 R15", inflation=2.2e5, load=4000.0, values={"mass": 8.77}))
+    assert found.reached["mass"] == pytest.approx(8.77, rel=2e-3)
+    assert found.factors["density"] == pytest.approx(0.94, abs=0.02)
+    rest = [value for name, value in found.factors.items() if name != "density"]
+    assert rest == pytest.approx([1.0] * len(rest), abs=1e-3)
+    assert report(found).count("no figure determines it") == len(found.factors) - 1
+
+
+@pytest.mark.slow
+def test_modes_of_a_coarse_mesh_bend_no_compound(coarse: None) -> None:
+    """The built-in tire's own .tir, modes 1 to 3 % up: sidewall x 0.73 and dynamic x 1.30 without a prior."""
+    own = figures_of({})
+    up = {"lateral": 1.02, "yaw": 1.02, "windup": 1.01, "vertical": 1.03}
+    values = {name: own.values[name] * up.get(name.split("_")[0], 1.0) for name in own.values}
+    values |= {name: own.values[name] for name in own.values if name.endswith("damping")}
+    found = fit(FitFigures(size="205/60 R15", inflation=2.2e5, load=4000.0, values=values))
+    for name, factor in found.factors.items():
+        assert 0.8 < factor < 1.25, name
+    assert "outside the plausible range" not in report(found)
+    assert "all figures are reached" in report(found)
+
+
+@pytest.mark.slow
+def test_figures_of_no_one_tire_are_named(coarse: None) -> None:
+    """Modes of the finding: the vertical one up, the others down. Tread x 3, sidewall x 0.47 without a prior."""
+    values = {
+        "mass": 9.0,
+        "lateral_frequency": 44.0,
+        "yaw_frequency": 54.0,
+        "windup_frequency": 62.0,
+        "vertical_frequency": 80.0,
+        "vertical_damping": 0.04,
+    }
+    found = fit(FitFigures(size="205/55 R16", inflation=2.3e5, load=4000.0, values=values))
+    told = report(found)
+    strange = {n for n, f in found.factors.items() if max(f, 1 / f) > PLAUSIBLE}
+    assert "tread" not in strange and 0.8 < found.factors["tread"] < 1.25
+    for name in strange:
+        assert f"{name} x {found.factors[name]:.2f}" in told
+    assert "vertical_frequency (-" in told.split("not reached within twice the tolerance: ")[1]
+
+
 def test_the_scene_has_the_fitted_tire(tmp_path: Path) -> None:
     """The [tire] that is written: compounds, cords and modes of the construction."""
     figures = FitFigures(size="205/60 R15", inflation=2.2e5, load=4000.0, values={"mass": 9.0})
@@ -110,7 +166,7 @@ def test_the_scene_has_the_fitted_tire(tmp_path: Path) -> None:
     (tmp_path / "scene.toml").write_text(text)
     tire = load(tmp_path / "scene.toml").tire
     made = construction("205/60 R15", factors)
-    for name, one in tire.shape.rubbers(tire).items():
+    for name, one in tire.shape.in_layers(tire).items():
         wanted = made.compounds[name]
         assert one.law.youngs == pytest.approx(wanted["youngs_modulus"], rel=1e-4)
         for key in ("density", "dynamic", "loss_factor"):
@@ -155,6 +211,18 @@ def test_a_tir_file(tmp_path: Path) -> None:
     assert found.pressed and "footprint_width" not in found.values
     other = read(tmp_path / "tire.tir", ["inflation=2.6e5", "size=215/60 R15"])
     assert (other.size, other.inflation) == ("215/60 R15", 2.6e5)
+    curve = "[DEFLECTION_LOAD_CURVE]\n{pen fz}\n0.0 0.0\n0.010 1.5D3 $ N\n0.020 3500.0\n"
+    (tmp_path / "curve.tir").write_text(f"{TIR}{curve}[SHAPE]\n1 2\n")
+    found = read(tmp_path / "curve.tir")
+    assert found.loads == ((0.010, 1500.0), (0.020, 3500.0))
+    (tmp_path / "curve.tir").write_text(f"{TIR}{curve}0.03 much\n")
+    with pytest.raises(InputError, match=r"line 35, \[DEFLECTION_LOAD_CURVE\]: '0\.03 much'"):
+        read(tmp_path / "curve.tir")
+    (tmp_path / "rim.tir").write_text(TIR.replace("RIM_RADIUS", "RIM_WIDTH = 0.1651\nRIM_RADIUS"))
+    assert read(tmp_path / "rim.tir").rim_width == 0.1651
+    (tmp_path / "rim.tir").write_text(TIR.replace("RIM_RADIUS", "RIM_WIDTH = 0.9\nRIM_RADIUS"))
+    found = read(tmp_path / "rim.tir")
+    assert found.rim_width is None and "RIM_WIDTH not used" in found.notes[0]
     (tmp_path / "tire.tir").write_text(TIR.replace("INFLPRES", "PRESSURE"))
     assert any("no INFLPRES" in note for note in read(tmp_path / "tire.tir").notes)
     with pytest.raises(InputError, match="is key=value"):
@@ -176,6 +244,11 @@ def test_a_tir_file(tmp_path: Path) -> None:
         ('size = "big"\ninflation = 2e5\nmass = 9', 'must be like "205/60 R15"'),
         ('size = "205/60 R15"\ninflation = 2.2\nmass = 9', "inflation = 2.2 Pa must be"),
         ('size = "205/60 R15"\ninflation = 2e5\nloads = [0.01, 2000]', "list of pairs"),
+        (
+            'size = "205/60 R15"\ninflation = 2e5\nfootprints = [[4000, 0.137]]',
+            "footprints is a list of rows",
+        ),
+        ('size = "205/60 R15"\nrim_width = 0.3\ninflation = 2e5\nmass = 9', "rim_width = 0.3 m"),
         ("size = ", "Invalid value"),
     ],
 )
@@ -183,6 +256,26 @@ def test_refused(tmp_path: Path, text: str, words: str) -> None:
     (tmp_path / "f.toml").write_text(text)
     with pytest.raises(InputError, match=words):
         read(tmp_path / "f.toml")
+
+
+def test_curves_and_footprints_are_figures() -> None:
+    """Each point is one; many of a curve count as four do."""
+    loads = tuple((1e-3 * k, 190.0 * k) for k in range(1, 17))
+    given = FitFigures(
+        size="205/60 R15",
+        inflation=2.2e5,
+        load=4000.0,
+        loads=loads,
+        footprints=((2000.0, 0.09, 0.12), (4000.0, 0.137, 0.143)),
+    )
+    assert given.pressed and len(given.targets) == 20
+    assert given.targets["load at 16 mm"] == 3040.0
+    assert given.targets["footprint width at 2000 N"] == 0.12
+    assert given.tolerance("load at 16 mm") == pytest.approx(0.03 * 2)
+    assert given.tolerance("footprint width at 2000 N") == 0.05
+    computed = Model(given)._computed()
+    assert computed.startswith("deflections = [0.001, ") and computed.count(",") == 5
+    assert deflection_curve("[VERTICAL]\n0.01 2000\n") == []
 
 
 @pytest.mark.parametrize(
