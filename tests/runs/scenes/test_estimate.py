@@ -50,11 +50,11 @@ def test_torus_is_as_measured(torus: Path) -> None:
 def test_passenger_is_as_measured(root: Path) -> None:
     """Measured on one process without error bars: 43 s of one core and 1.69 GB; the pivot's matrices are in it."""
     scene = root / "runs" / "scenes" / "passenger.toml"
-    wanted = estimate(load(scene, ["accuracy.estimate=false"]))
+    wanted = estimate(load(scene, ["accuracy.estimate=false", "contact.friction=0"]))
     assert 43 / 1.6 < sum(wanted.seconds.values()) < 43 * 1.6
     assert 1.69 / 1.6 < sum(wanted.memory.values()) / 1e9 < 1.69 * 1.6
     assert wanted.sizes.points == pytest.approx(1631, rel=0.3)
-    product = estimate(load(scene, ["accuracy.estimate=false", 'contact.solver="projected-cg"']))
+    product = estimate(load(scene, ["accuracy.estimate=false", "contact.friction=0", 'contact.solver="projected-cg"']))
     pivoted = wanted
     matrix = 8.0 * pivoted.sizes.points**2
     # The results of a block are counted at another time than it pivots.
@@ -182,4 +182,4 @@ def test_hours_are_said(torus: Path, monkeypatch, tmp_path: Path) -> None:
     monkeypatch.setattr(scene_estimate.shutil, "disk_usage", lambda _: usage._replace(free=10**13))
     wanted = estimate(load(torus, ["time.duration=100", "time.step=1e-5"]))
     (warning,) = scene_estimate.check_demand(wanted, tmp_path)
-    assert "3 hours of one core" in warning and "contact loop (time.duration" in warning
+    assert "7 hours of one core" in warning and "contact loop (time.duration" in warning

@@ -20,10 +20,11 @@ FINE = ["tire.segments=30", "tire.elements_arc=26", "modal.up_to=547.3"]
 # Processor time (s) by stage of one core of a shared server (Intel Xeon) beside other work, one BLAS thread, 2026-11-23,
 # without error bars.
 MEASURED = [
-    ("torus", SMALL, {"static": 1.4, "modes": 1.73, "contact loop": 1.48}),
-    ("torus", [], {"static": 6.2, "modes": 9.21, "greens": 2.57, "contact loop": 1.81}),
+    ("torus", SMALL, {"static": 1.4, "modes": 1.73}),
+    ("torus", ["contact.friction=0"], {"static": 6.2, "modes": 9.21, "greens": 2.57}),
     ("torus", LARGE, {"static": 105.0}),
-    ("passenger", [], {"static": 9.12, "modes": 12.7, "greens": 9.44, "contact loop": 8.84}),
+    ("passenger", ["contact.friction=0"], {"static": 9.12, "modes": 12.7, "greens": 9.44, "contact loop": 8.84}),
+    ("torus", [], {"contact loop": 2.3}),  # 2026-11-28, 1.3 s on a core nearly twice as fast
     ("passenger", FINE, {"static": 39.3, "modes": 69.7}),
 ]
 RUBBING = """
@@ -66,12 +67,12 @@ def test_seconds_are_as_measured(root: Path, scene: str, settings: list[str], ta
 
 @pytest.mark.parametrize(
     ("friction", "each"),
-    [(["contact.friction=0.8"], 8.5e-3), (["contact.brush_stiffness=2000.0"], 4.4e-3)],
+    [(["contact.friction=0.8"], 1.1e-3), (["contact.brush_stiffness=2000.0"], 1.1e-3)],
 )
-def test_horizontal_forces_cost_ten_times_the_normal_ones(
+def test_what_a_step_with_horizontal_forces_costs(
     root: Path, friction: list[str], each: float
 ) -> None:
-    """Measured 7 to 10 and 4.4 ms a step (1,000 steps); told was 0.7 ms."""
+    """Measured 0.5 ms a step of the same scene on a core nearly twice as fast, with either (2026-11-28)."""
     found = told(root, "torus", ["time.step=1e-4", "time.duration=0.1", *friction])
     assert each / 1.6 < found.seconds["contact loop"] / 1000 < 1.6 * each
 
