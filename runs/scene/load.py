@@ -184,13 +184,15 @@ def with_merged(scene: Scene, raw: dict[str, Any], source: Source, say: Say) -> 
         return scene
     check_series(scene.tire, source)
     scene.tire.shape.check(scene.tire, source)
-    if "tire" in source.broken():
+    given = _keys_in(raw, "tire")
+    stated = scene.tire.shape.built_in or {"region", "cords"} & given.keys()
+    if "tire" in source.broken() or not stated:
         return scene
 
     def read(merged: dict[str, Any]) -> TireTable:
         return _table(TireTable, merged, ("tire",), source)
 
-    return replace(scene, tire=with_parts(scene.tire, _keys_in(raw, "tire"), read, source, say))
+    return replace(scene, tire=with_parts(scene.tire, given, read, source, say))
 
 
 BAND_EDGE = 10**0.05  # upper edge of a third octave over its middle

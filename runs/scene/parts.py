@@ -44,8 +44,6 @@ def with_parts(
     """
     built = tire.shape.parts(tire)
     regions, cords = (raw.get(key, []) for key in ("region", "cords"))
-    if not (built.whole or regions or cords):
-        return tire
     merged = dict(raw) | {
         "region": _regions(built, regions, source),
         "cords": _cords(built, cords),

@@ -49,6 +49,7 @@ class RadialSection(SectionKind):
     # mesh).
     segments = 40
     without = ("material",)
+    built_in = True
 
     size: str = text("205/60 R15", "size of the built-in passenger tire (docs/radial-tire.md)")
     grooves: int = integer(
@@ -149,7 +150,7 @@ class RadialSection(SectionKind):
             )
             for name, one in own.items()
         }
-        return Parts(compounds, lines, {}, {}, whole=True)
+        return Parts(compounds, lines, {}, {}, whole=self.built_in)
 
     def rubbers(self, tire: TireTable) -> dict[str, Material]:
         return {

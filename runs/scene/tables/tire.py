@@ -84,7 +84,7 @@ class SectionKind(Parameters):
     `order` and `segments`: defaults of element order and elements around. `air`: whether air is
     included unless [tire.cavity] says otherwise. `tread_law`: default of `contact.tread`; a layer
     for treads on belts, which hardly deform. `without`: tables of [tire] that the kind has no use
-    for.
+    for. `built_in`: its compounds and cords follow from its keys, and are all written back.
     """
 
     owner = "section"
@@ -93,6 +93,7 @@ class SectionKind(Parameters):
     air: ClassVar[bool] = True
     tread_law: ClassVar[str] = "layer"
     without: ClassVar[tuple[str, ...]] = ()
+    built_in: ClassVar[bool] = False
 
     def elements(self, tire: TireTable) -> tuple[Self, int, int]:
         """The kind with its number of elements set; order and segments, given or by default."""
