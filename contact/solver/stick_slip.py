@@ -211,9 +211,10 @@ class BrushFriction:
         self._touched, self._force = brush.touched, np.zeros(c)
         law = brush.law
         upstream = CompressedRows(brush.upstream)
+        self._slip = np.broadcast_to(brush.slip, (c, 2)).T.copy()
         doubles = {
             "stiffness": np.ascontiguousarray(np.broadcast_to(np.asarray(law.stiffness, float), c)),
-            "slip": np.ascontiguousarray(np.broadcast_to(brush.slip, (c, 2)).T), "own": plane.own,
+            "slip": self._slip, "own": plane.own,
             "pitches": brush.pitches, "deflection": brush.deflected, "moved": brush.moved,
             "horizontal": self._horizontal, "before": self._before,
         }  # fmt: skip
@@ -232,6 +233,11 @@ class BrushFriction:
         self.compiled = _FFI.new("brush *", self._held)
         _C.brush_begin(self.compiled)
         self._freed = _FFI.gc(self.compiled, _C.brush_end)
+
+    def creep(self, slip: Array | tuple[float, float]) -> None:
+        """Set the slip (s_x, s_y), or (c, 2) at the points, of the steps to come (contact.tread.brush)."""
+        way = self._brush.way * np.array([-1.0, 1.0])
+        self._slip[:] = np.broadcast_to(way * np.asarray(slip), self._slip.T.shape).T
 
     @property
     def horizontal(self) -> Array:
