@@ -12,7 +12,6 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 ROOMS = ("fem", "modal", "greens", "contact", "runs")  # each may use those before it
-LARGEST = 800  # lines of a module: more than that is more than one subject
 SMALLEST = 60  # lines of a module that only one other imports: less is a page of its reader
 PLUGINS = {"kinds", "laws", "outputs"}  # folders of one variant a file
 FUNCTION = 30  # lines that 95 % of all functions stay within
@@ -100,13 +99,6 @@ def test_files_of_tests_differ_in_name() -> None:
 
 def _lines(file: Path) -> int:
     return len(file.read_text().splitlines())
-
-
-def test_a_module_is_one_subject() -> None:
-    pages = [file for kind in ("*.j2", "*.css", "*.js") for file in (ROOT / "runs").rglob(kind)]
-    files = [*MODULES.values(), *(ROOT / "tests").rglob("*.py"), *pages]
-    large = {str(file.relative_to(ROOT)) for file in files if _lines(file) > LARGEST}
-    assert large == set()
 
 
 def test_no_module_is_a_page_of_its_only_reader() -> None:

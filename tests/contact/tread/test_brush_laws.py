@@ -38,7 +38,7 @@ def test_a_brush_by_area_is_the_same_on_every_grid() -> None:
             brush.begin(touching)
             c = len(patch.points)
             # Rigid: no forces move anything.
-            friction = BrushFriction(brush, np.zeros((3 * c, 3 * c)), None)
+            friction = BrushFriction(brush, np.zeros((3 * c, 3 * c)), None, tolerance=1e-12)
             gap, none = np.where(touching, 0.0, 1.0), np.zeros(2 * c)
             for _ in range(200 * fine):
                 friction.solve(Pressed(), gap, touching, patch.force, none)

@@ -17,7 +17,6 @@ from tireroad.runs.fit import (
     FitFigures,
     Model,
     construction,
-    deflection_curve,
     fit,
     read,
     report,
@@ -275,7 +274,6 @@ def test_curves_and_footprints_are_figures() -> None:
     assert given.tolerance("footprint width at 2000 N") == 0.05
     computed = Model(given)._computed()
     assert computed.startswith("deflections = [0.001, ") and computed.count(",") == 5
-    assert deflection_curve("[VERTICAL]\n0.01 2000\n") == []
 
 
 @pytest.mark.parametrize(

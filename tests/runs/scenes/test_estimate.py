@@ -54,7 +54,12 @@ def test_passenger_is_as_measured(root: Path) -> None:
     assert 43 / 1.6 < sum(wanted.seconds.values()) < 43 * 1.6
     assert 1.69 / 1.6 < sum(wanted.memory.values()) / 1e9 < 1.69 * 1.6
     assert wanted.sizes.points == pytest.approx(1631, rel=0.3)
-    product = estimate(load(scene, ["accuracy.estimate=false", "contact.friction=0", 'contact.solver="projected-cg"']))
+    product = estimate(
+        load(
+            scene,
+            ["accuracy.estimate=false", "contact.friction=0", 'contact.solver="projected-cg"'],
+        )
+    )
     pivoted = wanted
     matrix = 8.0 * pivoted.sizes.points**2
     # The results of a block are counted at another time than it pivots.

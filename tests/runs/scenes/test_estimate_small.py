@@ -87,7 +87,15 @@ def test_a_curved_wall_without_tension(tmp_path: Path) -> None:
     ("overrides", "written"),
     [
         (["time.duration=2", "contact.friction=0"], 50.6),
-        (["time.duration=0.5", "output.vibration=true", "output.fields=true", "contact.friction=0"], 21.9),
+        (
+            [
+                "time.duration=0.5",
+                "output.vibration=true",
+                "output.fields=true",
+                "contact.friction=0",
+            ],
+            21.9,
+        ),
         (["contact=", "road=", "time=", "modal.count=300", "rotation.campbell.to=200"], 15.8),
     ],
 )

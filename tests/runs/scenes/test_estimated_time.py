@@ -23,7 +23,11 @@ MEASURED = [
     ("torus", SMALL, {"static": 1.4, "modes": 1.73}),
     ("torus", ["contact.friction=0"], {"static": 6.2, "modes": 9.21, "greens": 2.57}),
     ("torus", LARGE, {"static": 105.0}),
-    ("passenger", ["contact.friction=0"], {"static": 9.12, "modes": 12.7, "greens": 9.44, "contact loop": 8.84}),
+    (
+        "passenger",
+        ["contact.friction=0"],
+        {"static": 9.12, "modes": 12.7, "greens": 9.44, "contact loop": 8.84},
+    ),
     ("torus", [], {"contact loop": 2.3}),  # 2026-11-28, 1.3 s on a core nearly twice as fast
     ("passenger", FINE, {"static": 39.3, "modes": 69.7}),
 ]

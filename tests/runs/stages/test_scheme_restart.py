@@ -69,7 +69,7 @@ def history(folder) -> tuple[np.ndarray, str]:
 
 @pytest.fixture
 def attempts(monkeypatch):
-    """Ends so many loops as chattering, and asks the one after them to stop after its 60th step, once."""
+    """Ends so many loops as chattering, and asks the one after them to stop after its first block of steps, once."""
     ended: list[float] = []
 
     def arrange(count: int) -> list[float]:
@@ -78,21 +78,20 @@ def attempts(monkeypatch):
                 ended.append(limit)
                 raise Chatter("points open and close from step to step")
 
-        class StopsAt60:
+        class StopsOnce:
             asked = False
 
             def __init__(self, comm, seconds: float) -> None:
-                self.steps = 0
+                pass
 
             def __call__(self, signal) -> tuple[str, bool]:
-                self.steps += 1
-                if len(ended) == count and self.steps == 60 and not StopsAt60.asked:
-                    StopsAt60.asked = True
+                if len(ended) == count and not StopsOnce.asked:
+                    StopsOnce.asked = True
                     return "SIGTERM", False
                 return "", False
 
         monkeypatch.setattr(Alternation, "check", check)
-        monkeypatch.setattr(contact, "Watch", StopsAt60)
+        monkeypatch.setattr(contact, "Watch", StopsOnce)
         return ended
 
     return arrange
