@@ -119,9 +119,10 @@ class PlaneCompliance:
         """An upper bound of the largest singular value, m/N."""
         if self._bound is None:
             count = 2 * self.weights.shape[1]
-            size = float(np.linalg.norm(self.tire[-count:, -count:], 2))
+            beside = self.tire[-count:, -count:]
+            size = np.sqrt(np.linalg.norm(beside, 1) * np.linalg.norm(beside, np.inf))
             spread = sparse.linalg.norm(self.weights, 1) * sparse.linalg.norm(self.weights, np.inf)
-            self._bound = size * float(spread) + (
+            self._bound = float(size * spread) + (
                 self.shear.bound if self.shear is not None else 0.0
             )
         return self._bound
