@@ -12,6 +12,7 @@ of other members.
 from __future__ import annotations
 
 import csv
+import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -110,9 +111,8 @@ def _place(key: tuple[str, str]) -> tuple[int, tuple[int, str], float]:
 
 def _banded(name: str) -> tuple[str, float | None]:
     """The quantity and the band (Hz) of a third octave; None as the band of any other figure."""
-    what, _, band = name.rpartition(", ")
-    is_one = "dB" not in band and band.endswith(" Hz") and ": " not in what
-    return (what, float(band.removesuffix(" Hz"))) if is_one else (name, None)
+    found = re.fullmatch(r"([^:]+), ([\d.e+]+) Hz", name)
+    return (found[1], float(found[2])) if found else (name, None)
 
 
 def _settings(sweep: Sweep, member: Member) -> dict[str, Any]:
