@@ -5,18 +5,19 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* y (n) += sum_k coefficient[k] column[which[k]] (n), four columns at a time: y is read and written once for them. */
-static void add_columns(int64_t n, const double *columns, int count, const int *which, const double *coefficient,
+/* y (n) += sum_k coefficient[k] column[which[k]] (n), of columns `lead` apart, four at a time: y is read and written once
+   for them. */
+static void add_columns(int64_t n, int64_t lead, const double *columns, int count, const int *which, const double *coefficient,
                         double *restrict y) {
     int k = 0;
     for (; k + 4 <= count; k += 4) {
-        const double *restrict a = columns + which[k] * n, *restrict b = columns + which[k + 1] * n;
-        const double *restrict c = columns + which[k + 2] * n, *restrict d = columns + which[k + 3] * n;
+        const double *restrict a = columns + which[k] * lead, *restrict b = columns + which[k + 1] * lead;
+        const double *restrict c = columns + which[k + 2] * lead, *restrict d = columns + which[k + 3] * lead;
         const double ca = coefficient[k], cb = coefficient[k + 1], cc = coefficient[k + 2], cd = coefficient[k + 3];
         for (int64_t i = 0; i < n; i++) y[i] += ca * a[i] + cb * b[i] + cc * c[i] + cd * d[i];
     }
     for (; k < count; k++) {
-        const double *restrict a = columns + which[k] * n;
+        const double *restrict a = columns + which[k] * lead;
         const double ca = coefficient[k];
         for (int64_t i = 0; i < n; i++) y[i] += ca * a[i];
     }

@@ -24,7 +24,6 @@ typedef struct {
 void take(states *s);
 void move(states *s);
 void see(states *s);
-void predict(states *s);
 void advance(states *s);
 void add_loaded(int columns, int rows, const double *matrix, const double *x, int *which, double *value, double *y);
 // end
@@ -36,7 +35,7 @@ blas linked;
 /* y (rows,) += A x, A stored by columns; which and value (columns,) are workspace. */
 void add_loaded(int columns, int rows, const double *matrix, const double *x, int *which, double *value, double *y) {
     int count = nonzero(columns, x, which, value);
-    add_columns(rows, matrix, count, which, value, y);
+    add_columns(rows, rows, matrix, count, which, value, y);
 }
 
 /* z_n = y_n + b1 P f_n with the force that `advance` left. */
@@ -72,12 +71,6 @@ void see(states *s) {
     if (n) ((gemv)linked.dgemv)("T", &n, &m, &one, s->output, &n, s->moved, &step, &none, s->out, &step);
     else memset(s->out, 0, m * sizeof(double));
     memcpy(s->rate, s->out + m - 3, 3 * sizeof(double));
-}
-
-void predict(states *s) {
-    take(s);
-    move(s);
-    see(s);
 }
 
 /* The rate of momentum with the force at the end of the step. */

@@ -33,7 +33,6 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import linalg, sparse
-from scipy.sparse.linalg import LinearOperator
 from threadpoolctl import threadpool_info
 
 from tireroad.fem.collective import allgather_rows, same_on_all
@@ -304,11 +303,6 @@ class LoadedColumns:
             _C.ints(np.empty(count, np.int32)),
             _C.doubles(np.empty(count)),
         )
-
-    @staticmethod
-    def of(matrix: Array | LinearOperator, comm: MPI.Comm) -> LoadedColumns | LinearOperator:
-        """A matrix wrapped for such products; a linear operator is returned as it is."""
-        return LoadedColumns(matrix, comm) if isinstance(matrix, np.ndarray) else matrix
 
     def __matmul__(self, force: Array) -> Array:
         """A f (n,) for f (k,). Collective where the rows are shared."""

@@ -22,7 +22,7 @@ typedef struct {
     struct factor *factor;
 } active_set;
 
-int active_set_begin(active_set *s);
+void active_set_begin(active_set *s);
 void active_set_end(active_set *s);
 int active_set_refactor(active_set *s);
 int active_set_solve(active_set *s, const double *q, const uint8_t *guess, const double *reference, double *force);
@@ -46,7 +46,7 @@ typedef struct {
 
 enum { RIGID, GRID, MATRIX };
 
-int plane_begin(plane *s);
+void plane_begin(plane *s);
 void plane_end(plane *s);
 void plane_shear(plane *s, const double *force, double *moved);
 void plane_lift(plane *s, const double *force, double *moved);
@@ -96,7 +96,7 @@ typedef struct {
     struct brush_work *work;
 } brush;
 
-int brush_begin(brush *s);
+void brush_begin(brush *s);
 void brush_end(brush *s);
 int brush_solve(brush *s, normal_solver solve, void *of, const double *q, const uint8_t *guess, const double *at_rest,
                 const double *free, double *force);
@@ -143,7 +143,7 @@ static void *room(size_t count, size_t size) {
 struct factor {
     int members, changes, entered, count;
     int *member, *enter, *leave, *pivots, *turns, *index, *place;
-    double *lu, *columns, *rows, *schur, *whole, *rest, *inner, *change, *value, *right, *force, *gap;
+    double *lu, *columns, *rows, *schur, *rest, *inner, *change, *value, *right, *force, *gap;
     int *which;
     uint8_t *set, *trial;
     int known;                            /* whether `set` has been prepared */
@@ -152,23 +152,22 @@ struct factor {
 enum { SHARE = 16, FEWEST_CHANGES = 4, PATIENCE = 10 };
 static const double ROUNDING = 1e-12;
 
-int active_set_begin(active_set *s) {
+void active_set_begin(active_set *s) {
     const int n = s->n;
     struct factor *f = s->factor = room(1, sizeof *f);
     int **ints[] = {&f->member, &f->enter, &f->leave, &f->pivots, &f->turns, &f->index, &f->place, &f->which};
     for (int i = 0; i < 8; i++) *ints[i] = INTS(n);
-    double **doubles[] = {&f->whole, &f->rest, &f->inner, &f->change, &f->value, &f->right, &f->force, &f->gap};
-    for (int i = 0; i < 8; i++) *doubles[i] = DOUBLES(n);
+    double **doubles[] = {&f->rest, &f->inner, &f->change, &f->value, &f->right, &f->force, &f->gap};
+    for (int i = 0; i < 7; i++) *doubles[i] = DOUBLES(n);
     const int k = n / SHARE + FEWEST_CHANGES;
     f->lu = DOUBLES((size_t)n * n);
     f->columns = DOUBLES((size_t)n * k), f->rows = DOUBLES((size_t)n * k), f->schur = DOUBLES((size_t)k * k);
     f->set = room(n, 1), f->trial = room(n, 1);
-    return SOLVED;
 }
 
 void active_set_end(active_set *s) {
     struct factor *f = s->factor;
-    void *all[] = {f->member, f->enter, f->leave, f->pivots, f->turns, f->index, f->place, f->which, f->whole,
+    void *all[] = {f->member, f->enter, f->leave, f->pivots, f->turns, f->index, f->place, f->which,
                    f->rest, f->inner, f->change, f->value, f->right, f->force, f->gap, f->lu, f->columns, f->rows,
                    f->schur, f->set, f->trial, f};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) free(all[i]);
@@ -300,7 +299,7 @@ static void touch(active_set *s, const uint8_t *active, const double *q, const d
             }
     if (lifted) {
         memset(f->right, 0, n * sizeof(double));
-        add_columns(n, s->columns, lifted, f->which, f->value, f->right);
+        add_columns(n, n, s->columns, lifted, f->which, f->value, f->right);
     }
     for (int t = 0; t < f->count; t++) {
         const int i = f->index[t];
@@ -308,7 +307,7 @@ static void touch(active_set *s, const uint8_t *active, const double *q, const d
     }
     solve_factor(f, f->change);
     memcpy(gap, q, n * sizeof(double));
-    add_columns(n, s->columns, nonzero(n, f->change, f->which, f->value), f->which, f->value, gap);
+    add_columns(n, n, s->columns, nonzero(n, f->change, f->which, f->value), f->which, f->value, gap);
     for (int i = 0; i < n; i++) force[i] = active[i] ? (reference ? reference[i] : 0.0) + f->change[i] : 0.0;
 }
 
@@ -374,7 +373,7 @@ struct plane_work {
     double *tt, *zt, *tz, *t, *z, *u;     /* (2s, 2s), (2s, s), (s, 2s) of leading dimensions 2c, c, 2c; vectors */
 };
 
-int plane_begin(plane *s) {
+void plane_begin(plane *s) {
     const int p = s->nodes, c = s->points, most = p > c ? p : c;
     struct plane_work *w = s->work = room(1, sizeof *w);
     w->nodal = DOUBLES(2 * p), w->nodes = DOUBLES(2 * p), w->value = DOUBLES(3 * most), w->given = DOUBLES(2 * c);
@@ -387,7 +386,6 @@ int plane_begin(plane *s) {
         w->t = DOUBLES(2 * c), w->z = DOUBLES(c), w->u = DOUBLES(2 * c);
         for (int i = 0; i < c; i++) w->slot[i] = -1;
     }
-    return SOLVED;
 }
 
 void plane_end(plane *s) {
@@ -616,7 +614,7 @@ static void shear_some(plane *s, int reach, int count, const int *index, const d
         for (int i = 0; i < m; i++) down[d * m + i] = full[w->carried[i]];
     }
     memset(up, 0, 2 * m * sizeof(double));
-    add_columns(2 * m, w->compact, nonzero(2 * m, down, w->which, w->value), w->which, w->value, up);
+    add_columns(2 * m, 2 * m, w->compact, nonzero(2 * m, down, w->which, w->value), w->which, w->value, up);
     for (int d = 0; d < 2; d++) {
         double *full = w->value;
         for (int i = 0; i < m; i++) full[w->carried[i]] = up[d * m + i];
@@ -652,7 +650,7 @@ void plane_shear(plane *s, const double *force, double *moved) {
     const int c = s->points, p = s->nodes;
     for (int d = 0; d < 2; d++) to_nodes(s, force + d * c, w->nodal + d * p);
     memset(w->nodes, 0, 2 * p * sizeof(double));
-    add_columns(2 * p, s->hh, nonzero(2 * p, w->nodal, w->which, w->value), w->which, w->value, w->nodes);
+    add_columns(2 * p, 2 * p, s->hh, nonzero(2 * p, w->nodal, w->which, w->value), w->which, w->value, w->nodes);
     for (int d = 0; d < 2; d++) to_points(s, w->nodes + d * p, moved + d * c);
     if (s->tread == RIGID) return;
     const int count = loaded(s, force, 2);
@@ -682,12 +680,12 @@ void plane_lift(plane *s, const double *force, double *moved) {
     const int c = s->points, p = s->nodes;
     if (s->lift) {
         memset(moved, 0, c * sizeof(double));
-        add_columns(c, s->lift, nonzero(2 * c, force, w->which, w->value), w->which, w->value, moved);
+        add_columns(c, c, s->lift, nonzero(2 * c, force, w->which, w->value), w->which, w->value, moved);
         return;
     }
     for (int d = 0; d < 2; d++) to_nodes(s, force + d * c, w->nodal + d * p);
     memset(w->nodes, 0, p * sizeof(double));
-    if (s->zh) add_columns(p, s->zh, nonzero(2 * p, w->nodal, w->which, w->value), w->which, w->value, w->nodes);
+    if (s->zh) add_columns(p, p, s->zh, nonzero(2 * p, w->nodal, w->which, w->value), w->which, w->value, w->nodes);
     to_points(s, w->nodes, moved);
     if (s->tread == RIGID || !s->coupled) return;
     const int count = loaded(s, force, 2);
@@ -737,7 +735,7 @@ void plane_drag(plane *s, const double *force, double *moved) {
     const int c = s->points, p = s->nodes;
     to_nodes(s, force, w->nodal);
     memset(w->nodes, 0, 2 * p * sizeof(double));
-    if (s->hz) add_columns(2 * p, s->hz, nonzero(p, w->nodal, w->which, w->value), w->which, w->value, w->nodes);
+    if (s->hz) add_columns(2 * p, 2 * p, s->hz, nonzero(p, w->nodal, w->which, w->value), w->which, w->value, w->nodes);
     for (int d = 0; d < 2; d++) to_points(s, w->nodes + d * p, moved + d * c);
 }
 
@@ -969,7 +967,7 @@ struct brush_work {
     uint8_t *lifted, *touching, *set;
 };
 
-int brush_begin(brush *s) {
+void brush_begin(brush *s) {
     const int c = s->compliance->points;
     struct brush_work *w = s->work = room(1, sizeof *w);
     double **doubles[] = {&w->share, &w->past, &w->trial, &w->given, &w->moved, &w->lift, &w->found, &w->q,
@@ -978,7 +976,6 @@ int brush_begin(brush *s) {
     for (int i = 0; i < 16; i++) *doubles[i] = DOUBLES(2 * c);
     for (int i = 0; i < MIXED; i++) w->results[i] = DOUBLES(2 * c), w->residuals[i] = DOUBLES(2 * c);
     w->index = INTS(c), w->lifted = room(c, 1), w->touching = room(c, 1), w->set = room(c, 1);
-    return SOLVED;
 }
 
 void brush_end(brush *s) {
@@ -1145,24 +1142,14 @@ static void finish(brush *s, const double *force, const double *free) {
                 low = i < low ? i : low, high = i > high ? i : high;
                 low = next < low ? next : low, high = next > high ? next : high;
             }
-        memcpy(w->lift, force, c * sizeof(double));
         for (int half = 0; half < 2 && low <= high; half++) {
             double *moved = s->moved + half * c + low;
             for (int i = low; i <= high; i++) moved[i - low] = free[half * c + i] - s->dragged[half * c + i];
             int count = nonzero(c, force, p->which, p->value);
             for (int k = 0; k < 2 * c; k++)
                 if (w->found[k] != 0.0) p->which[count] = c + k, p->value[count++] = w->found[k];
-            const double *from = compliance->beside + half * c + low;
-            const int n = high - low + 1;
-            int k = 0;
-            for (; k + 4 <= count; k += 4) {
-                const double *restrict a0 = from + (size_t)p->which[k] * 2 * c, *restrict a1 = from + (size_t)p->which[k + 1] * 2 * c;
-                const double *restrict a2 = from + (size_t)p->which[k + 2] * 2 * c, *restrict a3 = from + (size_t)p->which[k + 3] * 2 * c;
-                const double v0 = p->value[k], v1 = p->value[k + 1], v2 = p->value[k + 2], v3 = p->value[k + 3];
-                for (int i = 0; i < n; i++) moved[i] += v0 * a0[i] + v1 * a1[i] + v2 * a2[i] + v3 * a3[i];
-            }
-            for (; k < count; k++)
-                for (int i = 0; i < n; i++) moved[i] += p->value[k] * from[(size_t)p->which[k] * 2 * c + i];
+            const double *rows = compliance->beside + half * c + low;
+            add_columns(high - low + 1, 2 * c, rows, count, p->which, p->value, moved);
         }
     } else {
         plane_shear(compliance, w->found, w->lift);
@@ -1252,12 +1239,7 @@ void meeting_prepare(meeting *s, const double *moved, const double *road, const 
         for (int d = 0; d < 3; d++) multiply(&down, s->added + d * c, s->nodal + d * p);
         memcpy(s->lifted, moved, s->seen * p * sizeof(double));
         int count = nonzero(3 * p, s->nodal, s->which, s->value);
-        if (s->seen * p == s->answer_rows) add_columns(s->answer_rows, s->answer, count, s->which, s->value, s->lifted);
-        else
-            for (int k = 0; k < count; k++) {
-                const double *column = s->answer + (size_t)s->which[k] * s->answer_rows;
-                for (int i = 0; i < s->seen * p; i++) s->lifted[i] += s->value[k] * column[i];
-            }
+        add_columns(s->seen * p, s->answer_rows, s->answer, count, s->which, s->value, s->lifted);
         nodes = s->lifted;
     }
     sparse up = {c, s->w_begin, s->w_column, s->w_value};

@@ -162,15 +162,11 @@ def stick_slip(
         "stick_slip *", held | {"compliance": compliance.compiled, "count": count, "norm": norm}
     )
     if _C.stick_slip_solve(problem, SLIDING_TOLERANCE):
-        raise _no_equilibrium()
+        raise ConvergenceError(
+            "contact: no equilibrium of stick and slip was found; take a smaller [time] step, a smaller friction "
+            "or a softer brush"
+        )
     return force.T.copy()
-
-
-def _no_equilibrium() -> ConvergenceError:
-    return ConvergenceError(
-        "contact: no equilibrium of stick and slip was found; take a smaller [time] step, a smaller friction "
-        "or a softer brush"
-    )
 
 
 class BrushFriction:
@@ -209,7 +205,7 @@ class BrushFriction:
         self._plane = plane = PlaneCompliance(tire, weights, shear, 3)
         c = plane.weights.shape[0]
         self._horizontal, self._before = np.zeros((2, c)), np.zeros((2, c))
-        self._touched, self._force = brush.touched, np.zeros(c)
+        self._touched = brush.touched
         law = brush.law
         upstream = CompressedRows(brush.upstream)
         self._slip = np.broadcast_to(brush.slip, (c, 2)).T.copy()

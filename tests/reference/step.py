@@ -55,6 +55,13 @@ def sliding(matrix: Array, constant: Array, bound: Array, force: Array) -> Array
     return onto_discs(force, bound)
 
 
+class Pressed:
+    """A normal solver whose forces are the static ones."""
+
+    def solve(self, q, guess_active=None, reference=None):
+        return reference
+
+
 class Bristles:
     """The brush of contact.tread.brush by its equations: rolling, of stiffness K (c,), slip (2, c) m a step."""
 

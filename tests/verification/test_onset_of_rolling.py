@@ -13,6 +13,7 @@ from tireroad.contact.solver.stick_slip import BrushFriction, PlaneCompliance, s
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.kernel import GridPlaces
 from tireroad.contact.tread.shear import KernelShear, half_space_shear
+from tireroad.tests.reference.step import Pressed
 
 POISSON, RADIUS, LOAD, FRICTION, PITCH = 0.28, 3.5, 0.4705, 0.4013, 0.25
 FORCE = 0.657 * FRICTION * LOAD
@@ -31,13 +32,6 @@ class Alone(KernelShear):
             grid, lambda x, y, a, b: half_space_shear(x, y, a, b, 1.0 + POISSON, POISSON)
         )
         self.coupled = False
-
-
-class Pressed:
-    """A normal solver whose forces are the static ones."""
-
-    def solve(self, q, guess_active=None, reference=None):
-        return reference
 
 
 @pytest.mark.slow

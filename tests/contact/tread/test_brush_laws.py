@@ -6,6 +6,7 @@ import pytest
 from tireroad.contact.solver.stick_slip import BrushFriction
 from tireroad.contact.tread.brush import Brush, BrushLaw, upstream
 from tireroad.runs.validation.cases import oval_patch
+from tireroad.tests.reference.step import Pressed
 
 
 def test_upstream_is_linear_interpolation_on_each_line() -> None:
@@ -15,13 +16,6 @@ def test_upstream_is_linear_interpolation_on_each_line() -> None:
     assert np.allclose(matrix @ x, [0.005, 0.015, 0.0, 0.005, 0.0])
     assert np.allclose(matrix.sum(axis=1), [1, 1, 0, 1, 0])
     assert np.array_equal(upstream(x, line, 0.0).toarray(), np.eye(5))
-
-
-class Pressed:
-    """A normal solver whose forces are the static ones."""
-
-    def solve(self, q, guess_active=None, reference=None):
-        return reference
 
 
 @pytest.mark.slow
