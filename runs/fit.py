@@ -277,11 +277,8 @@ class Tir:
         if key not in self.values:
             return None
         text, line = self.values[key]
-        try:
-            found = float(text.replace("D", "e").replace("d", "e"))
-        except ValueError:
-            found = math.nan
-        if not math.isfinite(found):
+        found = _finite(text)
+        if found is None:
             told = f"{key} = {text} is not a number{_hint(text)}" if text else f"{key} has no value"
             raise InputError(f"{self.path}, line {line}: {told}")
         return found
@@ -290,6 +287,15 @@ class Tir:
         """The unit as written if it is not that of SI."""
         text = self.units.get(key, ("", 0))[0]
         return text if text and text.lower() not in _UNITS[key][1] else None
+
+
+def _finite(text: str) -> float | None:
+    """A number as C or Fortran writes it; None if it is none or not finite."""
+    try:
+        found = float(text.replace("D", "e").replace("d", "e"))
+    except ValueError:
+        return None
+    return found if math.isfinite(found) else None
 
 
 def _hint(text: str) -> str:
@@ -361,11 +367,8 @@ def _curve(tir: Tir, nominal: float | None, notes: list[str]) -> list[list[float
     points: list[list[float]] = []
     for text, line in tir.tables.get(_CURVE, []):
         fields = re.split(r"[\s;]+", text)
-        try:
-            pair = [float(field) for field in fields]
-        except ValueError:
-            pair = []
-        if len(pair) != 2 or not all(math.isfinite(one) for one in pair):
+        pair = [one for one in map(_finite, fields) if one is not None]
+        if len(fields) != 2 or len(pair) != 2:
             raise InputError(
                 f"{tir.path}, line {line}: [{_CURVE}] has lines of a deflection and a load, not {text[:40]!r}{_hint(text)}"
             )

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import inv
 
 from tireroad.contact.solver.conditions import (
@@ -81,6 +83,7 @@ class ActiveSet:
         self.compiled = _FFI.new("active_set *", {"n": n} | self._held)
         _C.active_set_begin(self.compiled)
         self._freed = _FFI.gc(self.compiled, _C.active_set_end)
+        self.contact = _FFI.new("normal_contact *", {"all": self.compiled})
 
     def solve(
         self, q: Array, guess_active: Mask | None = None, reference: Array | None = None
@@ -150,73 +153,95 @@ class ActiveSet:
         return self._compliance.block(index, index)
 
 
+def guarded(work: Callable[..., int], raised: list[BaseException]) -> Callable[..., int]:
+    """`work` for a kernel to call: what it raises is appended to `raised`, for the caller of the kernel to raise."""
+
+    def run(*given: Any) -> int:
+        try:
+            return int(work(*given))
+        except BaseException as error:  # carried over the kernel
+            raised.append(error)
+            return int(_C.REFUSED)
+
+    return run
+
+
+def array(pointer: Any, size: int, kind: Any = float) -> NDArray[Any]:
+    """The array (size,) behind a pointer that a kernel passed, which lasts as long as the call."""
+    width = np.dtype(kind).itemsize
+    return np.frombuffer(_FFI.buffer(pointer, size * width), kind)
+
+
 class Pivot:
-    """M (c, c) of the `taken` points (n,) bool, of which `base` (n,) are B; 20 c^3 bytes of work.
+    """The contact problem of the `taken` points (n,) bool relative to `base` (n,) B, those that usually touch.
 
-    `places` (c,): the points in the order of M, B first. InputError if A is not positive definite.
+    M (c, c) takes 28 c^2 bytes of work to make. `places` (c,): the points in the order of M, B first. InputError if
+    A is not positive definite.
 
-    Of the points considered, B usually touch and N do not. With forces in metres, a = diag(A) f,
-    the unknowns z = (g_B, a_N) and their partners w = (a_B, g_N) solve a problem of the same kind,
+    With forces in metres, a = diag(A) f, the unknowns z = (g_B, a_N) and their partners w = (a_B, g_N) solve a problem
+    of the same kind,
 
         w = M z + h >= 0, z >= 0, w . z = 0,
         M = [ P, -P A_BN; A_NB P, A_NN - A_NB P A_BN ],  P = A_BB^-1,
 
-    in which few z are nonzero if the contact is near B. M is a P-matrix if A is one. Source:
-    Cottle, Pang and Stone, The Linear Complementarity Problem, 2.3 and 4.1.
+    in which few z are nonzero if the contact is near B. M is a P-matrix if A is one. h is linear in the gaps at the
+    reference forces: with q = 0 on B and forces of 0 elsewhere it is the reference to the last bit. Compiled
+    (contact.c). Source: Cottle, Pang and Stone, The Linear Complementarity Problem, 2.3 and 4.1.
     """
 
     def __init__(self, compliance: Compliance, taken: Mask, base: Mask) -> None:
         self.taken, self.base = taken, base
-        self.places = np.concatenate([np.flatnonzero(base), np.flatnonzero(taken & ~base)])
-        self._size = int(np.count_nonzero(base))
-        whole = checked_compliance(compliance.block(self.places, self.places))
+        places = np.concatenate([np.flatnonzero(base), np.flatnonzero(taken & ~base)])
+        b, c = int(np.count_nonzero(base)), len(places)
+        whole = checked_compliance(compliance.block(places, places))
         # A power of two, so that forces return from metres to the last bit.
         self._unit = 2.0 ** np.round(np.log2(whole.diagonal()))
-        self.matrix = self._pivoted(whole / self._unit)
-        self._turned = np.ascontiguousarray(self.matrix[:, : self._size].T)
+        self._matrix = _pivoted(whole / self._unit, b)
+        self.exchanged = ActiveSet(MatrixCompliance(self._matrix))
+        self.places, self._begun = places, np.zeros(c)
         self._reference: Array | None = None
+        doubles = {"unit": self._unit, "begun": self._begun} | {
+            name: np.empty(c) for name in ("own", "pushed", "value")
+        }
+        self._held: dict[str, Any] = {
+            name: COMPILED.doubles(values) for name, values in doubles.items()
+        }
+        self._held |= {
+            name: COMPILED.ints(values)
+            for name, values in {"places": places.astype(np.int32), "which": np.empty(c, np.int32)}.items()
+        }  # fmt: skip
+        self._held |= {
+            "differ": COMPILED.flags(np.empty(c, bool)), "points": len(taken), "taken": c, "base": b,
+            "columns": self.exchanged.compiled.columns, "exchanged": self.exchanged.compiled,
+        }  # fmt: skip
+        self.compiled = _FFI.new("pivot *", self._held)
 
-    def _pivoted(self, whole: Array) -> Array:
-        b = self._size
-        inverse = inv(whole[:b, :b]) if b else whole[:b, :b]
-        out = np.empty_like(whole)
-        out[:b, :b] = inverse
-        out[:b, b:] = -inverse @ whole[:b, b:]
-        out[b:, :b] = whole[b:, :b] @ inverse
-        out[b:, b:] = whole[b:, b:] + whole[b:, :b] @ out[:b, b:]
-        return out
-
-    def offset(self, q: Array, reference: Array) -> Array:
-        """h (c,) m for gaps q (n,) m at forces `reference` (n,) N, which are 0 at points not taken.
-
-        With q = 0 on B and a reference that is 0 elsewhere, h is that reference to the last bit.
-        """
-        if reference is not self._reference:
-            self._reference, self._begun = reference, self._at(reference)
-        own = q[self.places]
-        own[: self._size], pushed = 0.0, own[: self._size] @ self._turned
-        return self._begun + (own - pushed)
-
-    def _at(self, reference: Array) -> Array:
-        """The part of h due to the reference, (c,) m."""
+    def refer(self, reference: Array) -> None:
+        """Set the forces (n,) N at which the gaps q of what follows are, 0 at points not taken."""
+        if reference is self._reference:
+            return
+        self._reference, b = reference, self.compiled.base
         force = reference[self.places] * self._unit
-        out = -(self.matrix[:, self._size :] @ force[self._size :])
-        out[: self._size] += force[: self._size]
-        return out
+        self._begun[:] = -(self._matrix[:, b:] @ force[b:])
+        self._begun[:b] += force[:b]
 
-    def exchanged(self, active: Mask) -> Mask:
-        """Nonzero z (c,) if `active` (n,) touch: of B those that do not, of N those that do."""
-        out = active[self.places]
-        out[: self._size] ^= True
-        return out
+    def solve(self, q: Array, touching: Mask) -> Array:
+        """Forces f (n,) N for gaps q (n,) m, from a guess of the touching points (n,)."""
+        force = np.empty(len(q))
+        given = COMPILED.doubles(np.ascontiguousarray(q)), COMPILED.flags(touching)
+        self.exchanged.check(_C.pivot_solve(self.compiled, *given, COMPILED.doubles(force)))
+        return force
 
-    def forces(self, z: Array, w: Array) -> Array:
-        """Contact forces (n,) N of the z and w (c,) m."""
-        out = np.zeros(len(self.taken))
-        b = self._size
-        own = np.concatenate([w[:b], z[b:]])
-        out[self.places] = np.maximum(own, 0.0) / self._unit
-        return out
+
+def _pivoted(whole: Array, b: int) -> Array:
+    """M of a matrix whose first `b` rows are the base."""
+    inverse = inv(whole[:b, :b]) if b else whole[:b, :b]
+    out = np.empty_like(whole)
+    out[:b, :b] = inverse
+    out[:b, b:] = -inverse @ whole[:b, b:]
+    out[b:, :b] = whole[b:, :b] @ inverse
+    out[b:, b:] = whole[b:, b:] + whole[b:, :b] @ out[:b, b:]
+    return out
 
 
 # Number of steps over which the frequency of touching is averaged.
@@ -258,36 +283,74 @@ class UsualSet:
         self._pressed: Mask = np.zeros(n, dtype=bool)
         self._lost = 0.0
         self._made = 0
-        self._problem: tuple[Pivot, ActiveSet] | None = None
+        self._pivot: Pivot | None = None
+        self._base: Array = np.zeros(n)
+        self.raised: list[BaseException] = []  # in `others`, for the caller of the kernel to raise
+        self._others = _FFI.callback("look", guarded(self._look, self.raised))
+        self.contact = _FFI.new("normal_contact *", {"others": self._others})
 
     def solve(
         self, q: Array, guess_active: Mask | None = None, reference: Array | None = None
     ) -> Array:
         """Forces f (n,) N; see ActiveSet.solve."""
+        guess = self.begin(q, guess_active, reference)
+        while True:
+            assert self._pivot is not None, "begun"
+            force = self._pivot.solve(q, guess)
+            if self._settled(q, force):
+                return force
+            guess = force > 0.0
+
+    def begin(self, q: Array, guess_active: Mask | None, reference: Array | None) -> Mask:
+        """Prepare for a step; the guess (n,) of the touching points."""
         if not np.all(np.isfinite(q)):
             check_residual("active-set", np.nan)
-        base = np.zeros(len(q)) if reference is None else reference
+        self._base = np.zeros(len(q)) if reference is None else reference
         guess = self.active if guess_active is None else guess_active
-        pivot, inner = self._prepared(q, guess if guess.any() else q < 0.0, base != 0.0)
-        while True:
-            z = inner.solve(pivot.offset(q, base), pivot.exchanged(guess))
-            self.iterations = inner.iterations
-            force = pivot.forces(z, inner.gap)
-            gap = q + self._compliance.apply(force - base)
-            scale = float(np.abs(q).max() + (self._diagonal * force).max())
-            if not (gap[~pivot.taken] < -ROUNDING * scale).any():
-                return self._finish(force, gap, scale)
-            guess = force > 0.0
-            pivot, inner = self._widened(pivot.taken, pivot.base, gap)
+        pressed = self._base != 0.0
+        touching = guess if guess.any() else q < 0.0
+        if self._pivot is None:
+            self._share, self._pressed = touching.astype(float), pressed
+            self._widen(touching | pressed, touching, q)
+        elif (pressed & ~self._pivot.taken).any():
+            self._pressed = self._pressed | pressed
+            self._take(self._pivot.taken | pressed, self._pivot.base)
+        else:
+            self._pivot.refer(self._base)
+        return np.ascontiguousarray(guess)
+
+    def check(self, failure: int) -> None:
+        """ConvergenceError for what the kernel could not do."""
+        if failure and self._pivot:
+            self._pivot.exchanged.check(failure)
+
+    def _look(self, q: Any, force: Any) -> int:
+        """For the kernel: whether no other point touches, or there are more to be taken."""
+        n = len(self.active)
+        settled = self._settled(array(q, n).copy(), array(force, n).copy())
+        return int(_C.SOLVED if settled else _C.AGAIN)
+
+    def _settled(self, q: Array, force: Array) -> bool:
+        """Whether no point that was left out touches; if so the step is concluded, else more are taken."""
+        pivot = self._pivot
+        assert pivot is not None, "after a solution"
+        self.iterations = pivot.exchanged.iterations
+        gap = q + self._compliance.apply(force - self._base)
+        scale = float(np.abs(q).max() + (self._diagonal * force).max())
+        if (gap[~pivot.taken] < -ROUNDING * scale).any():
+            self._widen(pivot.taken, pivot.base, gap)
+            return False
+        self._finish(force, gap, scale)
+        return True
 
     def state(self) -> dict[str, Array | Mask]:
         """The state from which the next solve starts."""
-        if self._problem is None:
+        pivot = self._pivot
+        if pivot is None:
             return {}
-        pivot, inner = self._problem
         kept = {"active": self.active, "share": self._share, "lost": np.array(self._lost)}
         kept |= {"taken": pivot.taken, "base": pivot.base, "pressed": self._pressed}
-        return kept | {"exchanged": inner.factorised}
+        return kept | {"exchanged": pivot.exchanged.factorised}
 
     def set_state(self, state: dict[str, Array | Mask]) -> None:
         """Continue from `state`."""
@@ -297,45 +360,34 @@ class UsualSet:
         self.active, self._pressed, taken, base, exchanged = (
             np.array(state[name], dtype=bool) for name in masks
         )
-        _, inner = self._take(taken, base)
-        inner.refactor(exchanged)
+        self._take(taken, base).exchanged.refactor(exchanged)
         self._share, self._lost = np.array(state["share"], dtype=float), float(state["lost"])
 
     @property
     def factorisations(self) -> int:
         """Number of factorisations, including those of the pivots."""
-        return self._made + (self._problem[1].factorisations if self._problem else 0)
+        return self._made + (self._pivot.exchanged.factorisations if self._pivot else 0)
 
     def block(self, index: Index) -> Array:
         """A between the points `index`, (a, a) m/N."""
         return self._compliance.block(index, index)
 
-    def _prepared(self, q: Array, touching: Mask, pressed: Mask) -> tuple[Pivot, ActiveSet]:
-        """The problem, rebuilt if there is none or the reference presses on points left out."""
-        if self._problem is None:
-            self._share, self._pressed = touching.astype(float), pressed
-            return self._widened(touching | pressed, touching, q)
-        pivot = self._problem[0]
-        if (pressed & ~pivot.taken).any():
-            self._pressed = self._pressed | pressed
-            return self._take(pivot.taken | pressed, pivot.base)
-        return self._problem
-
-    def _widened(self, taken: Mask, base: Mask, gap: Array) -> tuple[Pivot, ActiveSet]:
-        """The problem with a further portion of points, nearest by their gaps (n,) m."""
+    def _widen(self, taken: Mask, base: Mask, gap: Array) -> None:
+        """Take a further portion of points, nearest by their gaps (n,) m."""
         left = np.flatnonzero(~taken)
         below = int(np.count_nonzero(gap[left] < 0.0))
         more = max(int(PORTION * np.count_nonzero(taken)), 2 * below, FEWEST_CANDIDATES)
         wider = taken.copy()
         wider[left[np.argsort(gap[left], kind="stable")[:more]]] = True
-        return self._take(wider, base)
+        self._take(wider, base)
 
-    def _take(self, taken: Mask, base: Mask) -> tuple[Pivot, ActiveSet]:
+    def _take(self, taken: Mask, base: Mask) -> Pivot:
         self._made = self.factorisations + 1
-        pivot = Pivot(self._compliance, taken, base)
-        self._problem = pivot, ActiveSet(MatrixCompliance(pivot.matrix))
+        self._pivot = Pivot(self._compliance, taken, base)
+        self._pivot.refer(self._base)
+        self.contact.usual = self._pivot.compiled
         self._lost = 0.0
-        return self._problem
+        return self._pivot
 
     def _finish(self, force: Array, gap: Array, scale: float) -> Array:
         self.residual = complementarity_residual(force, gap, self._diagonal, scale)
@@ -348,8 +400,8 @@ class UsualSet:
 
     def _reconsider(self) -> None:
         """Make the set that usually touches the base, once that would have been cheaper."""
-        assert self._problem is not None, "after a solution"
-        pivot = self._problem[0]
+        pivot = self._pivot
+        assert pivot is not None, "after a solution"
         self._share += (self.active - self._share) / MEMORY
         needed = (self._share > SELDOM) | self._pressed
         differ = float(np.count_nonzero(self.active ^ pivot.base))

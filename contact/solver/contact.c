@@ -8,7 +8,7 @@ typedef struct {
 } blas;
 extern blas linked;
 
-enum { SOLVED, SINGULAR, NO_SET, NOT_FINITE, UNSOLVED, REFUSED };
+enum { SOLVED, SINGULAR, NO_SET, NOT_FINITE, UNSOLVED, REFUSED, AGAIN };
 
 /* f >= 0, g = A (f - f_ref) + q >= 0, f . g = 0 for a matrix A (n, n), stored by rows and by columns. */
 typedef struct {
@@ -27,6 +27,31 @@ void active_set_end(active_set *s);
 int active_set_refactor(active_set *s);
 int active_set_solve(active_set *s, const double *q, const uint8_t *guess, const double *reference, double *force);
 
+/* The same between the points taken of many, relative to a base that usually touches (contact/solver/active_set.py). */
+typedef struct {
+    int points, taken, base;
+    const int *places;                    /* (taken,) points, those of the base first */
+    const double *columns, *unit;         /* M (taken, taken) by columns; (taken,) m/N */
+    const double *begun;                  /* (taken,) the offset h where q = 0 */
+    active_set *exchanged;                /* the problem in M */
+    double *own, *pushed, *value;         /* workspace: (taken,) */
+    int *which;
+    uint8_t *differ;
+} pivot;
+
+int pivot_solve(pivot *s, const double *q, const uint8_t *guess, double *force);
+
+/* Normal forces for the turns of a brush: `all` points at once, the `usual` ones, after which `others` are looked at, or
+   `another` solver. */
+typedef int (*normal_solver)(const double *q, const uint8_t *guess, double *force);
+typedef int (*look)(const double *q, const double *force);  /* SOLVED, or AGAIN with more points */
+typedef struct {
+    active_set *all;
+    pivot *usual;
+    look others;
+    normal_solver another;
+} normal_contact;
+
 /* What moves in the plane of the road, and away from it, under forces in the plane and normal to it: the tire
    between its nodes, and the tread between the points. In arrays (2, n), those of all x come before those of all y. */
 typedef struct {
@@ -36,8 +61,10 @@ typedef struct {
     const double *zh, *hz, *hh;           /* by columns: (2p, p), (p, 2p), (2p, 2p); zh, hz may be 0 */
     int tread;                            /* RIGID, GRID or MATRIX */
     int coupled;                          /* whether pressure shears it */
-    const double *kernel[5];              /* xx, xy, yy, zx, zy: (2 nx - 1, 2 ny - 1) of the grid, or (c, c) */
+    const double *kernel[5];              /* xx, xy, yy, zx, zy: (2 nx - 1, 2 ny - 1) of the grid and 8 numbers more, or (c, c) */
     int nx, ny, near;                     /* of the grid; cells up to which a Newton step reads the kernels */
+    const double *inverse[3];             /* xx, xy, yy of the tread's and the springs' inverse, or 0, */
+    int within;                           /* up to so many cells */
     const int *row, *column;              /* (c,) of each point in the grid */
     const double *lift, *beside;          /* all of it between the points, by columns: A_zt (2c, c), [A_tz A_tt]
                                              (3c, 2c); or 0 where that is too much */
@@ -48,10 +75,8 @@ enum { RIGID, GRID, MATRIX };
 
 void plane_begin(plane *s);
 void plane_end(plane *s);
-void plane_shear(plane *s, const double *force, double *moved);
-void plane_lift(plane *s, const double *force, double *moved);
-void plane_drag(plane *s, const double *force, double *moved);
-void tread_drag(plane *s, const double *force, double *moved);
+void plane_shear(plane *s, const double *force, int count, const int *to, double *moved);
+void plane_drag(plane *s, const double *force, const double *pressed, int count, const int *to, double *moved);
 int plane_held(const plane *s, int *index);
 void plane_hold(plane *s, int count, const int *index);
 
@@ -64,9 +89,13 @@ typedef struct {
     const double *inverse;                /* (count,) N/m, of B's diagonal */
     const double *constant, *bound;       /* (2, count) m; (count,) N, infinite where nothing slips */
     double *force;                        /* (2, count) N: guess, then solution */
+    int near;                             /* cells up to which a Newton step reads the tread's kernels */
+    double caution;                       /* share of r = `inverse` by which slipping points are told */
     double off, largest;                  /* residual, and the largest bound or force, N */
     double norm;                          /* an upper bound of the largest singular value of B, m/N */
-    active_set *normal;                   /* whose forces follow the tangential ones in a Newton step, or 0 */
+    normal_contact *normal;               /* whose forces follow the tangential ones in a Newton step, or 0 */
+    int touching;                         /* then: how many points, and which, touch */
+    const int *touch;
     double friction;                      /* of the bounds that follow with them */
     long products;
 } stick_slip;
@@ -74,8 +103,6 @@ typedef struct {
 int stick_slip_solve(stick_slip *s, double tolerance);
 int krylov(int n, int (*apply)(void *, const double *, double *), void *of, const double *right, double tolerance,
            double *x);
-
-typedef int (*normal_solver)(void *of, const double *q, const uint8_t *guess, const double *reference, double *force);
 
 /* A brush on the tire: normal and tangential forces of a step. */
 typedef struct {
@@ -98,9 +125,8 @@ typedef struct {
 
 void brush_begin(brush *s);
 void brush_end(brush *s);
-int brush_solve(brush *s, normal_solver solve, void *of, const double *q, const uint8_t *guess, const double *at_rest,
+int brush_solve(brush *s, normal_contact *normal, const double *q, const uint8_t *guess, const double *at_rest,
                 const double *free, double *force);
-int active_set_normal(void *of, const double *q, const uint8_t *guess, const double *reference, double *force);
 
 /* Tire at its nodes and contact at the points: what a step needs before and after its solution. */
 typedef struct {
@@ -357,17 +383,71 @@ int active_set_solve(active_set *s, const double *q, const uint8_t *guess, const
     return NO_SET;
 }
 
-int active_set_normal(void *of, const double *q, const uint8_t *guess, const double *reference, double *force) {
-    return active_set_solve(of, q, guess, reference, force);
+static void product(int rows, int columns, double factor, const double *a, int leading, const double *x, double keep,
+                    double *y) {
+    int one = 1;
+    if (rows && columns)
+        ((gemv)linked.dgemv)("N", &rows, &columns, &factor, a, &leading, x, &one, &keep, y, &one);
+}
+
+int pivot_solve(pivot *s, const double *q, const uint8_t *guess, double *force) {
+    const int b = s->base, c = s->taken;
+    for (int i = 0; i < c; i++) {
+        s->own[i] = q[s->places[i]];
+        s->differ[i] = guess[s->places[i]] ^ (i < b);
+    }
+    memset(s->pushed, 0, c * sizeof(double));
+    product(c, b, -1.0, s->columns, c, s->own, 1.0, s->pushed);
+    for (int i = 0; i < c; i++) s->own[i] = s->begun[i] + ((i < b ? 0.0 : s->own[i]) + s->pushed[i]);
+    s->exchanged->again = 1; /* its guess is given */
+    const int failed = active_set_solve(s->exchanged, s->own, s->differ, 0, s->value);
+    if (failed) return failed;
+    memset(force, 0, s->points * sizeof(double));
+    for (int i = 0; i < c; i++) force[s->places[i]] = fmax(i < b ? s->exchanged->gap[i] : s->value[i], 0.0) / s->unit[i];
+    return SOLVED;
+}
+
+/* force (c,) N at the points that touch, 0 elsewhere, that holds them on the road when they are lifted by (c,) m, 0 elsewhere. */
+static void follow(const normal_contact *s, const double *lifted, double *force) {
+    if (s->all) {
+        const struct factor *f = s->all->factor;
+        memset(force, 0, s->all->n * sizeof(double));
+        for (int k = 0; k < f->count; k++) force[f->index[k]] = -lifted[f->index[k]];
+        solve_factor(s->all->factor, force);
+        return;
+    }
+    pivot *u = s->usual;
+    struct factor *f = u->exchanged->factor;
+    const int b = u->base, c = u->taken;
+    for (int i = 0; i < b; i++) u->own[i] = -lifted[u->places[i]];
+    memset(u->pushed, 0, b * sizeof(double));
+    const int lifts = nonzero(b, u->own, u->which, u->value);
+    add_columns(b, c, u->columns, lifts, u->which, u->value, u->pushed);
+    for (int k = 0; k < f->count; k++) {
+        const int i = f->index[k];
+        if (i >= b) u->pushed[i] = lifted[u->places[i]] + dot(b, u->exchanged->rows + (size_t)i * c, u->own);
+    }
+    for (int k = 0; k < f->count; k++) u->value[f->index[k]] = -u->pushed[f->index[k]];
+    solve_factor(f, u->value);
+    memset(force, 0, u->points * sizeof(double));
+    for (int k = 0; k < f->count; k++) {
+        const int i = f->index[k];
+        if (i >= b) force[u->places[i]] = u->value[i] / u->unit[i];
+        u->which[k] = i, u->own[k] = u->value[i];
+    }
+    add_columns(b, c, u->columns, f->count, u->which, u->own, u->pushed);
+    for (int i = 0; i < b; i++)
+        if (!f->set[i]) force[u->places[i]] = u->pushed[i] / u->unit[i];
 }
 
 /* ---- Displacements in the plane and away from it --------------------------------------------------------------- */
 
 struct plane_work {
-    double *nodal, *nodes, *value, *field, *given, *compact;
+    double *nodal, *nodes, *value, *field, *given, *compact, *down;
     int *which, *first, *last, *some, *carried;
     uint8_t *bears, *kept;
-    int carriers;                         /* nodes between which `compact` (2m, 2m) has hh */
+    int carriers;                         /* m nodes between which `compact` (3m, 2m) has [hh; zh], `down` (2m, m) hz */
+    double *lifted, *follows;             /* (c,) m and N of a Newton step in which the normal forces follow */
     /* Of a dense compliance: the part between the points in `slots`, by columns; components x, y side by side. */
     int slots, *slot, *point;
     double *tt, *zt, *tz, *t, *z, *u;     /* (2s, 2s), (2s, s), (s, 2s) of leading dimensions 2c, c, 2c; vectors */
@@ -376,8 +456,9 @@ struct plane_work {
 void plane_begin(plane *s) {
     const int p = s->nodes, c = s->points, most = p > c ? p : c;
     struct plane_work *w = s->work = room(1, sizeof *w);
-    w->nodal = DOUBLES(2 * p), w->nodes = DOUBLES(2 * p), w->value = DOUBLES(3 * most), w->given = DOUBLES(2 * c);
-    w->field = DOUBLES(2 * (size_t)s->nx * s->ny), w->compact = DOUBLES(4 * (size_t)p * p);
+    w->nodal = DOUBLES(2 * p), w->nodes = DOUBLES(3 * p), w->value = DOUBLES(3 * most), w->given = DOUBLES(2 * c);
+    w->field = DOUBLES(2 * (size_t)s->nx * (s->ny + 8)), w->lifted = DOUBLES(c), w->follows = DOUBLES(c);
+    if (!s->lift) w->compact = DOUBLES(6 * (size_t)p * p), w->down = DOUBLES(2 * (size_t)p * p);
     w->which = INTS(3 * most), w->first = INTS(s->nx), w->last = INTS(s->nx), w->some = INTS(c);
     w->carried = INTS(p), w->bears = room(p, 1), w->kept = room(p, 1);
     if (s->lift) {
@@ -390,7 +471,7 @@ void plane_begin(plane *s) {
 
 void plane_end(plane *s) {
     struct plane_work *w = s->work;
-    void *all[] = {w->nodal, w->nodes, w->value, w->given, w->field, w->compact, w->which, w->first, w->last, w->some,
+    void *all[] = {w->nodal, w->nodes, w->value, w->given, w->field, w->compact, w->down, w->lifted, w->follows, w->which, w->first, w->last, w->some,
                    w->carried, w->bears, w->kept, w->slot, w->point, w->tt, w->zt, w->tz, w->t, w->z, w->u, w};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) free(all[i]);
 }
@@ -444,12 +525,6 @@ void plane_hold(plane *s, int count, const int *index) {
     hold(s, count, index);
 }
 
-static void product(int rows, int columns, const double *a, int leading, const double *x, double keep, double *y) {
-    int one = 1;
-    double unit = 1.0;
-    if (rows && columns) ((gemv)linked.dgemv)("N", &rows, &columns, &unit, a, &leading, x, &one, &keep, y, &one);
-}
-
 /* Forces (2, count) of some points side by side in the slots; and displacements back from `u`. */
 static void to_slots(plane *s, int count, const int *index, const double *force) {
     struct plane_work *w = s->work;
@@ -473,11 +548,6 @@ static void to_nodes(const plane *s, const double *points, double *nodes) {
     multiply(&down, points, nodes);
 }
 
-static void to_points(const plane *s, const double *nodes, double *points) {
-    sparse up = {s->points, s->w_begin, s->w_column, s->w_value};
-    multiply(&up, nodes, points);
-}
-
 /* The columns j0 to j1 of the outputs on each row of the grid, from the points at which they are read. */
 static void bounds(const plane *s, int count, const int *index) {
     struct plane_work *w = s->work;
@@ -489,11 +559,17 @@ static void bounds(const plane *s, int count, const int *index) {
     }
 }
 
-/* On the grid, between `bounds` and at least `reach` cells from each force: ux, uy (nx, ny) += kernels times forces. With
-   three kernels both components of both, with two and fy one of both, else both of one. Forces of one row of the grid
-   are taken by fours, so that displacements are read and written once for them. */
+/* Fields on the grid have rows a vector longer, and kernels end with one more: columns are taken by eights. */
+enum { VECTOR = 8 };
+static int pitch(const plane *s) { return s->ny + VECTOR; }
+static size_t cells(const plane *s) { return (size_t)s->nx * pitch(s); }
+static size_t cell(const plane *s, int point) { return (size_t)s->row[point] * pitch(s) + s->column[point]; }
+
+/* On the grid, between `bounds` and at least `reach` cells from each force: ux, uy += kernels times forces; what else is
+   in the fields is not to be read. With three kernels both components of both, with two and fy one of both, else both
+   of one. Forces of one row of the grid are taken by fours, so that displacements are read and written once for them. */
 static void spread(const plane *s, int reach, int count, const int *index, const double *fx, const double *fy,
-                   const double *kernel0, const double *kernel1, const double *kernel2, double *ux, double *uy) {
+                   const double *const *kernel, int kernels, double *ux, double *uy) {
     enum { TOGETHER = 4 };
     const struct plane_work *w = s->work;
     const int wide = 2 * s->ny - 1;
@@ -511,18 +587,19 @@ static void spread(const plane *s, int reach, int count, const int *index, const
             const int low = w->first[i] > begin - reach ? w->first[i] : begin - reach;
             const int n = (w->last[i] < end + reach ? w->last[i] : end + reach) - low + 1;
             if (n <= 0) continue;
-            double *restrict x = ux + (size_t)i * s->ny + low, *restrict y = uy ? uy + (size_t)i * s->ny + low : 0;
+            const int most = (n + VECTOR - 1) / VECTOR * VECTOR;
+            double *restrict x = ux + (size_t)i * pitch(s) + low, *restrict y = uy ? uy + (size_t)i * pitch(s) + low : 0;
             size_t at[TOGETHER];
             for (int k = 0; k < TOGETHER; k++) /* those beyond `some` read the first one's kernel, times nothing */
                 at[k] = (size_t)(i - row + s->nx - 1) * wide + (s->ny - 1 - s->column[index[a + (k < some ? k : 0)]] + low);
-            const double *restrict a0 = kernel0 + at[0], *restrict a1 = kernel0 + at[1], *restrict a2 = kernel0 + at[2];
-            const double *restrict a3 = kernel0 + at[3], *restrict b0 = kernel1 + at[0], *restrict b1 = kernel1 + at[1];
-            const double *restrict b2 = kernel1 + at[2], *restrict b3 = kernel1 + at[3];
-            if (kernel2) {
-                const double *restrict c0 = kernel2 + at[0], *restrict c1 = kernel2 + at[1], *restrict c2 = kernel2 + at[2];
-                const double *restrict c3 = kernel2 + at[3];
+            const double *restrict a0 = kernel[0] + at[0], *restrict a1 = kernel[0] + at[1], *restrict a2 = kernel[0] + at[2];
+            const double *restrict a3 = kernel[0] + at[3], *restrict b0 = kernel[1] + at[0], *restrict b1 = kernel[1] + at[1];
+            const double *restrict b2 = kernel[1] + at[2], *restrict b3 = kernel[1] + at[3];
+            if (kernels == 3) {
+                const double *restrict c0 = kernel[2] + at[0], *restrict c1 = kernel[2] + at[1];
+                const double *restrict c2 = kernel[2] + at[2], *restrict c3 = kernel[2] + at[3];
 #pragma GCC ivdep
-                for (int j = 0; j < n; j++) {
+                for (int j = 0; j < most; j++) {
                     x[j] += a0[j] * p[0] + a1[j] * p[1] + a2[j] * p[2] + a3[j] * p[3] + b0[j] * q[0] + b1[j] * q[1] +
                             b2[j] * q[2] + b3[j] * q[3];
                     y[j] += b0[j] * p[0] + b1[j] * p[1] + b2[j] * p[2] + b3[j] * p[3] + c0[j] * q[0] + c1[j] * q[1] +
@@ -530,12 +607,12 @@ static void spread(const plane *s, int reach, int count, const int *index, const
                 }
             } else if (fy)
 #pragma GCC ivdep
-                for (int j = 0; j < n; j++)
+                for (int j = 0; j < most; j++)
                     x[j] += a0[j] * p[0] + a1[j] * p[1] + a2[j] * p[2] + a3[j] * p[3] + b0[j] * q[0] + b1[j] * q[1] +
                             b2[j] * q[2] + b3[j] * q[3];
             else
 #pragma GCC ivdep
-                for (int j = 0; j < n; j++) {
+                for (int j = 0; j < most; j++) {
                     x[j] += a0[j] * p[0] + a1[j] * p[1] + a2[j] * p[2] + a3[j] * p[3];
                     y[j] += b0[j] * p[0] + b1[j] * p[1] + b2[j] * p[2] + b3[j] * p[3];
                 }
@@ -545,33 +622,70 @@ static void spread(const plane *s, int reach, int count, const int *index, const
 
 static int everywhere(const plane *s) { return s->nx > s->ny ? s->nx : s->ny; }
 
-/* moved (2, count) += the tread's displacements in the plane under forces (2, count), between the points `index`. */
-static void shear_tread(plane *s, int reach, int count, const int *index, const double *force, double *moved) {
+/* Displacements of the tread at the points `to` (n,), within `reach` cells of forces at the points `index` (count,): in the
+   plane under forces in it, moved (2, n) +=; away from the road under them, moved (n,) +=; in the plane under normal
+   forces, moved (2, n) -=, the transpose of the second. */
+static void shear_tread(plane *s, int reach, int count, const int *index, const double *force, int n, const int *to,
+                        double *moved) {
     struct plane_work *w = s->work;
     const double *x = force, *y = force + count;
     if (s->tread == GRID) {
-        const size_t cells = (size_t)s->nx * s->ny;
-        bounds(s, count, index);
-        memset(w->field, 0, 2 * cells * sizeof(double));
-        spread(s, reach, count, index, x, y, s->kernel[0], s->kernel[1], s->kernel[2], w->field, w->field + cells);
-        for (int a = 0; a < count; a++) {
-            const size_t at = (size_t)s->row[index[a]] * s->ny + s->column[index[a]];
-            moved[a] += w->field[at], moved[count + a] += w->field[cells + at];
+        bounds(s, n, to);
+        memset(w->field, 0, 2 * cells(s) * sizeof(double));
+        spread(s, reach, count, index, x, y, s->kernel, 3, w->field, w->field + cells(s));
+        for (int a = 0; a < n; a++) {
+            const size_t at = cell(s, to[a]);
+            moved[a] += w->field[at], moved[n + a] += w->field[cells(s) + at];
         }
     } else if (s->tread == MATRIX)
-        for (int a = 0; a < count; a++) {
-            const size_t at = (size_t)index[a] * s->points;
+        for (int a = 0; a < n; a++) {
+            const size_t at = (size_t)to[a] * s->points;
             const double *xx = s->kernel[0] + at, *xy = s->kernel[1] + at, *yy = s->kernel[2] + at;
             double across = 0.0, along = 0.0;
             for (int b = 0; b < count; b++) {
                 const int j = index[b];
                 along += xx[j] * x[b] + xy[j] * y[b], across += xy[j] * x[b] + yy[j] * y[b];
             }
-            moved[a] += along, moved[count + a] += across;
+            moved[a] += along, moved[n + a] += across;
         }
 }
 
-/* hh between the nodes that carry some points, kept while it has all of them and not twice as many. */
+static void lift_tread(plane *s, int reach, int count, const int *index, const double *force, int n, const int *to,
+                       double *moved) {
+    struct plane_work *w = s->work;
+    if (s->tread == RIGID || !s->coupled) return;
+    if (s->tread == GRID) {
+        bounds(s, n, to);
+        memset(w->field, 0, cells(s) * sizeof(double));
+        spread(s, reach, count, index, force, force + count, s->kernel + 3, 2, w->field, 0);
+        for (int a = 0; a < n; a++) moved[a] += w->field[cell(s, to[a])];
+    } else
+        for (int a = 0; a < n; a++) {
+            const double *zx = s->kernel[3] + (size_t)to[a] * s->points, *zy = s->kernel[4] + (size_t)to[a] * s->points;
+            for (int b = 0; b < count; b++) moved[a] += zx[index[b]] * force[b] + zy[index[b]] * force[count + b];
+        }
+}
+
+static void drag_tread(plane *s, int reach, int count, const int *index, const double *force, int n, const int *to,
+                       double *moved) {
+    struct plane_work *w = s->work;
+    if (s->tread == RIGID || !s->coupled) return;
+    if (s->tread == GRID) {
+        bounds(s, n, to);
+        memset(w->field, 0, 2 * cells(s) * sizeof(double));
+        spread(s, reach, count, index, force, 0, s->kernel + 3, 2, w->field, w->field + cells(s));
+        for (int a = 0; a < n; a++) {
+            const size_t at = cell(s, to[a]);
+            moved[a] -= w->field[at], moved[n + a] -= w->field[cells(s) + at];
+        }
+    } else
+        for (int a = 0; a < n; a++) {
+            const double *zx = s->kernel[3] + (size_t)to[a] * s->points, *zy = s->kernel[4] + (size_t)to[a] * s->points;
+            for (int b = 0; b < count; b++) moved[a] -= zx[index[b]] * force[b], moved[n + a] -= zy[index[b]] * force[b];
+        }
+}
+
+/* [hh; zh] and hz between the nodes that carry some points, kept while they have all of them and not twice as many. */
 static void carry(plane *s, int count, const int *index) {
     struct plane_work *w = s->work;
     const int p = s->nodes;
@@ -587,9 +701,39 @@ static void carry(plane *s, int count, const int *index) {
         if (w->kept[k]) w->carried[m++] = k;
     w->carriers = m;
     for (int j = 0; j < 2 * m; j++) {
-        const double *from = s->hh + (size_t)(w->carried[j % m] + (j / m) * p) * 2 * p;
-        double *to = w->compact + (size_t)j * 2 * m;
+        const size_t at = w->carried[j % m] + (j / m) * p;
+        const double *from = s->hh + at * 2 * p, *up = s->zh ? s->zh + at * p : 0;
+        double *to = w->compact + (size_t)j * 3 * m;
+        for (int i = 0; i < m; i++) {
+            const int k = w->carried[i];
+            to[i] = from[k], to[m + i] = from[p + k], to[2 * m + i] = up ? up[k] : 0.0;
+        }
+    }
+    for (int j = 0; j < m && s->hz; j++) {
+        const double *from = s->hz + (size_t)w->carried[j] * 2 * p;
+        double *to = w->down + (size_t)j * 2 * m;
         for (int i = 0; i < m; i++) to[i] = from[w->carried[i]], to[m + i] = from[p + w->carried[i]];
+    }
+}
+
+/* From forces (count,) of some points to the nodes that carry them (m,); and from these to the displacements of points. */
+static void to_carriers(plane *s, int count, const int *index, const double *force, double *nodes) {
+    struct plane_work *w = s->work;
+    double *full = w->value;
+    memset(full, 0, s->nodes * sizeof(double));
+    for (int a = 0; a < count; a++)
+        for (int k = s->w_begin[index[a]]; k < s->w_begin[index[a] + 1]; k++) full[s->w_column[k]] += s->w_value[k] * force[a];
+    for (int i = 0; i < w->carriers; i++) nodes[i] = full[w->carried[i]];
+}
+
+static void from_carriers(plane *s, const double *nodes, int count, const int *index, double *moved) {
+    struct plane_work *w = s->work;
+    double *full = w->value;
+    for (int i = 0; i < w->carriers; i++) full[w->carried[i]] = nodes[i];
+    for (int a = 0; a < count; a++) {
+        double sum = 0.0;
+        for (int k = s->w_begin[index[a]]; k < s->w_begin[index[a] + 1]; k++) sum += s->w_value[k] * full[s->w_column[k]];
+        moved[a] = sum;
     }
 }
 
@@ -597,35 +741,18 @@ static void carry(plane *s, int count, const int *index) {
    `carry` of these. */
 static void shear_some(plane *s, int reach, int count, const int *index, const double *force, double *moved) {
     struct plane_work *w = s->work;
-    const int m = w->carriers, p = s->nodes, c = s->points;
+    const int m = w->carriers, c = s->points;
     if (s->lift) {
         to_slots(s, count, index, force);
-        product(2 * w->slots, 2 * w->slots, w->tt, 2 * c, w->t, 0.0, w->u);
+        product(2 * w->slots, 2 * w->slots, 1.0, w->tt, 2 * c, w->t, 0.0, w->u);
         from_slots(s, count, index, moved);
         return;
     }
-    double *down = w->nodal, *up = w->nodes;
-    for (int d = 0; d < 2; d++) { /* to all nodes, then side by side to those that carry */
-        double *full = w->value;
-        memset(full, 0, p * sizeof(double));
-        for (int a = 0; a < count; a++)
-            for (int k = s->w_begin[index[a]]; k < s->w_begin[index[a] + 1]; k++)
-                full[s->w_column[k]] += s->w_value[k] * force[d * count + a];
-        for (int i = 0; i < m; i++) down[d * m + i] = full[w->carried[i]];
-    }
-    memset(up, 0, 2 * m * sizeof(double));
-    add_columns(2 * m, 2 * m, w->compact, nonzero(2 * m, down, w->which, w->value), w->which, w->value, up);
-    for (int d = 0; d < 2; d++) {
-        double *full = w->value;
-        for (int i = 0; i < m; i++) full[w->carried[i]] = up[d * m + i];
-        for (int a = 0; a < count; a++) {
-            double sum = 0.0;
-            for (int k = s->w_begin[index[a]]; k < s->w_begin[index[a] + 1]; k++)
-                sum += s->w_value[k] * full[s->w_column[k]];
-            moved[d * count + a] = sum;
-        }
-    }
-    shear_tread(s, reach, count, index, force, moved);
+    for (int d = 0; d < 2; d++) to_carriers(s, count, index, force + d * count, w->nodal + d * m);
+    memset(w->nodes, 0, 2 * m * sizeof(double));
+    add_columns(2 * m, 3 * m, w->compact, nonzero(2 * m, w->nodal, w->which, w->value), w->which, w->value, w->nodes);
+    for (int d = 0; d < 2; d++) from_carriers(s, w->nodes + d * m, count, index, moved + d * count);
+    shear_tread(s, reach, count, index, force, count, index, moved);
 }
 
 /* The points with a force, and their forces side by side in `given`. */
@@ -640,109 +767,58 @@ static int loaded(plane *s, const double *force, int components) {
     return count;
 }
 
-static void every_cell(plane *s) {
-    for (int i = 0; i < s->nx; i++) s->work->first[i] = 0, s->work->last[i] = s->ny - 1;
+static double from_nodes(const plane *s, const double *nodes, int point) {
+    double sum = 0.0;
+    for (int k = s->w_begin[point]; k < s->w_begin[point + 1]; k++) sum += s->w_value[k] * nodes[s->w_column[k]];
+    return sum;
 }
 
-/* moved (2, c) = the displacements in the plane of all points under forces in the plane (2, c). */
-void plane_shear(plane *s, const double *force, double *moved) {
+/* moved (2, count) = the displacements in the plane of the points `to` under forces in the plane (2, c). */
+void plane_shear(plane *s, const double *force, int count, const int *to, double *moved) {
     struct plane_work *w = s->work;
     const int c = s->points, p = s->nodes;
     for (int d = 0; d < 2; d++) to_nodes(s, force + d * c, w->nodal + d * p);
     memset(w->nodes, 0, 2 * p * sizeof(double));
     add_columns(2 * p, 2 * p, s->hh, nonzero(2 * p, w->nodal, w->which, w->value), w->which, w->value, w->nodes);
-    for (int d = 0; d < 2; d++) to_points(s, w->nodes + d * p, moved + d * c);
-    if (s->tread == RIGID) return;
-    const int count = loaded(s, force, 2);
-    if (s->tread == GRID) {
-        const size_t cells = (size_t)s->nx * s->ny;
-        every_cell(s);
-        memset(w->field, 0, 2 * cells * sizeof(double));
-        spread(s, everywhere(s), count, w->some, w->given, w->given + count, s->kernel[0], s->kernel[1], s->kernel[2], w->field,
-               w->field + cells);
-        for (int i = 0; i < c; i++) {
-            const size_t at = (size_t)s->row[i] * s->ny + s->column[i];
-            moved[i] += w->field[at], moved[c + i] += w->field[cells + at];
-        }
-    } else
-        for (int i = 0; i < c; i++)
-            for (int a = 0; a < count; a++) {
-                const size_t at = (size_t)i * c + w->some[a];
-                const double x = w->given[a], y = w->given[count + a];
-                moved[i] += s->kernel[0][at] * x + s->kernel[1][at] * y;
-                moved[c + i] += s->kernel[1][at] * x + s->kernel[2][at] * y;
-            }
+    for (int d = 0; d < 2; d++)
+        for (int a = 0; a < count; a++) moved[d * count + a] = from_nodes(s, w->nodes + d * p, to[a]);
+    const int loads = loaded(s, force, 2);
+    shear_tread(s, everywhere(s), loads, w->some, w->given, count, to, moved);
 }
 
-/* moved (c,) = the displacements away from the road under forces in the plane (2, c). */
-void plane_lift(plane *s, const double *force, double *moved) {
+/* moved (count,) = the displacements away from the road of the points `to` under forces in the plane (2, c). */
+static void plane_lift(plane *s, const double *force, int count, const int *to, double *moved) {
     struct plane_work *w = s->work;
     const int c = s->points, p = s->nodes;
-    if (s->lift) {
-        memset(moved, 0, c * sizeof(double));
-        add_columns(c, c, s->lift, nonzero(2 * c, force, w->which, w->value), w->which, w->value, moved);
-        return;
-    }
     for (int d = 0; d < 2; d++) to_nodes(s, force + d * c, w->nodal + d * p);
     memset(w->nodes, 0, p * sizeof(double));
     if (s->zh) add_columns(p, p, s->zh, nonzero(2 * p, w->nodal, w->which, w->value), w->which, w->value, w->nodes);
-    to_points(s, w->nodes, moved);
-    if (s->tread == RIGID || !s->coupled) return;
-    const int count = loaded(s, force, 2);
-    if (s->tread == GRID) {
-        every_cell(s);
-        memset(w->field, 0, (size_t)s->nx * s->ny * sizeof(double));
-        spread(s, everywhere(s), count, w->some, w->given, w->given + count, s->kernel[3], s->kernel[4], 0, w->field, 0);
-        for (int i = 0; i < c; i++) moved[i] += w->field[(size_t)s->row[i] * s->ny + s->column[i]];
-    } else
-        for (int i = 0; i < c; i++)
-            for (int a = 0; a < count; a++) {
-                const size_t at = (size_t)i * c + w->some[a];
-                moved[i] += s->kernel[3][at] * w->given[a] + s->kernel[4][at] * w->given[count + a];
-            }
+    for (int a = 0; a < count; a++) moved[a] = from_nodes(s, w->nodes, to[a]);
+    const int loads = loaded(s, force, 2);
+    lift_tread(s, everywhere(s), loads, w->some, w->given, count, to, moved);
 }
 
-/* moved (2, c) += the tread's displacements in the plane under normal forces (c,), at the points within `bounds`. */
-static void tread_drag_within(plane *s, const double *force, double *moved) {
+/* moved (2, count) = the displacements in the plane of the points `to`: the tire's under normal forces (c,) and the
+   tread's under `pressed` (c,). */
+void plane_drag(plane *s, const double *force, const double *pressed, int count, const int *to, double *moved) {
     struct plane_work *w = s->work;
-    const int c = s->points;
-    if (s->tread == RIGID || !s->coupled) return;
-    const int count = loaded(s, force, 1);
-    if (s->tread == GRID) {
-        const size_t cells = (size_t)s->nx * s->ny;
-        memset(w->field, 0, 2 * cells * sizeof(double));
-        spread(s, everywhere(s), count, w->some, w->given, 0, s->kernel[3], s->kernel[4], 0, w->field, w->field + cells);
-        for (int i = 0; i < c; i++) {
-            const size_t at = (size_t)s->row[i] * s->ny + s->column[i];
-            moved[i] -= w->field[at], moved[c + i] -= w->field[cells + at];
-        }
-    } else
-        for (int i = 0; i < c; i++)
-            for (int a = 0; a < count; a++) {
-                const size_t at = (size_t)i * c + w->some[a];
-                moved[i] -= s->kernel[3][at] * w->given[a], moved[c + i] -= s->kernel[4][at] * w->given[a];
-            }
-}
-
-void tread_drag(plane *s, const double *force, double *moved) {
-    every_cell(s);
-    tread_drag_within(s, force, moved);
-}
-
-/* moved (2, c) = the tire's displacements in the plane under normal forces (c,). */
-void plane_drag(plane *s, const double *force, double *moved) {
-    struct plane_work *w = s->work;
-    const int c = s->points, p = s->nodes;
+    const int p = s->nodes;
     to_nodes(s, force, w->nodal);
     memset(w->nodes, 0, 2 * p * sizeof(double));
     if (s->hz) add_columns(2 * p, 2 * p, s->hz, nonzero(p, w->nodal, w->which, w->value), w->which, w->value, w->nodes);
-    for (int d = 0; d < 2; d++) to_points(s, w->nodes + d * p, moved + d * c);
+    for (int d = 0; d < 2; d++)
+        for (int a = 0; a < count; a++) moved[d * count + a] = from_nodes(s, w->nodes + d * p, to[a]);
+    const int loads = loaded(s, pressed, 1);
+    drag_tread(s, everywhere(s), loads, w->some, w->given, count, to, moved);
 }
 
 /* ---- Stick and slip ---------------------------------------------------------------------------------------------- */
 
+/* Where a Newton step does not let the residual fall to this share, fewer points are to be found slipping: r, which is that
+   of single points, then is too large for displacements of all of them. Any r > 0 has the same solution. */
+static const double FALLS = 0.7, CAUTION = 0.1, LEAST_CAUTION = 1e-4;
 enum { NEWTON_STEPS = 30, GRADIENT_STEPS = 5000, FEW = 200, SHORT = 40 };
-static const double INNER = 5e-2; /* residual reduction in a Newton step; which points slip is known no better */
+static const double INNER = 1e-1; /* residual reduction in a Newton step; which points slip is known no better */
 
 /* One cycle of GMRES of at most `most` steps from x = 0: x (n,) with |A x - b| <= tolerance |b| if that is enough. */
 static int cycle(int n, int most, int (*apply)(void *, const double *, double *), void *of, const double *right,
@@ -820,60 +896,107 @@ static double most_force(const stick_slip *s) {
     return most;
 }
 
-/* The trial forces t - r (B t + c) and the residual t - P(trial) of the present forces; returns its largest. */
+/* The trial forces t - k r (B t + c), k = `caution`, and the residual t - P(trial) of the present forces; r (B t + c) where
+   they stick. Returns the largest residual with k = 1. */
 static double residual(stick_slip *s, double *trial, double *off) {
     const int a = s->count;
+    const double *t = s->force, k = s->caution;
     double worst = 0.0;
-    stiffness(s, everywhere(s->compliance), s->force, trial);
-    for (int d = 0; d < 2 * a; d += a)
-        for (int i = 0; i < a; i++)
-            trial[d + i] = s->force[d + i] - s->inverse[i] * (trial[d + i] + s->constant[d + i]);
-    memcpy(off, trial, 2 * a * sizeof(double));
-    onto_discs(a, s->bound, off);
-    for (int i = 0; i < 2 * a; i++) off[i] = s->force[i] - off[i];
-    for (int i = 0; i < a; i++) worst = fmax(worst, hypot(off[i], off[a + i]));
+    stiffness(s, everywhere(s->compliance), t, trial);
+    for (int i = 0; i < a; i++) {
+        const double x = s->inverse[i] * (trial[i] + s->constant[i]), y = s->inverse[i] * (trial[a + i] + s->constant[a + i]);
+        const double bound = s->bound[i], whole = hypot(t[i] - x, t[a + i] - y), part = whole > bound ? bound / whole : 1.0;
+        worst = fmax(worst, hypot(t[i] - part * (t[i] - x), t[a + i] - part * (t[a + i] - y)));
+        trial[i] = t[i] - k * x, trial[a + i] = t[a + i] - k * y;
+        const double length = hypot(trial[i], trial[a + i]), share = bound / length;
+        const int slips = length > bound;
+        off[i] = slips ? t[i] - share * trial[i] : x, off[a + i] = slips ? t[a + i] - share * trial[a + i] : y;
+    }
     return worst;
 }
 
 struct newton {
     stick_slip *problem;
     double *normal, *share;               /* (2, a), (a,): the projection's derivative b/|t| (I - n n^T) */
+    double *step;                         /* workspace: (2, a) */
 };
 
-/* moved (2, a) = B t, and with the normal forces that follow t, f' = -A_NN^-1 A_Nt t, also A_tN f'; `follows` (n,). */
+/* moved (2, a) = B t, and with the normal forces `follows` (c,) = -A_NN^-1 A_Nt t that follow t, also A_tN of them. */
 static void followed(stick_slip *s, const double *step, double *moved, double *follows) {
     plane *c = s->compliance;
     struct plane_work *w = c->work;
-    const struct factor *f = s->normal->factor;
     const int a = s->count, n = c->points;
     s->products++;
-    to_slots(c, a, s->index, step);
-    product(w->slots, 2 * w->slots, w->zt, n, w->t, 0.0, w->z);
-    for (int k = 0; k < f->count; k++) { /* a point that touches without a force is in no slot */
-        const int at = w->slot[f->index[k]];
-        follows[f->index[k]] = at < 0 ? 0.0 : -w->z[at];
+    memset(w->lifted, 0, n * sizeof(double));
+    if (c->lift) {
+        to_slots(c, a, s->index, step);
+        product(w->slots, 2 * w->slots, 1.0, w->zt, n, w->t, 0.0, w->z);
+        for (int k = 0; k < s->touching; k++) w->lifted[s->touch[k]] = w->z[w->slot[s->touch[k]]];
+        follow(s->normal, w->lifted, follows);
+        product(2 * w->slots, 2 * w->slots, 1.0, w->tt, 2 * n, w->t, 0.0, w->u);
+        memset(w->z, 0, w->slots * sizeof(double));
+        for (int k = 0; k < s->touching; k++) w->z[w->slot[s->touch[k]]] = follows[s->touch[k]];
+        product(2 * w->slots, w->slots, 1.0, w->tz, 2 * n, w->z, 1.0, w->u);
+        from_slots(c, a, s->index, moved);
+    } else {
+        const int m = w->carriers, t = s->touching;
+        for (int d = 0; d < 2; d++) to_carriers(c, a, s->index, step + d * a, w->nodal + d * m);
+        memset(w->nodes, 0, 3 * m * sizeof(double));
+        add_columns(3 * m, 3 * m, w->compact, nonzero(2 * m, w->nodal, w->which, w->value), w->which, w->value, w->nodes);
+        double *some = w->given; /* side by side at the points that touch */
+        from_carriers(c, w->nodes + 2 * m, t, s->touch, some);
+        lift_tread(c, s->near, a, s->index, step, t, s->touch, some);
+        for (int k = 0; k < t; k++) w->lifted[s->touch[k]] = some[k];
+        follow(s->normal, w->lifted, follows);
+        for (int k = 0; k < t; k++) some[k] = follows[s->touch[k]];
+        to_carriers(c, t, s->touch, some, w->nodal);
+        add_columns(2 * m, 2 * m, w->down, nonzero(m, w->nodal, w->which, w->value), w->which, w->value, w->nodes);
+        for (int d = 0; d < 2; d++) from_carriers(c, w->nodes + d * m, a, s->index, moved + d * a);
+        shear_tread(c, s->near, a, s->index, step, a, s->index, moved);
+        drag_tread(c, s->near, t, s->touch, some, a, s->index, moved);
     }
-    solve_factor(s->normal->factor, follows);
-    product(2 * w->slots, 2 * w->slots, w->tt, 2 * n, w->t, 0.0, w->u);
-    memset(w->z, 0, w->slots * sizeof(double));
-    for (int k = 0; k < f->count; k++)
-        if (w->slot[f->index[k]] >= 0) w->z[w->slot[f->index[k]]] = follows[f->index[k]];
-    product(2 * w->slots, w->slots, w->tz, 2 * n, w->z, 1.0, w->u);
-    from_slots(c, a, s->index, moved);
     for (int d = 0; d < 2; d++)
         for (int i = 0; i < a; i++) moved[d * a + i] += s->spring[i] * step[d * a + i];
 }
 
-static int derivative(void *of, const double *step, double *out) {
+/* step (2, a) = about the forces that move the sticking points by given (2, a) of the displacements r B: a preconditioner. */
+static void precondition(const struct newton *s, const double *given, double *step) {
+    const stick_slip *problem = s->problem;
+    plane *c = problem->compliance;
+    struct plane_work *w = c->work;
+    const int a = problem->count;
+    memcpy(step, given, 2 * a * sizeof(double));
+    if (!c->inverse[0]) return;
+    int *index = w->some, count = 0;
+    double *force = w->given;
+    for (int i = 0; i < a; i++) count += s->share[i] == 1.0;
+    for (int i = 0, k = 0; i < a; i++)
+        if (s->share[i] == 1.0) {
+            index[k] = problem->index[i];
+            force[k] = given[i] / problem->inverse[i], force[count + k++] = given[a + i] / problem->inverse[i];
+        }
+    bounds(c, count, index);
+    memset(w->field, 0, 2 * cells(c) * sizeof(double));
+    spread(c, c->within, count, index, force, force + count, c->inverse, 3, w->field, w->field + cells(c));
+    for (int i = 0; i < a; i++)
+        if (s->share[i] == 1.0) {
+            const size_t at = cell(c, problem->index[i]);
+            step[i] = w->field[at], step[a + i] = w->field[cells(c) + at];
+        }
+}
+
+static int derivative(void *of, const double *given, double *out) {
     struct newton *s = of;
     stick_slip *problem = s->problem;
     const int a = problem->count;
-    const double *inverse = problem->inverse, *n = s->normal;
-    double *follows = problem->normal ? problem->normal->factor->right : 0;
+    const double *inverse = problem->inverse, *n = s->normal, *step = s->step;
+    precondition(s, given, s->step);
+    double *follows = problem->normal ? problem->compliance->work->follows : 0;
     if (follows) followed(problem, step, out, follows);
-    else stiffness(problem, problem->compliance->near, step, out);
+    else stiffness(problem, problem->near, step, out);
     for (int i = 0; i < a; i++) {
-        double x = inverse[i] * out[i] - step[i], y = inverse[i] * out[a + i] - step[a + i];
+        const double r = (s->share[i] < 1.0 ? problem->caution : 1.0) * inverse[i];
+        double x = r * out[i] - step[i], y = r * out[a + i] - step[a + i];
         const double along = n[i] * x + n[a + i] * y;
         x = s->share[i] * (x - n[i] * along), y = s->share[i] * (y - n[a + i] * along);
         if (follows) /* the bound of a point that slips follows its normal force */
@@ -886,7 +1009,7 @@ static int derivative(void *of, const double *step, double *out) {
 /* A semismooth Newton step from the trial forces and their residual: d + P' (r B d - d) = -residual. */
 static void newton_step(stick_slip *s, const double *trial, double *off, double tolerance) {
     const int a = s->count;
-    double *normal = DOUBLES(2 * a), *share = DOUBLES(a), *step = DOUBLES(2 * a);
+    double *normal = DOUBLES(2 * a), *share = DOUBLES(a), *step = DOUBLES(2 * a), *before = DOUBLES(2 * a);
     for (int i = 0; i < a; i++) {
         const double length = hypot(trial[i], trial[a + i]);
         const int slips = length > s->bound[i];
@@ -894,10 +1017,11 @@ static void newton_step(stick_slip *s, const double *trial, double *off, double 
         normal[i] = slips ? trial[i] / length : 0.0, normal[a + i] = slips ? trial[a + i] / length : 0.0;
     }
     for (int i = 0; i < 2 * a; i++) off[i] = -off[i];
-    struct newton given = {s, normal, share};
-    krylov(2 * a, derivative, &given, off, tolerance, step);
+    struct newton given = {s, normal, share, step};
+    krylov(2 * a, derivative, &given, off, tolerance, before);
+    precondition(&given, before, step);
     for (int i = 0; i < 2 * a; i++) s->force[i] += step[i];
-    free(normal), free(share), free(step);
+    free(normal), free(share), free(step), free(before);
 }
 
 /* Projected gradients with Nesterov's momentum, restarted where it points uphill: slow but safe for symmetric B. */
@@ -935,9 +1059,13 @@ int stick_slip_solve(stick_slip *s, double tolerance) {
     if (!s->compliance->lift) carry(s->compliance, a, s->index);
     memcpy(begun, s->force, 2 * a * sizeof(double));
     onto_discs(a, s->bound, s->force);
+    s->near = everywhere(s->compliance), s->caution = 1.0;
+    double before = INFINITY;
     for (int step = 0; step < NEWTON_STEPS; step++) {
         s->off = residual(s, trial, off);
         s->largest = most_force(s);
+        if (s->off > FALLS * before) s->caution = fmax(CAUTION * s->caution, LEAST_CAUTION);
+        before = s->off;
         if (s->off <= tolerance * s->largest) {
             found = SOLVED;
             break;
@@ -956,33 +1084,36 @@ int stick_slip_solve(stick_slip *s, double tolerance) {
 /* ---- Both in turn -------------------------------------------------------------------------------------------------- */
 
 /* Turns: at most; in which the normal forces follow in a Newton step; after which stick and slip are solved in each. */
-enum { TURNS = 100, FOLLOWED = 10, FLAT = 30, MIXED = 4, LIFT_PATIENCE = 10 };
-static const double SLIDING_TOLERANCE = 1e-10;
+enum { TURNS = 100, FOLLOWED = 8, FLAT = 30, MIXED = 4, LIFT_PATIENCE = 10 };
+static const double ENOUGH = 0.1; /* of the tolerance: stick and slip within a turn */
 
 struct brush_work {
-    double *share, *past, *trial, *given, *moved, *lift, *found, *q, *mixed;
+    double *share, *past, *trial, *moved, *some, *found, *q, *mixed;
     double *spring, *inverse, *constant, *bound, *force, *ahead, *off;
     double *results[MIXED], *residuals[MIXED];
-    int *index;
+    int *index, *every;
+    int touches, *touch, reaches, *reach; /* the points that touch, and with those next ahead of them; ascending */
     uint8_t *lifted, *touching, *set;
 };
 
 void brush_begin(brush *s) {
     const int c = s->compliance->points;
     struct brush_work *w = s->work = room(1, sizeof *w);
-    double **doubles[] = {&w->share, &w->past, &w->trial, &w->given, &w->moved, &w->lift, &w->found, &w->q,
+    double **doubles[] = {&w->share, &w->past, &w->trial, &w->moved, &w->some, &w->found, &w->q,
                           &w->mixed, &w->spring, &w->inverse, &w->constant, &w->bound, &w->force,
                           &w->ahead, &w->off};
-    for (int i = 0; i < 16; i++) *doubles[i] = DOUBLES(2 * c);
+    for (int i = 0; i < 15; i++) *doubles[i] = DOUBLES(2 * c);
     for (int i = 0; i < MIXED; i++) w->results[i] = DOUBLES(2 * c), w->residuals[i] = DOUBLES(2 * c);
-    w->index = INTS(c), w->lifted = room(c, 1), w->touching = room(c, 1), w->set = room(c, 1);
+    w->index = INTS(c), w->every = INTS(c), w->touch = INTS(c), w->reach = INTS(c);
+    for (int i = 0; i < c; i++) w->every[i] = i;
+    w->lifted = room(c, 1), w->touching = room(c, 1), w->set = room(c, 1);
 }
 
 void brush_end(brush *s) {
     struct brush_work *w = s->work;
     for (int i = 0; i < MIXED; i++) free(w->results[i]), free(w->residuals[i]);
-    void *all[] = {w->share, w->past, w->trial, w->given, w->moved, w->lift, w->found, w->q, w->mixed, w->spring,
-                   w->inverse, w->constant, w->bound, w->force, w->ahead, w->off, w->index, w->lifted, w->touching, w->set, w};
+    void *all[] = {w->share, w->past, w->trial, w->moved, w->some, w->found, w->q, w->mixed, w->spring, w->inverse,
+                   w->constant, w->bound, w->force, w->ahead, w->off, w->index, w->every, w->touch, w->reach, w->lifted, w->touching, w->set, w};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) free(all[i]);
 }
 
@@ -1072,13 +1203,15 @@ static int mix(brush *s, int held, const double *given, const double *result, do
     return held + 1;
 }
 
-/* The points whose bristles bear, and their problem with the normal forces `force`. */
+/* The points whose bristles bear, and their problem with the normal forces `force`; after `drag`. */
 static stick_slip sticking(brush *s, const double *force) {
     struct brush_work *w = s->work;
     const int c = s->compliance->points;
     int a = 0;
-    for (int i = 0; i < c; i++)
-        if (force[i] > 0.0 && !w->lifted[i] && w->share[i] > 1e-9) w->index[a++] = i;
+    for (int k = 0; k < w->touches; k++) {
+        const int i = w->touch[k];
+        if (!w->lifted[i] && w->share[i] > 1e-9) w->index[a++] = i;
+    }
     for (int k = 0; k < a; k++) {
         const int i = w->index[k];
         w->spring[k] = 1.0 / (s->stiffness[i] * w->share[i]);
@@ -1086,44 +1219,43 @@ static stick_slip sticking(brush *s, const double *force) {
         w->bound[k] = s->friction < 0.0 ? INFINITY : s->friction * force[i];
         for (int d = 0; d < 2; d++) w->constant[d * a + k] = w->moved[d * c + i] + w->past[d * c + i] / w->share[i];
     }
-    if (!s->compliance->lift) carry(s->compliance, a, w->index);
-    stick_slip problem = {s->compliance, a, w->index, w->spring, w->inverse, w->constant, w->bound, w->force};
+    stick_slip problem = {s->compliance, a, w->index, w->spring, w->inverse, w->constant, w->bound, w->force, s->compliance->near, 1.0};
     problem.norm = s->norm + (a ? largest(a, w->spring) : 0.0);
     return problem;
 }
 
-/* moved (2, c) = the displacements in the plane under normal forces (c,), where the kernel reads them. */
+/* moved (2, c) = the displacements in the plane under normal forces (c,) where points touch; on a grid too large to be
+   dense also at those next ahead of them. Both are listed. */
 static void drag(brush *s, const double *force, const double *free, double *moved) {
     plane *compliance = s->compliance;
-    struct plane_work *w = compliance->work;
+    struct plane_work *p = compliance->work;
+    struct brush_work *w = s->work;
     const int c = compliance->points;
+    w->touches = w->reaches = 0;
+    memset(w->set, 0, c);
+    for (int i = 0; i < c; i++)
+        if (force[i] > 0.0) w->touch[w->touches++] = i, w->set[i] = w->set[s->ahead[i]] = 1;
+    for (int i = 0; i < c; i++)
+        if (w->set[i]) w->reach[w->reaches++] = i;
     if (compliance->lift) { /* between the points that touch: the others are read once, in `finish` */
-        int count = 0;
-        for (int i = 0; i < c; i++)
-            if (force[i] > 0.0) w->some[count++] = i;
-        hold(compliance, count, w->some);
-        memset(w->z, 0, w->slots * sizeof(double));
-        for (int a = 0; a < count; a++) w->z[w->slot[w->some[a]]] = force[w->some[a]];
-        product(2 * w->slots, w->slots, w->tz, 2 * c, w->z, 0.0, w->u);
-        for (int a = 0; a < count; a++) {
-            const int i = w->some[a], k = w->slot[i];
-            moved[i] = w->u[2 * k], moved[c + i] = w->u[2 * k + 1];
+        hold(compliance, w->touches, w->touch);
+        memset(p->z, 0, p->slots * sizeof(double));
+        for (int a = 0; a < w->touches; a++) p->z[p->slot[w->touch[a]]] = force[w->touch[a]];
+        product(2 * p->slots, p->slots, 1.0, p->tz, 2 * c, p->z, 0.0, p->u);
+        for (int a = 0; a < w->touches; a++) {
+            const int i = w->touch[a], k = p->slot[i];
+            moved[i] = p->u[2 * k], moved[c + i] = p->u[2 * k + 1];
             for (int d = 0; d < 2 * c; d += c) moved[d + i] += free[d + i] - s->dragged[d + i];
         }
         return;
     }
-    plane_drag(compliance, force, moved);
-    int count = 0; /* read where points touch and at those next ahead of them */
-    for (int i = 0; i < c; i++)
-        if (force[i] > 0.0) w->some[count++] = i;
-    if (compliance->tread == GRID) bounds(compliance, count, w->some);
-    for (int a = 0; a < count && compliance->tread == GRID; a++) {
-        const int next = s->ahead[w->some[a]], row = compliance->row[next], column = compliance->column[next];
-        if (column < w->first[row]) w->first[row] = column;
-        if (column > w->last[row]) w->last[row] = column;
-    }
-    tread_drag_within(compliance, force, moved);
-    for (int i = 0; i < 2 * c; i++) moved[i] += free[i] - s->dragged[i];
+    carry(compliance, w->touches, w->touch);
+    plane_drag(compliance, force, force, w->reaches, w->reach, w->some);
+    for (int d = 0; d < 2; d++)
+        for (int a = 0; a < w->reaches; a++) {
+            const int at = d * c + w->reach[a];
+            moved[at] = w->some[d * w->reaches + a] + free[at] - s->dragged[at];
+        }
 }
 
 /* Set the state of the bristles: their deflections, the displacements of their bases, which points touched. */
@@ -1133,16 +1265,10 @@ static void finish(brush *s, const double *force, const double *free) {
     const int c = compliance->points;
     memcpy(s->before, s->horizontal, 2 * c * sizeof(double));
     memcpy(s->horizontal, w->found, 2 * c * sizeof(double));
-    if (compliance->lift) { /* at the points that touch and those next ahead, on the rows between the first and the last */
+    if (compliance->lift && w->reaches) { /* on the rows between the first and the last */
         struct plane_work *p = compliance->work;
-        int low = c, high = 0;
-        for (int i = 0; i < c; i++)
-            if (force[i] > 0.0) {
-                const int next = s->ahead[i];
-                low = i < low ? i : low, high = i > high ? i : high;
-                low = next < low ? next : low, high = next > high ? next : high;
-            }
-        for (int half = 0; half < 2 && low <= high; half++) {
+        const int low = w->reach[0], high = w->reach[w->reaches - 1];
+        for (int half = 0; half < 2; half++) {
             double *moved = s->moved + half * c + low;
             for (int i = low; i <= high; i++) moved[i - low] = free[half * c + i] - s->dragged[half * c + i];
             int count = nonzero(c, force, p->which, p->value);
@@ -1151,45 +1277,75 @@ static void finish(brush *s, const double *force, const double *free) {
             const double *rows = compliance->beside + half * c + low;
             add_columns(high - low + 1, 2 * c, rows, count, p->which, p->value, moved);
         }
-    } else {
-        plane_shear(compliance, w->found, w->lift);
-        for (int i = 0; i < 2 * c; i++) s->moved[i] = w->moved[i] + w->lift[i];
+    } else if (!compliance->lift) {
+        plane_shear(compliance, w->found, w->reaches, w->reach, w->some);
+        for (int d = 0; d < 2; d++)
+            for (int a = 0; a < w->reaches; a++) {
+                const int at = d * c + w->reach[a];
+                s->moved[at] = w->moved[at] + w->some[d * w->reaches + a];
+            }
     }
     for (int d = 0; d < 2 * c; d += c)
         for (int i = 0; i < c; i++) s->deflection[d + i] = -w->found[d + i] / s->stiffness[i];
     for (int i = 0; i < c; i++) s->touched[i] = force[i] > 0.0;
 }
 
-int brush_solve(brush *s, normal_solver solve, void *of, const double *q, const uint8_t *guess, const double *at_rest,
+/* w->q (c,) = gaps with the points of `to` lifted by the bristles' forces. */
+static void lifted_by(brush *s, const double *q, const double *forces, int count, const int *to) {
+    struct brush_work *w = s->work;
+    plane *compliance = s->compliance;
+    struct plane_work *p = compliance->work;
+    const int c = compliance->points;
+    memcpy(w->q, q, c * sizeof(double));
+    if (compliance->lift) {
+        add_columns(c, c, compliance->lift, nonzero(2 * c, forces, p->which, p->value), p->which, p->value, w->q);
+        return;
+    }
+    plane_lift(compliance, forces, count, to, w->some);
+    for (int a = 0; a < count; a++) w->q[to[a]] += w->some[a];
+}
+
+static int normal_forces(const normal_contact *n, int turn, const double *q, const uint8_t *guess, const double *reference,
+                         double *force) {
+    if (n->usual) return pivot_solve(n->usual, q, guess, force);
+    if (!n->all) return n->another(q, guess, force);
+    n->all->again = turn > 1;
+    return active_set_solve(n->all, q, guess, reference, force);
+}
+
+int brush_solve(brush *s, normal_contact *normal, const double *q, const uint8_t *guess, const double *at_rest,
                 const double *free, double *force) {
     struct brush_work *w = s->work;
     plane *compliance = s->compliance;
-    const int c = compliance->points, unbounded = s->friction < 0.0, own = solve == active_set_normal;
+    const int c = compliance->points, unbounded = s->friction < 0.0, own = normal->all || normal->usual;
     int held = 0, failed;
+    double before = INFINITY, caution = 1.0;
     offer(s, w->share, w->past);
     memset(w->lifted, 0, c);
     for (int i = 0; i < 2 * c; i++) w->trial[i] = 2.0 * s->horizontal[i] - s->before[i]; /* saves a turn */
     for (s->turns = 1; s->turns <= TURNS; s->turns++) {
-        plane_lift(compliance, w->trial, w->lift);
-        for (int i = 0; i < c; i++) w->q[i] = q[i] + w->lift[i];
-        if (own) ((active_set *)of)->again = s->turns > 1;
-        if ((failed = solve(of, w->q, guess, at_rest, force))) return failed;
+        const pivot *usual = normal->usual;
+        lifted_by(s, q, w->trial, usual ? usual->taken : c, usual ? usual->places : w->every);
+        if ((failed = normal_forces(normal, s->turns, w->q, guess, at_rest, force))) return failed;
+        drag(s, force, free, w->moved);
         for (int i = 0; i < c; i++) w->set[i] = force[i] > 0.0;
         guess = w->set;
-        drag(s, force, free, w->moved);
         if (unbounded) /* a point that comes and goes: its own bristle lifts it off */
             for (int i = 0; i < c; i++) {
                 if (s->turns > LIFT_PATIENCE && w->set[i] != w->touching[i]) w->lifted[i] = 1;
                 w->touching[i] = w->set[i];
             }
         stick_slip problem = sticking(s, force);
-        const int a = problem.count, follows = own && compliance->lift && s->turns <= FOLLOWED;
+        const int a = problem.count, follows = own && s->turns <= FOLLOWED;
         for (int d = 0; d < 2; d++)
             for (int k = 0; k < a; k++) w->force[d * a + k] = w->trial[d * c + w->index[k]];
         onto_discs(a, w->bound, w->force);
+        problem.caution = caution;
         problem.off = residual(&problem, w->ahead, w->off);
         problem.largest = most_force(&problem);
         if (!isfinite(problem.off)) return NOT_FINITE;
+        if (problem.off > FALLS * before) caution = fmax(CAUTION * caution, LEAST_CAUTION);
+        before = problem.off;
         const double limit = s->tolerance * problem.largest;
         double cut = 0.0; /* what the bounds have cut off still acted on the normal forces */
         memset(w->found, 0, 2 * c * sizeof(double));
@@ -1197,13 +1353,22 @@ int brush_solve(brush *s, normal_solver solve, void *of, const double *q, const 
             for (int k = 0; k < a; k++) w->found[d * c + w->index[k]] = w->force[d * a + k];
         for (int i = 0; i < 2 * c; i++) cut = fmax(cut, fabs(w->found[i] - w->trial[i]));
         if (fmax(problem.off, cut) <= limit) {
+            if (usual) {
+                lifted_by(s, q, w->trial, c, w->every);
+                failed = normal->others(w->q, force);
+                if (failed == AGAIN) continue; /* with more points */
+                if (failed) return failed;
+            }
             s->products += problem.products, s->all_turns += s->turns;
             finish(s, force, free);
             return SOLVED;
         }
-        if (s->turns > FLAT) failed = stick_slip_solve(&problem, SLIDING_TOLERANCE);
+        if (s->turns > (own ? FOLLOWED : FLAT)) failed = stick_slip_solve(&problem, ENOUGH * s->tolerance);
         else {
-            if (follows) problem.normal = of, problem.friction = unbounded ? 0.0 : s->friction;
+            if (follows) {
+                problem.normal = normal, problem.friction = unbounded ? 0.0 : s->friction;
+                problem.touching = w->touches, problem.touch = w->touch;
+            }
             newton_step(&problem, w->ahead, w->off, INNER);
             onto_discs(a, w->bound, w->force);
         }

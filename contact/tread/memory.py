@@ -134,7 +134,7 @@ class TreadMemory:
         self._ahead, self._next = _shifted(kept, jump), offset - jump
         field = np.asarray(np.tensordot(self._size, self._ahead, 1), dtype=float)
         here = (1.0 - self._next) * field + self._next * _shifted(field, 1)
-        return self._moved(here.reshape(len(here), -1))[:, self._place]
+        return self._moved(here.reshape(len(here), -1)).take(self._place, axis=1)  # in rows
 
     def _moved(self, pressed: Array) -> Array:
         """Displacements (1 or 3, n) m of filtered forces (1 or 3, n) N on the whole grid."""

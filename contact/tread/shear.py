@@ -34,8 +34,9 @@ Array = NDArray[np.float64]
 Plane = NDArray[np.complex128]  # x + iy
 Index = NDArray[np.intp]
 
-
-_UNREAD = 0.03  # share of the sum of a kernel that a Newton step leaves out
+_WITHIN = 2  # cells of the inverse of a tread that precondition a Newton step
+_LEAST = 0.01  # of the largest eigenvalue: the least of what is inverted
+_UNREAD = 0.2  # share of the sum of a kernel that a Newton step leaves out, whose problem is solved to a tenth
 
 
 class ShearConvolution:
@@ -164,6 +165,9 @@ class Shear(Protocol):
     def compiled(self, library: Library) -> dict[str, Any]:
         """The tread in the structure `plane` of the kernel (contact.solver.stick_slip)."""
 
+    def inverse(self, library: Library, spring: float) -> dict[str, Any]:
+        """About the inverse of `spread` with a spring (m/N) in series at each point, likewise; {} if there is none."""
+
 
 class MatrixShear:
     """Between points (c, 2) m with rectangles of half sizes (c, 2) m, at any positions."""
@@ -204,6 +208,10 @@ class MatrixShear:
         xx, xy, yy = (part[np.ix_(index, index)] for part in self._parts[:3])
         return np.block([[xx, xy], [xy, yy]])
 
+    def inverse(self, library: Library, spring: float) -> dict[str, Any]:
+        """None: the points are on no grid."""
+        return {}
+
     def compiled(self, library: Library) -> dict[str, Any]:
         """The five matrices."""
         kernel = [library.doubles(part) for part in self._parts]
@@ -239,7 +247,7 @@ class KernelShear:
     def compiled(self, library: Library) -> dict[str, Any]:
         """The five kernels over the offsets from one end of the grid to the other, and the points on it.
 
-        A Newton step is solved to 5 % only, so it reads the kernels as far as they have all but that of their sum.
+        A Newton step reads the kernels as far as they have most of their sum (`_UNREAD`).
         """
         size, (nx, ny) = np.abs(self._around[[0, 2]]).max(axis=0), self._grid.shape
         apart = np.maximum(
@@ -250,12 +258,36 @@ class KernelShear:
         row, column = np.divmod(self._grid.place, self._grid.shape[1])
         return {
             "tread": library.lib.GRID, "coupled": self.coupled,
-            "kernel": [library.doubles(kernel) for kernel in self._around],
+            "kernel": [library.doubles(kernel) for kernel in _in_vectors(self._around)],
             "nx": nx, "ny": ny, "near": near,
             "row": library.ints(row.astype(np.int32)), "column": library.ints(column.astype(np.int32)),
         }  # fmt: skip
+
+    def inverse(self, library: Library, spring: float) -> dict[str, Any]:
+        """Kernels of the inverse of `spread` with a spring (m/N) in series at each point, where the grid is endless: they decay
+        in a few cells. In the layout of `compiled`."""
+        nx, ny = self._grid.shape
+        whole = np.zeros((3, *self._kernels.shape[1:]))
+        whole[:, np.arange(1 - nx, nx)[:, None], np.arange(1 - ny, ny)] = self._around[:3]
+        xx, xy, yy = fft.fft2(whole).real
+        own = 0.5 * (xx + yy) - np.hypot(0.5 * (xx - yy), xy)  # the smaller eigenvalue of each wave
+        spring = max(
+            spring, _LEAST * own.max() - own.min()
+        )  # positive definite, whatever the ends of the grid cut off
+        xx, yy = xx + spring, yy + spring
+        kernels = fft.ifft2(np.array([yy, -xy, xx]) / (xx * yy - xy**2)).real
+        kernels = kernels[:, np.arange(1 - nx, nx)[:, None], np.arange(1 - ny, ny)]
+        return {
+            "inverse": [library.doubles(kernel) for kernel in _in_vectors(kernels)],
+            "within": _WITHIN,
+        }
 
     def _between(self, index: Index) -> Array:
         """All kernels between the points `index`, (5, a, a)."""
         i, j = np.divmod(self._grid.place[index], self._grid.shape[1])
         return self._kernels[:, i[:, None] - i, j[:, None] - j]
+
+
+def _in_vectors(kernels: Array) -> Array:
+    """Kernels (k, ...) as (k, n + 8): what is read by eights may end behind the last."""
+    return np.hstack([kernels.reshape(len(kernels), -1), np.zeros((len(kernels), 8))])

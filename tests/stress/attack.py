@@ -40,7 +40,7 @@ brush_stiffness = 2e5
 kind = "sine"
 amplitude = 1e-4
 [time]
-duration = 0.012
+duration = 0.15
 step = 3e-5
 checkpoint = 0.1
 """
@@ -89,7 +89,8 @@ def content(folder: Path) -> dict[str, np.ndarray]:
 
             def keep(name: str, item: object, stem: str = path.stem) -> None:
                 if isinstance(item, h5py.Dataset):
-                    found[f"{stem}:{name}"] = item[()]
+                    text = h5py.check_string_dtype(item.dtype) is not None
+                    found[f"{stem}:{name}"] = item.asstr()[()].astype(str) if text else item[()]
 
             file.visititems(keep)
     return found

@@ -61,7 +61,7 @@ def _stop_in_the_loop(scene: Path, out: Path) -> None:
     with started(command("run", scene, "--out", out)) as process:
         while not (out / "checkpoint.h5").exists():
             assert process.poll() is None, process.communicate()
-            time.sleep(0.02)
+            time.sleep(0.002)
         process.terminate()
         process.communicate()
     assert process.returncode == 4 and (out / "checkpoint.h5").exists()

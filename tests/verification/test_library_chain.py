@@ -57,6 +57,7 @@ speed = 40.0
 [contact]
 points = "nodes"
 youngs_modulus = 2e7
+friction = 0.0
 [road]
 kind = "sine"
 run_in = 0.0

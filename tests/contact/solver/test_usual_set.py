@@ -30,22 +30,19 @@ def gaps(steps: int) -> np.ndarray:
 
 
 def test_pivoted_forces_are_those_of_the_matrix() -> None:
-    """Of any set that touches: z are the unknowns that differ, w the rest."""
+    """Of a base far from what touches, and from any guess, with a reference that presses on more than the base."""
     rng, matrix = np.random.default_rng(4), compliance()
-    n = len(matrix)
+    n, plain = len(matrix), ActiveSet(compliance())
     taken = rng.random(n) < 0.7
-    base, active = taken & (rng.random(n) < 0.6), taken & (rng.random(n) < 0.5)
+    base, guess = taken & (rng.random(n) < 0.6), taken & (rng.random(n) < 0.5)
     q, reference = rng.standard_normal((2, n)) * [[1e-4], [1.0]]
-    reference[~taken] = 0.0
+    reference = np.where(taken, np.abs(reference), 0.0)
+    q[~taken] = 1.0  # so that they are clear of the road
     pivot = Pivot(MatrixCompliance(matrix), taken, base)
-    some = pivot.exchanged(active)
-    offset, z = pivot.offset(q, reference), np.zeros(taken.sum())
-    z[some] = np.linalg.solve(pivot.matrix[np.ix_(some, some)], -offset[some])
-    w = pivot.matrix @ z + offset
-    wanted = np.zeros(n)
-    right = (matrix @ reference - q)[active]
-    wanted[active] = np.linalg.solve(matrix[np.ix_(active, active)], right)
-    assert np.abs(pivot.forces(z, w) - np.maximum(wanted, 0.0)).max() < 1e-11 * np.abs(wanted).max()
+    pivot.refer(reference)
+    wanted = plain.solve(q, reference=reference)
+    assert 20 < (wanted > 0).sum() < taken.sum() - 20
+    assert np.abs(pivot.solve(q, guess) - wanted).max() < 1e-11 * wanted.max()
 
 
 @pytest.mark.parametrize("price", [6.0, 1e-3])

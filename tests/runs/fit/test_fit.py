@@ -215,7 +215,7 @@ def test_a_tir_file(tmp_path: Path) -> None:
     found = read(tmp_path / "curve.tir")
     assert found.loads == ((0.010, 1500.0), (0.020, 3500.0))
     (tmp_path / "curve.tir").write_text(f"{TIR}{curve}0.03 much\n")
-    with pytest.raises(InputError, match=r"line 35, \[DEFLECTION_LOAD_CURVE\]: '0\.03 much'"):
+    with pytest.raises(InputError, match=r"line 35: .* not '0\.03 much'"):
         read(tmp_path / "curve.tir")
     (tmp_path / "rim.tir").write_text(TIR.replace("RIM_RADIUS", "RIM_WIDTH = 0.1651\nRIM_RADIUS"))
     assert read(tmp_path / "rim.tir").rim_width == 0.1651

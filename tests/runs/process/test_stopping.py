@@ -99,8 +99,8 @@ def hears_hangups() -> None:
 
 
 def in_the_loop(process: subprocess.Popen, out: Path) -> None:
-    """Wait until blocks of steps have been written."""
-    while not any(part.stat().st_size > 30_000 for part in out.glob(".contact.h5.*.part")):
+    """Wait until blocks of steps have been written: with the points, and no step, the file has 0.1 MB."""
+    while not any(part.stat().st_size > 300_000 for part in out.glob(".contact.h5.*.part")):
         assert process.poll() is None, process.communicate()
         time.sleep(0.05)
 

@@ -98,7 +98,8 @@ def test_a_companion_is_the_run_it_stands_for(run, whole, cause, sets):
     wanted = {"step": 1 / 3, "points": 1 / np.sqrt(1 + 0.5**3), "mesh": 1 / 7}
     assert part == pytest.approx(wanted[cause])
     found = forces.contact
-    assert found[:, 2] == pytest.approx(contact_force(other)[:, 2], rel=1e-8)
+    # The turns of friction end at a residual of 1e-3 of the largest bound: rounding may end them one earlier or later.
+    assert found[:, 2] == pytest.approx(contact_force(other)[:, 2], rel=1e-4)
 
 
 @pytest.mark.long
