@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
@@ -169,6 +169,13 @@ class PushedTire(LinearTire, Protocol):
     """A tire that may begin with a force that is there at t = 0."""
 
     def start(self, force: np.ndarray) -> None: ...
+
+
+@runtime_checkable
+class SteadyTire(LinearTire, Protocol):
+    """A tire that may begin at rest under a `force` that always was, with a `sudden` one beside it; its displacement, m."""
+
+    def start_steady(self, force: np.ndarray, sudden: np.ndarray | None = None) -> np.ndarray: ...
 
 
 @runtime_checkable
@@ -374,6 +381,11 @@ class ContactProblem:
         self._touching = None
         return self.change
 
+    def creep(self, slip: Array) -> None:
+        """Set the slip (s_x, s_y), or (c, 2) at the points, of the steps to come (contact.tread.brush); with friction only."""
+        assert self._friction is not None, "slip needs friction"
+        self._friction.creep(slip)
+
     @property
     def factorisations(self) -> int:
         """Number of matrices that the solver has factorised."""
@@ -420,11 +432,15 @@ def _pointer(values: Array | None) -> Any:
 
 @dataclass(frozen=True)
 class Loop:
-    """The parts of a time loop that have a history, which a checkpoint must keep."""
+    """The parts of a time loop that have a history, which a checkpoint must keep.
+
+    `begun`: changes (k,) N of the forces and displacements (r,) m of the nodes at t = 0, from the static state; None: none.
+    """
 
     tire: LinearTire
     contact: ContactProblem
     memory: TreadMemory | None = None
+    begun: tuple[Array, Array] | None = None
 
     def roll(
         self, drive: Drive, step: float, steps: int, *, done: int = 0, at_once: int = _STEPS_AHEAD
@@ -484,6 +500,15 @@ class Loop:
             times, force, horizontal.transpose(0, 2, 1), gap, axle, residual, penetration, active.astype(int),
             change, free_all, np.array(readings) if readings else None, contact,
         )  # fmt: skip
+
+    def begun_at(self, state: dict[str, np.ndarray], change: Array) -> Loop:
+        """Begin in a `state` of the contact, with the tire at rest under the changes (k,) N of its forces.
+
+        Collective when the tire looks ahead.
+        """
+        assert isinstance(self.tire, SteadyTire), f"{type(self.tire).__name__} begins at rest only"
+        self.contact.set_state(state)
+        return replace(self, begun=(change, self.tire.start_steady(change)))
 
     def snapshot(self) -> dict[str, np.ndarray]:
         """Arrays by name, between two steps. Collective when the tire is."""
@@ -580,6 +605,15 @@ class DrivenTire:
         self._along = np.zeros(history.shape[1])
         self.work = self.lead = 0.0
         tire.start(np.concatenate([np.zeros(self._count), history[0]]))
+
+    def start_steady(self, force: np.ndarray, sudden: np.ndarray | None = None) -> np.ndarray:
+        """Begin at rest under contact forces (c,) N that always were, and `sudden` ones; the displacement (r,) m."""
+        assert isinstance(self._tire, SteadyTire), "a convolution begins at rest only"
+        none = np.zeros_like(force) if sudden is None else sudden
+        always = np.concatenate([force, np.zeros_like(self._history[0])])
+        moved = self._tire.start_steady(always, np.concatenate([none, self._history[0]]))
+        self._along = moved[self._seen :][: len(self._along)]
+        return moved[: self._seen]
 
     def predict(self) -> np.ndarray:
         """Displacement (c,) m at the end of the step without new contact forces. Collective."""

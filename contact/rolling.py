@@ -1,35 +1,51 @@
-"""The loop of a contact: tire, solver, brush and tread memory of a setup; and the slip of free rolling."""
+"""The loop of a contact: tire, solver, brush and tread memory of a setup; and the steady rolling in which it begins."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
+from mpi4py import MPI
 
 from tireroad.contact.loop import ContactProblem, LinearTire, Loop
 from tireroad.contact.model import ContactSpec, step_solver, tread_memory, tread_shear
 from tireroad.contact.patch import Patch
-from tireroad.contact.setup import ContactSetup
+from tireroad.contact.setup import ContactSetup, SteadyRolling
 from tireroad.contact.solver.conditions import Array
-from tireroad.contact.solver.stick_slip import BrushFriction
-from tireroad.contact.tread.brush import Brush, BrushLaw, free_slip
+from tireroad.contact.solver.stick_slip import TOLERANCE, BrushFriction
+from tireroad.contact.tread.brush import Brush, BrushLaw, next_ahead
+from tireroad.fem.errors import ConvergenceError
+from tireroad.greens.response import Response
 
-PASSAGES = 6  # of the patch, after which the bristles of a smooth road are steady
+PASSAGES = 100  # lengths of the footprint, within which a tire is to roll steadily
+FEWEST_STEPS = 8  # of a length
+STEADY = 1e-4  # of the load: changes of the forces from one length to the next
+MOST_SLIP = (-0.2, 0.2)
+FINE = 1e-6  # tolerance of stick and slip, so that the slip is not that of its residual
 
 
-def make_loop(spec: ContactSpec, setup: ContactSetup, tire: LinearTire, step: float) -> Loop:
-    """The loop in steps of `step` s, at rest, of a `tire` and the contact that the `spec` asks for.
+def make_loop(
+    spec: ContactSpec,
+    setup: ContactSetup,
+    tire: LinearTire,
+    step: float,
+    tolerance: float = TOLERANCE,
+) -> Loop:
+    """The loop in steps of `step` s of a `tire` and the contact that the `spec` asks for, at rest or in `setup.steady`.
 
-    InputError if the contact problem is not affordable or has no unique solution. Not collective.
+    `tolerance`: of stick and slip (contact.solver.stick_slip.BrushFriction).
+
+    InputError if the contact problem is not affordable or has no unique solution. Collective when the tire looks ahead.
     """
     patch = setup.patch
     p = len(patch.index)
     memory = tread_memory(spec, patch, setup.rolled.speed, step)
     at_once = memory.at_once if memory else 1.0
     solver = step_solver(spec, patch, tire.same_step[:p, :p], at_once)
-    friction = _friction(spec, setup, tire, step, at_once) if spec.has_friction else None
-    return Loop(tire, ContactProblem(patch, tire.same_step, solver, friction), memory)
+    friction = _friction(spec, setup, tire, step, at_once, tolerance) if spec.has_friction else None
+    loop = Loop(tire, ContactProblem(patch, tire.same_step, solver, friction), memory)
+    return loop.begun_at(setup.steady.state, setup.steady.change) if setup.steady else loop
 
 
 def bristles(spec: ContactSpec, patch: Patch) -> float | Array | None:
@@ -42,7 +58,12 @@ def bristles(spec: ContactSpec, patch: Patch) -> float | Array | None:
 
 
 def _friction(
-    spec: ContactSpec, setup: ContactSetup, tire: LinearTire, step: float, at_once: float
+    spec: ContactSpec,
+    setup: ContactSetup,
+    tire: LinearTire,
+    step: float,
+    at_once: float,
+    tolerance: float,
 ) -> BrushFriction:
     """The brush at rest.
 
@@ -59,24 +80,146 @@ def _friction(
     law = BrushLaw(stiffness, spec.friction, setup.slips, spec.brush)
     brush = Brush(law, patch.points[:, 0], patch.line, setup.rolled.speed, step)
     brush.begin(patch.force > 0, moved)
-    return BrushFriction(brush, tire.same_step, patch.weights, shear, pressed)
+    return BrushFriction(brush, tire.same_step, patch.weights, shear, pressed, tolerance)
 
 
-def freely_rolling(
-    setup: ContactSetup, step: float, contact_force: Callable[[ContactSetup, int], Array]
-) -> tuple[ContactSetup, float]:
-    """The setup (settled) with the slip of free rolling on a smooth road, and that slip.
+class StaticTire:
+    """A tire that follows its forces at once: the response (r, k) m/N to constant forces, of a tire that rolls steadily."""
 
-    `contact_force(setup, steps)` (n, 3) N runs the loop in steps of `step` s; it is asked for six passages of the
-    patch. ConvergenceError if no slip is free of drag. Collective if `contact_force` is.
+    comm = MPI.COMM_SELF
+
+    def __init__(self, flexibility: Array) -> None:
+        self.same_step = flexibility
+        self._free = np.zeros(len(flexibility))
+
+    def predict(self) -> Array:
+        """No displacement (r,) m is left of earlier forces."""
+        return self._free
+
+    def advance(self, force: Array) -> None:
+        """Nothing moves on."""
+
+    def inertia_force(self) -> Array:
+        """None (3,)."""
+        return np.zeros(3)
+
+    def snapshot(self) -> dict[str, Array]:
+        """No state."""
+        return {}
+
+    def restore(self, state: dict[str, Array]) -> None:
+        """No state."""
+
+
+def rolling_steadily(spec: ContactSpec, setup: ContactSetup, response: Response) -> ContactSetup:
+    """The setup (settled) with the state in which its tire rolls steadily, and with the slip of free rolling if it is free.
+
+    The contact problem on a smooth road, in steps of a point each, of a tire that follows its forces at once (`response`
+    at 0 Hz). Freely rolling, the slip along the road is set from step to step so that the force along it is none,
+
+        s+ = s_0 - F_x / (K way),   s_0 = s - (F_x - F_x before) / (K way),
+
+    K the tire's stiffness along the road, `way` that of a step: s_0 is the slip at which F_x would not have changed. What
+    `setup.slip` has along the road comes on top, afterwards. Steady: from one length of the footprint to the next forces
+    change by less than 1e-4 of the load. The setup itself where bristles do not roll: without friction, at standstill,
+    with springs in their place. A tread that creeps begins at rest, with that slip. ConvergenceError if nothing is steady
+    after 100 lengths of the footprint. Not collective: each process finds the same.
     """
-    x0, x1, _, _ = setup.patch.extent
-    steps = max(math.ceil(PASSAGES * (x1 - x0) / setup.rolled.speed / step), 20)
-    smooth, load = setup.smooth(steps * step), float(setup.patch.force.sum())
+    patch, given = setup.patch, setup.slip
+    touching = patch.force > 0
+    rolls = spec.has_friction and spec.brush == "rolling" and setup.rolled.speed > 0
+    if not (rolls and touching.any()) or setup.steady is not None:
+        return setup
+    way = _pitch(patch)
+    length = float(np.ptp(patch.points[touching, 0])) + way
+    rolled = _Rolled(spec, setup, response, way)
+    found = setup
+    if setup.free:
+        rolled.freely(given[1])
+        rolled.until_steady(length)
+        found = setup.with_slip(rolled.slip)
+    if given[0] or not setup.free:
+        rolled.held(found.slip)
+        rolled.until_steady(length)
+    if spec.law.creep is not None:
+        return found
+    contact = rolled.loop.contact
+    force, state = contact.resultant.copy(), contact.state()
+    steady = SteadyRolling(state, contact.change.copy(), force, rolled.way)
+    return replace(found, steady=steady)
 
-    def drag(slip: float) -> float:
-        found = contact_force(smooth.with_slip(slip), steps)
-        return float(found[-max(steps // PASSAGES, 1) :, 0].mean())
 
-    slip = free_slip(drag, load)
-    return setup.with_slip(slip), slip
+class _Rolled:
+    """A tire that follows its forces at once, rolled over a smooth road step by step."""
+
+    def __init__(
+        self, spec: ContactSpec, setup: ContactSetup, response: Response, way: float
+    ) -> None:
+        patch, p = setup.patch, len(setup.patch.index)
+        step = way / setup.rolled.speed
+        flexibility = (response.static() + response.residual)[: 3 * p, : 3 * p]
+        begun = replace(setup.smooth(step), free=False)
+        self.loop = make_loop(spec, begun, StaticTire(flexibility), step, FINE)
+        self._load, self._step = float(patch.force.sum()), way
+        share = patch.force / self._load
+        nodes = share if patch.weights is None else patch.weights.T @ share
+        stiffness = 1.0 / float(nodes @ flexibility[p : 2 * p, p : 2 * p] @ nodes)
+        self._more = stiffness * way  # N of force along the road for a step at a slip of 1
+        self._road, self._free = np.zeros(len(patch.points)), np.zeros(3 * p)
+        self._shape = replace(setup, slip=(0.0, 0.0)).slips
+        self._across: float | None = None
+        self.slip, self.way, self._before = 0.0, 0.0, 0.0
+
+    def freely(self, across: float) -> None:
+        """From now on the slip along the road lets the wheel roll freely, with a slip `across`."""
+        self._across = across
+        self._creep(self.slip, across)
+
+    def held(self, slip: tuple[float, float]) -> None:
+        """From now on the wheel slips so."""
+        self._across = None
+        self._creep(*slip)
+
+    def _creep(self, along: float, across: float) -> None:
+        self.loop.contact.creep(self._shape + (along, across))
+
+    def until_steady(self, length: float) -> None:
+        """Roll until the mean forces of a `length` (m) are those of the one before."""
+        steps, last = max(math.ceil(length / self._step), FEWEST_STEPS), None
+        for _ in range(PASSAGES):
+            mean = np.mean([self._roll() for _ in range(steps)], axis=0)
+            if last is not None:
+                drag = abs(mean[0]) if self._across is not None else 0.0
+                if max(drag, *np.abs(mean - last)[:2]) <= STEADY * self._load:
+                    return
+            last = mean
+        wanted = (
+            "no slip at which the road does not drag the tire"
+            if self._across is not None
+            else "no steady rolling"
+        )
+        raise ConvergenceError(
+            f"contact: {wanted} was found within {self.way:.3g} m of a smooth road (last {mean[0]:.3g} N along and "
+            f"{mean[1]:.3g} N across it): raise contact.friction, or take rotation.free_rolling = false"
+        )
+
+    def _roll(self) -> Array:
+        """A step; the forces (3,) N of the road."""
+        contact, memory = self.loop.contact, self.loop.memory
+        tread = memory.predict() if memory else None
+        contact.commit(contact.solve(self._road, None, tread, self._free), None)
+        if memory:
+            memory.advance(contact.at_points)
+        force, self.way = contact.resultant.copy(), self.way + self._step
+        if self._across is not None:
+            unchanged = self.slip - (force[0] - self._before) / self._more
+            self._before = force[0]
+            self.slip = float(np.clip(unchanged - force[0] / self._more, *MOST_SLIP))
+            self._creep(self.slip, self._across)
+        return force
+
+
+def _pitch(patch: Patch) -> float:
+    """The usual distance (m) of points that follow each other along the road."""
+    _, pitch = next_ahead(patch.points[:, 0], patch.line)
+    return float(np.median(pitch[pitch > 0]))

@@ -15,6 +15,7 @@ from tireroad.contact.patch import LEAST_REACH, Patch, make_patch
 from tireroad.contact.roads.cell_mean import CellMean
 from tireroad.contact.roads.kinds.shapes import Flat
 from tireroad.contact.roads.under_tire import NOTHING, PreparedRoad, RoadUnderTire
+from tireroad.contact.tread.brush import shape_slip
 from tireroad.contact.tread.pattern import Pattern
 from tireroad.fem.static.road import RoadShape
 from tireroad.greens.response import Response
@@ -65,12 +66,28 @@ class Rolled:
         return self.speed * self.duration
 
 
+@dataclass(frozen=True)
+class SteadyRolling:
+    """A tire that rolls steadily on a smooth road: where a loop begins.
+
+    `state` of the contact problem (ContactProblem.state); `change` (k,) N of the forces on the nodes from the static state;
+    `force` (3,) N of the road; `way` m rolled until it was steady.
+    """
+
+    state: dict[str, np.ndarray]
+    change: np.ndarray
+    force: np.ndarray
+    way: float
+
+
 @dataclass(frozen=True, kw_only=True)
 class ContactSetup:
     """The contact of a run: the `patch` of points whose static gap is within `reach` (m), the strip
     of `road` under it, the `slip` (s_x, s_y) of the wheel as in contact.tread.brush, `shape_slip`
     (s, 2) of the static shape at the outer face's nodes, for bristles, and `pull` (s, 2) N,
-    horizontal forces of a static state with friction.
+    horizontal forces of a static state with friction. `free`: the slip of free rolling is still to be found; `free_slip`:
+    that slip, which is part of `slip`;
+    `steady`: the state of steady rolling in which a loop begins (contact.rolling.rolling_steadily).
     """
 
     patch: Patch
@@ -81,6 +98,9 @@ class ContactSetup:
     slip: tuple[float, float] = (0.0, 0.0)
     shape_slip: np.ndarray | None = None
     pull: np.ndarray | None = None
+    free: bool = False
+    free_slip: float | None = None
+    steady: SteadyRolling | None = None
 
     @property
     def drive(self) -> Drive:
@@ -154,8 +174,8 @@ class ContactSetup:
         return self.slip + (nodes if weights is None else weights @ nodes)
 
     def with_slip(self, more: float) -> ContactSetup:
-        """The same with `more` slip along the road."""
-        return replace(self, slip=(self.slip[0] + more, self.slip[1]))
+        """The same with the slip of free rolling, `more` along the road."""
+        return replace(self, slip=(self.slip[0] + more, self.slip[1]), free=False, free_slip=more)
 
     def smooth(self, duration: float) -> ContactSetup:
         """The same on a flat road at rest, for `duration` s, without a pattern."""
@@ -182,6 +202,16 @@ class ContactSetup:
         if pull is not None:
             settled = replace(settled, pull=spread_pull(settled, pull, force))
         return replace(self, patch=settled), rise
+
+
+def freely_rolling(
+    setup: ContactSetup, face: OuterFace, ring: np.ndarray, radius: float
+) -> ContactSetup:
+    """The setup of a wheel that turns as it would by itself, of effective rolling radius `radius` m: its slip is to be
+    found (contact.rolling.rolling_steadily), and bristles feel the local speeds of the static shape, whose nodes form a
+    ring at the angles `ring` (rad)."""
+    shape = shape_slip(face.positions, ring, face.shape, radius)
+    return replace(setup, free=True, shape_slip=shape)
 
 
 def contact_setup(

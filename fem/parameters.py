@@ -227,8 +227,8 @@ def integer(
     return parameter(key, default)
 
 
-def flag(default: bool, doc: str, *, only_for: OnlyFor = None) -> Any:
-    """A boolean, true or false."""
+def flag(default: bool | None, doc: str, *, only_for: OnlyFor = None) -> Any:
+    """A boolean, true or false. A default of None makes it optional."""
 
     def read(value: Any) -> bool:
         if not isinstance(value, bool):

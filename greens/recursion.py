@@ -61,7 +61,7 @@ class Block:
         block, push = response.block, response.block_input
         self._output = np.vstack([response.block_output, response.inertia[1]])
         self._decay, self._old, self._new = block_steps(block, push, step, scheme)
-        self._parts = EARLIER[scheme]
+        self._parts, self._held = EARLIER[scheme], response.held_block()
         size, forces = push.shape
         self.state = np.zeros(size)
         self._force = self._before = np.zeros(forces)
@@ -71,6 +71,13 @@ class Block:
 
     def start(self, force: np.ndarray) -> None:
         self._force = self._before = force
+
+    def start_steady(self, force: np.ndarray) -> np.ndarray:
+        """Begin at rest under a force (k,) N that always was; the outputs. Rigid states, which are last, stay 0."""
+        block, _, push = self._held
+        self.state = np.zeros(len(self.state))
+        self.state[: len(block)] = -np.linalg.solve(block, push @ force)
+        return self._output @ self.state
 
     def direct_next(self) -> np.ndarray:
         return self._output @ (self._decay @ self._new + self._parts[0] * self._old)
@@ -364,6 +371,7 @@ class Recursion:
         # Real arithmetic on adjacent (re, im), as the states lie in memory.
         output = np.vstack([response.output[:, mine], response.inertia[0][:, mine]])
         into = np.ascontiguousarray(response.input[mine])
+        self._eigenvalue, self._residual = s, response.residual
         self._output = np.ascontiguousarray(output.conj()).view(float)
         self._block = None
         if comm.rank == self._idle and len(response.block):
@@ -451,6 +459,22 @@ class Recursion:
             self._block.start(force)
         self._begin()
 
+    def start_steady(self, force: np.ndarray, sudden: np.ndarray | None = None) -> np.ndarray:
+        """Begin at rest under a force (k,) N that has always been there, with a `sudden` one at t = 0 beside it.
+
+        Every state is z = -P f / s, of the block T z = -P f; rigid states rest. Returns the displacement (r,) m. Collective.
+        """
+        self.start(force if sudden is None else force + sudden)
+        push = (self._input @ np.ascontiguousarray(force)).view(complex)
+        self._state[:] = -push / self._eigenvalue
+        moved = self._output @ self._state.view(float)
+        if self._block:
+            moved += self._block.start_steady(force)
+        self._rate[:] = 0.0 if sudden is None else self._begun @ sudden
+        self._moved, self._taken = False, True
+        self._begin()
+        return self._reduce(moved)[:-3] + self._residual @ force
+
     def _begin(self) -> None:
         """Compute all outputs of the first step. Collective when looking ahead."""
         if self.ahead:
@@ -529,6 +553,11 @@ class Recursion:
         self._unknown = self._force
         _C.lib.advance(self._c)
         self._moved = self._taken = False
+
+    @property
+    def force(self) -> np.ndarray:
+        """The force (k,) N at the end of the last step."""
+        return self._force.copy()
 
     @property
     def state(self) -> np.ndarray:

@@ -33,8 +33,8 @@ from tireroad.contact.patch import Patch
 from tireroad.contact.results.chatter import choose, oscillation
 from tireroad.contact.results.spectra import Limit, amplitudes, limits, lowest, pitch, third_octaves
 from tireroad.contact.roads.under_tire import RoadUnderTire
-from tireroad.contact.rolling import bristles, make_loop
-from tireroad.contact.setup import ContactSetup, Rolled, contact_setup
+from tireroad.contact.rolling import bristles, make_loop, rolling_steadily
+from tireroad.contact.setup import ContactSetup, Rolled, contact_setup, freely_rolling
 from tireroad.contact.tread.law import TREADS, TreadLaw
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.matrices import probe
@@ -650,6 +650,8 @@ def drive(
     if not (math.isfinite(friction) and friction >= 0.0):
         raise InputError(f"drive: friction = {friction!r} must be a number of 0 or more")
     spec = TreadContact(law=law, friction=friction)
+    if spec.has_friction and rolled.speed > 0:
+        setup = freely_rolling(setup, static, motions.lattice.ring, static.rolling_radius())
     along, across, down = (
         probe.nodes(setup.patch.index, len(static.points), part) for part in range(3)
     )
@@ -659,7 +661,7 @@ def drive(
         response = tire.respond(every, every, residual)
     else:
         response = tire.respond(down, down, residual, aside)
-    setup, _ = setup.equilibrated(response, static.force, spec)
+    setup = rolling_steadily(spec, setup.equilibrated(response, static.force, spec)[0], response)
     fastest = np.abs(response.eigenvalue).max(initial=1.0 / duration)
     largest = min(duration / LEAST_STEPS, TURN / fastest) if step is None else step
     chosen = equal_steps(duration, largest)

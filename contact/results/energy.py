@@ -22,14 +22,19 @@ class Work:
 
     Trapezoidal rule: sum (f + f_before).(u - u_before)/2, second order in the step. `lead`: the
     additional work of the mean forces that a `scheme` applies during the steps
-    (greens.recursion.ahead_of_mean). A checkpoint keeps both, with the last forces and displacement.
+    (greens.recursion.ahead_of_mean); `begun`: energy (J) that was in the tire before. A checkpoint keeps them, with the
+    last forces and displacement.
     """
 
     def __init__(self, scheme: str = "linear") -> None:
-        self.total = self.lead = 0.0
+        self.total = self.lead = self.begun = 0.0
         self._scheme = scheme
         self._forces = np.zeros((2, 1))  # of the last two steps
         self._moved = np.zeros(1)
+
+    def begin(self, change: np.ndarray, moved: np.ndarray, energy: float) -> None:
+        """Begin at `change` (k,) N and `moved` (k,) m, with an energy (J) in the tire, in place of 0."""
+        self._forces, self._moved, self.begun = np.stack([change, change]), moved, energy
 
     def add(self, change: np.ndarray, moved: np.ndarray) -> None:
         """Count n steps: `change` (n, k) N and `moved` (n, k) m of contact.rolling.Instant."""
@@ -52,14 +57,14 @@ class Work:
     def state(self) -> dict[str, np.ndarray]:
         """The state that a checkpoint keeps."""
         return {
-            "work": np.array([self.total, self.lead]),
+            "work": np.array([self.total, self.lead, self.begun]),
             "work_forces": self._forces,
             "work_moved": self._moved,
         }
 
     def set_state(self, state: dict[str, np.ndarray]) -> None:
         """Continue from `state`."""
-        self.total, self.lead = state["work"].tolist()
+        self.total, self.lead, self.begun = state["work"].tolist()
         self._forces, self._moved = state["work_forces"], state["work_moved"]
 
 
@@ -153,6 +158,10 @@ class Circulation:
             self.work += work
             self.lead += more
         self._forces = whole[-2:]
+
+    def begin(self, forces: np.ndarray) -> None:
+        """Begin at forces (k,) N in place of none."""
+        self._forces = np.stack([forces, forces])
 
     def state(self) -> dict[str, np.ndarray]:
         """The state that a checkpoint keeps."""

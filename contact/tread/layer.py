@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
@@ -109,6 +111,25 @@ def transforms(m: Array, poisson_ratio: float) -> tuple[Array, Array, Array]:
     return along, np.tanh(m), coupling
 
 
+@lru_cache(maxsize=8)  # 0.6 s each
+def _tables(nu: float) -> list[CubicSpline]:
+    """Integrals of J_n over rho^n, n = 0 to 2, of a layer with Poisson's ratio `nu`: even and smooth at 0."""
+    nodes, weights = np.polynomial.legendre.leggauss(200 + int(4 * LAST * REACH / np.pi))
+    m = 0.5 * LAST * (nodes + 1.0)
+    weights = 0.5 * LAST * weights
+    along, across, coupling = transforms(m, nu)
+    parts = (
+        0.5 * (along + across) - 0.5 * (2.0 - nu),
+        coupling - 0.5 * (1.0 - 2.0 * nu),
+        0.5 * (along - across) + 0.5 * nu,
+    )
+    rho = np.linspace(_FIRST, REACH, int(PER_THICKNESS * REACH) + 1)
+    return [
+        CubicSpline(rho, [jv(n, m * r) @ (weights * part) / r**n for r in rho])
+        for n, part in enumerate(parts)
+    ]
+
+
 class LayerShear:
     """As `half_space_shear`, for a layer of `thickness` m.
 
@@ -137,22 +158,8 @@ class LayerShear:
 
     def __init__(self, youngs_modulus: float, poisson_ratio: float, thickness: float) -> None:
         self._elastic, self._thickness = (youngs_modulus, poisson_ratio), thickness
-        nu = self._nu = poisson_ratio
-        nodes, weights = np.polynomial.legendre.leggauss(200 + int(4 * LAST * REACH / np.pi))
-        m = 0.5 * LAST * (nodes + 1.0)
-        weights = 0.5 * LAST * weights
-        along, across, coupling = transforms(m, nu)
-        parts = (
-            0.5 * (along + across) - 0.5 * (2.0 - nu),
-            coupling - 0.5 * (1.0 - 2.0 * nu),
-            0.5 * (along - across) + 0.5 * nu,
-        )
-        rho = np.linspace(_FIRST, REACH, int(PER_THICKNESS * REACH) + 1)
-        # Tables of J_n integrals over rho^n: even and smooth at 0.
-        self._tables = [
-            CubicSpline(rho, [jv(n, m * r) @ (weights * part) / r**n for r in rho])
-            for n, part in enumerate(parts)
-        ]
+        self._nu = poisson_ratio
+        self._tables = _tables(poisson_ratio)
 
     def __call__(self, x: Array, y: Array, a: Array, b: Array) -> Array:
         """(5, ...) m/N at offsets x, y (m) from rectangles 2a x 2b (m)."""

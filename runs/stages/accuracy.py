@@ -26,7 +26,7 @@ from tireroad.contact.results.error_bars import (
     total,
 )
 from tireroad.contact.results.spectra import Limit, limits, lowest, pitch
-from tireroad.contact.rolling import bristles
+from tireroad.contact.rolling import bristles, rolling_steadily
 from tireroad.contact.setup import ContactSetup, on_shape
 from tireroad.contact.tread.between_nodes import (
     Backed,
@@ -128,9 +128,8 @@ class Given:
     """The run that companions repeat in part.
 
     Its `job`, static state, patch and road (`setup`, not settled), response and rolling modes; the
-    first `steps` of `step` s of its loop, integrated by `scheme`. `free_slip`: the slip of free
-    rolling, already in `setup`; another setup of the scene needs it too. `most`: touching points
-    that a companion may have (contact.grid_patch.ratio).
+    first `steps` of `step` s of its loop, integrated by `scheme`. `most`: touching points that a companion may
+    have (contact.grid_patch.ratio).
     """
 
     job: Job
@@ -141,7 +140,6 @@ class Given:
     step: float
     steps: int
     scheme: str = "linear"
-    free_slip: float = 0.0
     most: float = MOST
 
     @property
@@ -213,8 +211,9 @@ class Given:
 def equilibrated(
     job: Job, setup: ContactSetup, response: Response, force: np.ndarray
 ) -> ContactSetup:
-    """The setup with its patch in the static state under the nodal forces (s,) N."""
-    return setup.equilibrated(response, force, job.scene.contact)[0]
+    """The setup with its patch in the static state under the nodal forces (s,) N, and its tire rolling steadily."""
+    settled = setup.equilibrated(response, force, job.scene.contact)[0]
+    return rolling_steadily(job.scene.contact, settled, response)
 
 
 STATIC_TO_GREENS: tuple[type[PipelinePart], ...] = (
@@ -422,7 +421,7 @@ def coarser_mesh(given: Given) -> ContactForces:
     """Elements of twice the size, from the static state on. Collective."""
     job, done = coarser(given.job, given.static)
     response, state = done["greens"].product.contact, done["static"].product
-    setup = done["setup"].product.with_slip(given.free_slip)
+    setup = done["setup"].product
     setup = equilibrated(job, setup, response, state.normal_force)
     return given.of(job).repeated(setup, response)
 
@@ -641,8 +640,7 @@ class AccuracyStage(Computed[Accuracy]):
         return Given(
             job=self.job,
             static=self.static,
-            setup=self.setup.product.with_slip(self.contact.product.free_slip),
-            free_slip=self.contact.product.free_slip,
+            setup=self.setup.product,
             response=self.greens.product.contact,
             rolling=self.rotating.product,
             step=self.contact.product.step,

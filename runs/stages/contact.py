@@ -26,8 +26,9 @@ from tireroad.contact.results.energy import (
     springs,
 )
 from tireroad.contact.roads.kinds.shapes import Edges
-from tireroad.contact.rolling import freely_rolling, make_loop
+from tireroad.contact.rolling import make_loop, rolling_steadily
 from tireroad.contact.setup import ContactSetup
+from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.static.footprint import Footprint
 from tireroad.fem.static.state import StaticState
 from tireroad.greens.basis import Basis
@@ -37,7 +38,7 @@ from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files import store
 from tireroad.runs.process import console
 from tireroad.runs.process.signals import Deferred, Stopped
-from tireroad.runs.scene.tables.scene import RoadTable, Scene
+from tireroad.runs.scene.tables.scene import RoadTable, Scene, rolls_freely
 from tireroad.runs.stages import contact_file
 from tireroad.runs.stages import setup as stages_setup
 from tireroad.runs.stages.contact_file import (
@@ -52,7 +53,6 @@ from tireroad.runs.stages.rolling import (
     Planned,
     chosen_scheme,
     driven_tire,
-    forces,
     integration,
     passing_period,
     planned,
@@ -212,12 +212,13 @@ _SLIGHT = 1e-6
 class Works:
     """Work (J) of the contact's force changes and of the prescribed forces, if any.
 
-    `lead`: additional work of the forces that the scheme applies during the steps.
+    `lead`: additional work of the forces that the scheme applies during the steps; `begun`: energy (J) in the tire before.
     """
 
     contact: float
     driven: float | None
     lead: float
+    begun: float = 0.0
 
     @property
     def total(self) -> float:
@@ -228,7 +229,7 @@ class Works:
 def works(contact: Work, driven: DrivenTire | None) -> Works:
     """The works of a completed loop."""
     lead = contact.lead + (driven.lead if driven else 0.0)
-    return Works(contact.total, driven.work if driven else None, lead)
+    return Works(contact.total, driven.work if driven else None, lead, contact.begun)
 
 
 @dataclass(frozen=True)
@@ -291,6 +292,11 @@ class Losses:
         losses are known."""
         return self._aside.total, self._aside.lead
 
+    def begin(self) -> None:
+        """Begin at the forces that the tire has at t = 0."""
+        if self._motion is not None:
+            self._circulation.begin(self._tire.force[self._leaning.others])
+
     def flush(self) -> None:
         """Account for the steps since the last call. Collective."""
         if self._motion is None or not (samples := self._tire.samples()):
@@ -348,22 +354,38 @@ def describe_energy(
     record.indicators["work of contact on the tire"] = (work.contact, "J")
     if work.driven is not None:
         record.indicators["work of the prescribed forces"] = (work.driven, "J")
-    own = own_states(response, rolling) and len(kept["block_state"]) == len(rolling.states.block)
-    if not own:
+    energies = energies_in(rolling, response, kept, losses, step)
+    if energies is None:
         console.say(f"  energy: contact and forces put {total:.4g} J into the tire{losses.unknown}")
         return
-    left = energy_left(rolling, kept, response.slow(step))
-    elastic = springs(response.resolved(step), kept["push_force"], losses.others)
     record.indicators |= {
-        "energy left in the modes": (left, "J"),
-        "energy left in the residual flexibility": (elastic, "J"),
+        "energy left in the modes": (energies[0], "J"),
+        "energy left in the residual flexibility": (energies[1], "J"),
     }
+    if work.begun:
+        record.indicators["energy in both as the run begins"] = (work.begun, "J")
+    left = sum(energies) - work.begun
     if losses.found is None:
-        _standing(record, rolling, total, left + elastic, slight)
+        _standing(record, rolling, total, left, slight)
     else:
         lost, drive, beyond, springs_lead = losses.found
         taken = springs_lead - work.lead
-        _rolling(record, total, left + elastic, lost, drive, beyond, taken, slight)
+        _rolling(record, total, left, lost, drive, beyond, taken, slight)
+
+
+def energies_in(
+    rolling: RollingModes,
+    response: Response,
+    kept: dict[str, np.ndarray],
+    losses: Losses,
+    step: float,
+) -> tuple[float, float] | None:
+    """Energy (J) in the modes and in the residual flexibility by a tire's snapshot; None where they are not known."""
+    own = own_states(response, rolling) and len(kept["block_state"]) == len(rolling.states.block)
+    if not own:
+        return None
+    left = energy_left(rolling, kept, response.slow(step))
+    return left, springs(response.resolved(step), kept["push_force"], losses.others)
 
 
 def _standing(
@@ -459,9 +481,7 @@ class ContactStage(Stage[ContactHistory]):
             "road": [asdict(scene.road), stages_setup.inputs(self.job)],
             "files": [store.file_hash(file) for file in scene.road.surface.files],
             "speed": self.setup.product.rolled.speed,
-            "slip": [scene.rotation.free_rolling, scene.rotation.slip_angle]
-            if scene.rotation
-            else None,
+            "slip": [rolls_freely(scene), scene.rotation.slip_angle] if scene.rotation else None,
             "axle_force": scene.output.axle_force,
             "forces": [asdict(force) for force in scene.force],
             "time": {k: v for k, v in asdict(scene.time).items() if k != "checkpoint"},
@@ -487,7 +507,7 @@ class ContactStage(Stage[ContactHistory]):
                 record.indicators["rise of the tire as it settles on the grid"] = (rise, "m")
             begun = begun_with(self.job, key)
             chosen = chosen_scheme(self.job, record, setup, plan, begun)
-            setup, slip = self._rolling_freely(record, setup, plan, chosen.scheme)
+            setup = self._rolling_steadily(record, setup)
         spec, patch = self.job.scene.contact, setup.patch
         count = f"{len(patch.points)} contact points on {len(patch.index)} nodes"
         console.say(f"  {count}, tread {spec.tread}, solver {solver_name(spec, patch)}")
@@ -497,35 +517,45 @@ class ContactStage(Stage[ContactHistory]):
             )
         while True:
             try:
-                return self._attempt(key, record, setup, slip, plan, chosen)
+                return self._attempt(key, record, setup, plan, chosen)
             except Chatter as chatter:
                 chosen = reported(record, chosen.next_scheme(chatter))
                 forget_checkpoint(self.job)
 
-    def _rolling_freely(self, record: Record, setup: ContactSetup, plan: Planned, scheme: str):
-        """(setup, slip) of free rolling if the scene asks for it, else slip 0. Collective."""
-        rotation, response = self.job.scene.rotation, self.greens.product.contact
-        if rotation is None or not rotation.free_rolling:
-            return setup, 0.0
-
-        def contact_force(smooth: ContactSetup, steps: int) -> np.ndarray:
-            return forces(self.job, smooth, response, plan.step, steps, scheme).contact
-
-        setup, slip = freely_rolling(setup, plan.step, contact_force)
-        record.headline["slip of free rolling"] = (100 * slip, "%")
-        return setup, slip
+    def _rolling_steadily(self, record: Record, setup: ContactSetup) -> ContactSetup:
+        """The setup that begins with steady rolling, where it can: recorded, or why not."""
+        asked = bool(self.job.scene.rotation and self.job.scene.rotation.free_rolling)
+        try:
+            setup = rolling_steadily(self.job.scene.contact, setup, self.greens.product.contact)
+        except ConvergenceError as error:
+            if asked:
+                raise
+            record.warnings.append(
+                f"the run begins at rest, without the slip of free rolling: {error}"
+            )
+            return replace(setup, free=False)
+        if setup.free_slip is not None:
+            record.headline["slip of free rolling"] = (100 * setup.free_slip, "%")
+        if (steady := setup.steady) is not None:
+            for axis, name in enumerate("xy"):
+                record.indicators[f"force {name} of steady rolling, as the run begins"] = (
+                    float(steady.force[axis]),
+                    "N",
+                )
+        return setup
 
     def _attempt(
         self,
         key: str,
         record: Record,
         setup: ContactSetup,
-        slip: float,
         plan: Planned,
         scheme: Chosen,
     ) -> None:
         """Run the loop, writing by blocks; raises Chatter beyond the scheme's limit. Collective."""
         response, chosen = self.greens.product.contact, integration(self.job, plan, scheme.scheme)
+        if chosen.scheme == "convolution":
+            setup = replace(setup, steady=None)  # its history begins at t = 0
         with record.timing("tread and solver"):
             driven = driven_tire(self.job, chosen, setup.patch)
             loop = self._loop(record, setup, driven or chosen.tire, chosen.step)
@@ -533,12 +563,14 @@ class ContactStage(Stage[ContactHistory]):
         losses = Losses(chosen, response, self._states, self._leaning(setup))
         with ExitStack() as stack, record.timing("time loop"):
             attributes = {"step": chosen.step, "scheme": chosen.scheme, "road_relief": setup.relief}
-            attributes |= {"free_slip": slip, "scheme_reason": scheme.reason}
+            attributes |= {"free_slip": setup.free_slip or 0.0, "scheme_reason": scheme.reason}
             attributes["scheme_limit"] = scheme.limit
             attributes["friction"] = self._coefficient
             file = ContactFile(self.job, key, setup, attributes)
             kept = file.open(stack, self.job.path(self.name))
-            if kept is not None:
+            if kept is None:
+                self._begin(loop, totals, losses, chosen.step)
+            else:
                 loop.restore(kept)
                 totals.set_state(kept)
                 losses.set_state(kept)
@@ -567,6 +599,16 @@ class ContactStage(Stage[ContactHistory]):
             state = self.static.product
             pressed = float(state.normal_force.sum()) * (state.deflection or 0.0)
             describe_energy(record, *given, losses, chosen.step, pressed)
+
+    def _begin(self, loop: Loop, totals: Totals, losses: Losses, step: float) -> None:
+        """Count work and losses from the state in which the loop begins, if that is not the static one. Collective."""
+        if loop.begun is None:
+            return
+        change, moved = loop.begun
+        losses.begin()
+        kept = loop.tire.snapshot()
+        energies = energies_in(self._states, self.greens.product.contact, kept, losses, step)
+        totals.work.begin(change[: len(moved)], moved, sum(energies or (0.0,)))
 
     @property
     def _coefficient(self) -> float:

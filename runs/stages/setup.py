@@ -16,8 +16,13 @@ from tireroad.contact.patch import spacing
 from tireroad.contact.roads.grid_file import UNREADABLE, read_numbers
 from tireroad.contact.roads.road import placed
 from tireroad.contact.roads.under_tire import make_motion
-from tireroad.contact.setup import ContactSetup, Rolled, contact_setup, nodes_within
-from tireroad.contact.tread.brush import shape_slip
+from tireroad.contact.setup import (
+    ContactSetup,
+    Rolled,
+    contact_setup,
+    freely_rolling,
+    nodes_within,
+)
 from tireroad.contact.tread.pattern import Heights, Pattern, pitch_starts
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices import probe
@@ -27,6 +32,7 @@ from tireroad.runs.files.store import put
 from tireroad.runs.scene.rules import made
 from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.scene.tables.contact import PatternTable
+from tireroad.runs.scene.tables.scene import rolls_freely
 from tireroad.runs.stages import corner
 from tireroad.runs.stages.rolling import run_time
 from tireroad.runs.stages.stage import Job, Record, Result, Shared, memoize, wheel_slip
@@ -190,11 +196,10 @@ def points_of(job: Job, state: StaticState) -> str | Pitch:
 
 def _slipping(job: Job, state: StaticState, setup: ContactSetup) -> ContactSetup:
     """The setup with slip and slip angle; at free rolling also the slip of the static shape."""
-    rotation, slip = job.scene.rotation, wheel_slip(job.scene)
-    if rotation is None or not rotation.free_rolling:
-        return replace(setup, slip=slip)
-    given = state.positions, job.tire.lattice.ring, state.shape, rolling_radius(job, state)
-    return replace(setup, slip=slip, shape_slip=shape_slip(*given))
+    setup = replace(setup, slip=wheel_slip(job.scene))
+    if not rolls_freely(job.scene):
+        return setup
+    return freely_rolling(setup, state, job.tire.lattice.ring, rolling_radius(job, state))
 
 
 def rolling_speed(job: Job, state: StaticState) -> float:

@@ -1,31 +1,11 @@
-"""Free rolling: the root of the drag, the slip of the static shape, and that there may be none."""
+"""Free rolling: the slip of the static shape, and where bristles feel it."""
 
 import numpy as np
 import pytest
 
 from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.solver.stick_slip import BrushFriction
-from tireroad.contact.tread.brush import Brush, BrushLaw, free_slip, shape_slip
-from tireroad.fem.errors import ConvergenceError
-
-LOAD = 1000.0
-
-
-@pytest.mark.parametrize("root", [0.0, 2e-4, -3e-3, 0.05, 0.15])
-def test_the_root_of_a_saturating_force(root) -> None:
-    asked = []
-
-    def drag(slip: float) -> float:
-        asked.append(slip)
-        return 800.0 * np.tanh(40 * (slip - root))
-
-    assert abs(drag(free_slip(drag, LOAD))) <= 1e-4 * LOAD
-    assert len(asked) < 20
-
-
-def test_no_free_rolling() -> None:
-    with pytest.raises(ConvergenceError, match="no free rolling"):
-        free_slip(lambda slip: -50.0 + np.tanh(slip), LOAD)
+from tireroad.contact.tread.brush import Brush, BrushLaw, shape_slip
 
 
 def test_slip_of_a_rigid_wheel_and_of_a_cone() -> None:

@@ -525,10 +525,10 @@ class RotationTable:
         least=1e-6,
         most=500,
     )
-    free_rolling: bool = flag(
-        False,
-        "find the slip of the wheel at which a smooth road exerts no drag, with the time loop and its brush, which then "
-        "feels the local speeds of the static shape; added to contact.slip",
+    free_rolling: bool | None = flag(
+        None,
+        "the wheel turns at the rate at which a smooth road exerts no drag, to which contact.slip adds; bristles then feel "
+        "the local speeds of the static shape; absent: true with friction",
     )
     slip_angle: float = number(
         0.0,
@@ -745,6 +745,14 @@ def rubbed(scene: Scene) -> Scene:
     if scene.contact is None or scene.static.friction is not None:
         return scene
     return replace(scene, contact=scene.contact.by_default())
+
+
+def rolls_freely(scene: Scene) -> bool:
+    """Whether the rate of free rolling is sought: by default wherever bristles roll over the road."""
+    rotation, contact = scene.rotation, scene.contact
+    if rotation is None or contact is None or not contact.has_friction or rotation.speed == 0:
+        return False
+    return contact.brush == "rolling" if rotation.free_rolling is None else rotation.free_rolling
 
 
 def has_air(scene: Scene) -> bool:

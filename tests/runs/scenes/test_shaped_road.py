@@ -18,6 +18,7 @@ error_estimate = false
 count = 40
 [rotation]
 speed = 40.0
+free_rolling = false
 [contact]
 points = { dx = 0.008, dy = 0.008 }
 tread = "layer"
@@ -66,7 +67,7 @@ def test_on_a_smooth_drum_nothing_moves(tmp_path, launch, axle) -> None:
 def test_companions_of_a_freely_rolling_wheel_roll_freely(tmp_path, launch) -> None:
     """Without its slip a companion would be dragged, and the mean along the road be off by that."""
     scene = tmp_path / "scene.toml"
-    text = SCENE.replace("speed = 40.0", "speed = 40.0\nfree_rolling = true")
+    text = SCENE.replace("free_rolling = false", "free_rolling = true")
     text = text.replace('kind = "flat"', 'kind = "sine"\namplitude = 2e-4\nwavelength = 0.1')
     text = text.replace("duration = 0.01", "duration = 0.04")
     text = text.replace("[accuracy]\nestimate = false\n", "")
@@ -100,7 +101,7 @@ def test_roads_that_cannot_be(tmp_path, old, new, named) -> None:
 def test_a_freely_rolling_wheel_is_not_dragged(tmp_path, launch) -> None:
     """On a smooth road, cambered: none of the force along the road is left, some of it across (camber thrust)."""
     scene = tmp_path / "scene.toml"
-    text = SCENE.replace("speed = 40.0", "speed = 40.0\nfree_rolling = true")
+    text = SCENE.replace("free_rolling = false", "free_rolling = true")
     scene.write_text(text.replace("duration = 0.01", "duration = 0.05"))
     done = launch("-m", "runs", "run", scene, "--out", tmp_path / "out", "--until", "contact")
     assert done.returncode == 0, done.stderr + done.stdout
@@ -124,7 +125,7 @@ def test_a_freely_rolling_wheel_is_not_dragged(tmp_path, launch) -> None:
     ],
 )
 def test_free_rolling_that_cannot_be(tmp_path, old, new, named) -> None:
-    text = SCENE.replace("[rotation]\n", "[rotation]\nfree_rolling = true\n")
+    text = SCENE.replace("free_rolling = false", "free_rolling = true")
     (tmp_path / "scene.toml").write_text(text.replace(old, new))
     with pytest.raises(InputError, match=named):
         load(tmp_path / "scene.toml")

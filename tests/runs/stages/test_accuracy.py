@@ -99,7 +99,7 @@ def test_a_companion_is_the_run_it_stands_for(run, whole, cause, sets):
     assert part == pytest.approx(wanted[cause])
     found = forces.contact
     # The turns of friction end at a residual of 1e-3 of the largest bound: rounding may end them one earlier or later.
-    assert found[:, 2] == pytest.approx(contact_force(other)[:, 2], rel=1e-4)
+    assert found[:, 2] == pytest.approx(contact_force(other)[:, 2], rel=3e-4)
 
 
 @pytest.mark.long
