@@ -111,11 +111,13 @@ class StaticTire:
         """No state."""
 
 
-def rolling_steadily(spec: ContactSpec, setup: ContactSetup, response: Response) -> ContactSetup:
+def rolling_steadily(
+    spec: ContactSpec, setup: ContactSetup, response: Response, step: float
+) -> ContactSetup:
     """The setup (settled) with the state in which its tire rolls steadily, and with the slip of free rolling if it is free.
 
-    The contact problem on a smooth road, in steps of a point each, of a tire that follows its forces at once (`response`
-    at 0 Hz). Freely rolling, the slip along the road is set from step to step so that the force along it is none,
+    The contact problem on a smooth road, in steps of a point each and then in the loop's own of `step` s, of a tire that
+    follows its forces at once (`response` at 0 Hz). Freely rolling, the slip along the road is set from step to step so that the force along it is none,
 
         s+ = s_0 - F_x / (K way),   s_0 = s - (F_x - F_x before) / (K way),
 
@@ -130,9 +132,9 @@ def rolling_steadily(spec: ContactSpec, setup: ContactSetup, response: Response)
     rolls = spec.has_friction and spec.brush == "rolling" and setup.rolled.speed > 0
     if not (rolls and touching.any()) or setup.steady is not None:
         return setup
-    way = _pitch(patch)
-    length = float(np.ptp(patch.points[touching, 0])) + way
-    rolled = _Rolled(spec, setup, response, way)
+    pitch = _pitch(patch)
+    length = float(np.ptp(patch.points[touching, 0])) + pitch
+    rolled = _Rolled(spec, setup, response, pitch)
     found = setup
     if setup.free:
         rolled.freely(given[1])
@@ -143,18 +145,29 @@ def rolling_steadily(spec: ContactSpec, setup: ContactSetup, response: Response)
         rolled.until_steady(length)
     if spec.law.creep is not None:
         return found
+    if (way := setup.rolled.speed * step) < pitch:
+        rolled = _Rolled(spec, setup, response, way, rolled)
+        rolled.held(found.slip)
+        rolled.until_steady(length)
     contact = rolled.loop.contact
-    force, state = contact.resultant.copy(), contact.state()
-    steady = SteadyRolling(state, contact.change.copy(), force, rolled.way)
-    return replace(found, steady=steady)
+    forces = contact.vertical.copy(), contact.horizontal.T.copy()
+    return replace(
+        found, steady=SteadyRolling(contact.state(), contact.change.copy(), *forces, rolled.way)
+    )
 
 
 class _Rolled:
     """A tire that follows its forces at once, rolled over a smooth road step by step."""
 
     def __init__(
-        self, spec: ContactSpec, setup: ContactSetup, response: Response, way: float
+        self,
+        spec: ContactSpec,
+        setup: ContactSetup,
+        response: Response,
+        way: float,
+        before: _Rolled | None = None,
     ) -> None:
+        """In steps of `way` m, from rest or where it was `before`."""
         patch, p = setup.patch, len(setup.patch.index)
         step = way / setup.rolled.speed
         flexibility = (response.static() + response.residual)[: 3 * p, : 3 * p]
@@ -169,6 +182,9 @@ class _Rolled:
         self._shape = replace(setup, slip=(0.0, 0.0)).slips
         self._across: float | None = None
         self.slip, self.way, self._before = 0.0, 0.0, 0.0
+        if before is not None:
+            self.way = before.way
+            self.loop.contact.set_state(before.loop.contact.state())
 
     def freely(self, across: float) -> None:
         """From now on the slip along the road lets the wheel roll freely, with a slip `across`."""

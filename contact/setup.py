@@ -71,12 +71,13 @@ class SteadyRolling:
     """A tire that rolls steadily on a smooth road: where a loop begins.
 
     `state` of the contact problem (ContactProblem.state); `change` (k,) N of the forces on the nodes from the static state;
-    `force` (3,) N of the road; `way` m rolled until it was steady.
+    `normal` (c,) and `horizontal` (c, 2) N of the points, as a loop has them; `way` m rolled until it was steady.
     """
 
     state: dict[str, np.ndarray]
     change: np.ndarray
-    force: np.ndarray
+    normal: np.ndarray
+    horizontal: np.ndarray
     way: float
 
 

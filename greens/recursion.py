@@ -621,13 +621,19 @@ class Recursion:
 
 
 def marched(
-    response: Response, step: float, scheme: str, begun: Array, blocks: Iterable[Array]
+    response: Response,
+    step: float,
+    scheme: str,
+    begun: Array,
+    blocks: Iterable[Array],
+    always: Array | None = None,
 ) -> Iterator[Array]:
     """Displacements (n, r) m at the ends of steps of `step` s under forces that are known, block by
     block.
 
     As `Recursion` finds them step by step, but by products of matrices: with known forces only the
-    decay of the states goes from one step to the next. `begun` (k,) N at t = 0, `blocks` (n, k) N.
+    decay of the states goes from one step to the next. `begun` (k,) N at t = 0, `blocks` (n, k) N; `always` (k,) N: the part
+    of `begun` that always was, as `Recursion.start_steady` has it.
     """
     decay = np.exp(response.eigenvalue * step)
     old, new = weights(response.eigenvalue * step, step, scheme)
@@ -635,9 +641,13 @@ def marched(
     into = np.ascontiguousarray(response.input.T).view(float)
     output = np.ascontiguousarray(response.output.conj()).view(float).T
     block = Block(response, step, scheme) if len(response.block) else None
+    force, state = begun, np.zeros(len(decay), complex)
+    if always is not None:
+        state -= (always @ into).view(complex) / response.eigenvalue
     if block:
         block.start(begun)
-    force, state = begun, np.zeros(len(decay), complex)
+        if always is not None:
+            block.start_steady(always)
     last = np.repeat((begun @ into).view(complex)[None], 2, axis=0)
     for forces in blocks:
         pushes = np.concatenate([last, (forces @ into).view(complex)])

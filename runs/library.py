@@ -661,10 +661,11 @@ def drive(
         response = tire.respond(every, every, residual)
     else:
         response = tire.respond(down, down, residual, aside)
-    setup = rolling_steadily(spec, setup.equilibrated(response, static.force, spec)[0], response)
+    setup, _ = setup.equilibrated(response, static.force, spec)
     fastest = np.abs(response.eigenvalue).max(initial=1.0 / duration)
     largest = min(duration / LEAST_STEPS, TURN / fastest) if step is None else step
     chosen = equal_steps(duration, largest)
+    setup = rolling_steadily(spec, setup, response, chosen.size)
     blocks = _blocks(spec, setup, response, chosen, motions.body.comm)
     highest = tire.states.highest / (2 * np.pi)
     bounds = limits(step=chosen.size, highest=highest, pitch=pitch(setup.patch), speed=rolled.speed)

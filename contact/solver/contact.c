@@ -1086,6 +1086,7 @@ int stick_slip_solve(stick_slip *s, double tolerance) {
 /* Turns: at most; in which the normal forces follow in a Newton step; after which stick and slip are solved in each. */
 enum { TURNS = 100, FOLLOWED = 8, FLAT = 30, MIXED = 4, LIFT_PATIENCE = 10 };
 static const double ENOUGH = 0.1; /* of the tolerance: stick and slip within a turn */
+static const double SHRUNK = 0.03, SMALL = 1e-6; /* of the first residual of a step, down to a share of the largest bound */
 
 struct brush_work {
     double *share, *past, *trial, *moved, *some, *found, *q, *mixed;
@@ -1319,7 +1320,7 @@ int brush_solve(brush *s, normal_contact *normal, const double *q, const uint8_t
     plane *compliance = s->compliance;
     const int c = compliance->points, unbounded = s->friction < 0.0, own = normal->all || normal->usual;
     int held = 0, failed;
-    double before = INFINITY, caution = 1.0;
+    double before = INFINITY, first = INFINITY, caution = 1.0;
     offer(s, w->share, w->past);
     memset(w->lifted, 0, c);
     for (int i = 0; i < 2 * c; i++) w->trial[i] = 2.0 * s->horizontal[i] - s->before[i]; /* saves a turn */
@@ -1346,7 +1347,10 @@ int brush_solve(brush *s, normal_contact *normal, const double *q, const uint8_t
         if (!isfinite(problem.off)) return NOT_FINITE;
         if (problem.off > FALLS * before) caution = fmax(CAUTION * caution, LEAST_CAUTION);
         before = problem.off;
-        const double limit = s->tolerance * problem.largest;
+        /* Small changes are not to be lost step by step: bristles would carry the error through the patch. */
+        if (s->turns == 1) first = problem.off;
+        const double shrunk = fmax(SHRUNK * first, SMALL * problem.largest);
+        const double limit = fmin(s->tolerance * problem.largest, shrunk);
         double cut = 0.0; /* what the bounds have cut off still acted on the normal forces */
         memset(w->found, 0, 2 * c * sizeof(double));
         for (int d = 0; d < 2; d++)
@@ -1363,7 +1367,7 @@ int brush_solve(brush *s, normal_contact *normal, const double *q, const uint8_t
             finish(s, force, free);
             return SOLVED;
         }
-        if (s->turns > (own ? FOLLOWED : FLAT)) failed = stick_slip_solve(&problem, ENOUGH * s->tolerance);
+        if (s->turns > (own ? FOLLOWED : FLAT)) failed = stick_slip_solve(&problem, problem.largest > 0.0 ? ENOUGH * limit / problem.largest : 0.0);
         else {
             if (follows) {
                 problem.normal = normal, problem.friction = unbounded ? 0.0 : s->friction;

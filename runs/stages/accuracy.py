@@ -26,7 +26,7 @@ from tireroad.contact.results.error_bars import (
     total,
 )
 from tireroad.contact.results.spectra import Limit, limits, lowest, pitch
-from tireroad.contact.rolling import bristles, rolling_steadily
+from tireroad.contact.rolling import bristles
 from tireroad.contact.setup import ContactSetup, on_shape
 from tireroad.contact.tread.between_nodes import (
     Backed,
@@ -211,9 +211,8 @@ class Given:
 def equilibrated(
     job: Job, setup: ContactSetup, response: Response, force: np.ndarray
 ) -> ContactSetup:
-    """The setup with its patch in the static state under the nodal forces (s,) N, and its tire rolling steadily."""
-    settled = setup.equilibrated(response, force, job.scene.contact)[0]
-    return rolling_steadily(job.scene.contact, settled, response)
+    """The setup with its patch in the static state under the nodal forces (s,) N."""
+    return setup.equilibrated(response, force, job.scene.contact)[0]
 
 
 STATIC_TO_GREENS: tuple[type[PipelinePart], ...] = (

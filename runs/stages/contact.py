@@ -507,7 +507,7 @@ class ContactStage(Stage[ContactHistory]):
                 record.indicators["rise of the tire as it settles on the grid"] = (rise, "m")
             begun = begun_with(self.job, key)
             chosen = chosen_scheme(self.job, record, setup, plan, begun)
-            setup = self._rolling_steadily(record, setup)
+            setup = self._rolling_steadily(record, setup, plan.step)
         spec, patch = self.job.scene.contact, setup.patch
         count = f"{len(patch.points)} contact points on {len(patch.index)} nodes"
         console.say(f"  {count}, tread {spec.tread}, solver {solver_name(spec, patch)}")
@@ -522,11 +522,13 @@ class ContactStage(Stage[ContactHistory]):
                 chosen = reported(record, chosen.next_scheme(chatter))
                 forget_checkpoint(self.job)
 
-    def _rolling_steadily(self, record: Record, setup: ContactSetup) -> ContactSetup:
+    def _rolling_steadily(self, record: Record, setup: ContactSetup, step: float) -> ContactSetup:
         """The setup that begins with steady rolling, where it can: recorded, or why not."""
         asked = bool(self.job.scene.rotation and self.job.scene.rotation.free_rolling)
         try:
-            setup = rolling_steadily(self.job.scene.contact, setup, self.greens.product.contact)
+            setup = rolling_steadily(
+                self.job.scene.contact, setup, self.greens.product.contact, step
+            )
         except ConvergenceError as error:
             if asked:
                 raise
@@ -539,7 +541,7 @@ class ContactStage(Stage[ContactHistory]):
         if (steady := setup.steady) is not None:
             for axis, name in enumerate("xy"):
                 record.indicators[f"force {name} of steady rolling, as the run begins"] = (
-                    float(steady.force[axis]),
+                    float(steady.horizontal[:, axis].sum()),
                     "N",
                 )
         return setup

@@ -327,6 +327,9 @@ class ContactFile:
         store.put(self._file, "static_force", patch.force, "N")
         if patch.pull is not None:
             store.put(self._file, "static_horizontal_force", patch.pull, "N")
+        if (steady := self._setup.steady) is not None:
+            store.put(self._file, "initial_normal_force", steady.normal, "N")
+            store.put(self._file, "initial_horizontal_force", steady.horizontal, "N")
         stages_setup.fill(self._file, self._setup)
         fill(self._file, self._setup)
         forces = len(self._job.scene.force)

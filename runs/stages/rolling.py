@@ -15,7 +15,7 @@ from tireroad.contact.loop import DrivenTire, LinearTire, equal_steps, steps_of
 from tireroad.contact.patch import Patch
 from tireroad.contact.results.chatter import Chosen, choose, oscillation
 from tireroad.contact.roads.under_tire import is_level
-from tireroad.contact.rolling import bristles, make_loop
+from tireroad.contact.rolling import bristles, make_loop, rolling_steadily
 from tireroad.contact.setup import ContactSetup
 from tireroad.greens.recursion import Convolution, Recursion, sharers
 from tireroad.greens.response import Response
@@ -204,6 +204,7 @@ def forces(
     comm = sharers(kept, job.comm)
     tire = Recursion(response=kept, step=step, scheme=scheme, comm=comm, look_ahead=True)
     spec = contact or job.scene.contact
+    setup = rolling_steadily(spec, setup, response, step)
     driven = driven_tire(job, Integration(tire, step, steps, scheme), setup.patch)
     chosen: LinearTire = driven or tire
     loop = make_loop(spec, setup, chosen, step)

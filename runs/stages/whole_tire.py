@@ -74,10 +74,23 @@ class PatchForces:
         return PatchForces(job=job, setup=setup, time=time, step=step, scheme=scheme, seen=seen)
 
     @property
+    def always(self) -> np.ndarray:
+        """Modal forces (m,) N kg^-1/2 of the state in which the loop begins: they have always been there."""
+        if self.setup is None:
+            return np.zeros(self.seen.shape[1])
+        names = "initial_normal_force", "initial_horizontal_force"
+        with h5py.File(self.job.path("contact")) as file:
+            if names[0] not in file:
+                return np.zeros(self.seen.shape[1])
+            found = np.hstack(self._on_nodes(file, *(file[name][:][None] for name in names)))[0]
+        return found @ self.seen[: len(found)]
+
+    @property
     def begun(self) -> np.ndarray:
-        """Modal forces (m,) N kg^-1/2 at t = 0: the prescribed ones alone."""
+        """Modal forces (m,) N kg^-1/2 at t = 0: the prescribed ones, and those that have always been there."""
         given = self.job.scene.force
-        return histories(given, np.zeros(1))[0] @ self.seen[len(self.seen) - len(given) :]
+        sudden = histories(given, np.zeros(1))[0] @ self.seen[len(self.seen) - len(given) :]
+        return self.always + sudden
 
     def pushes(self, start: int = 0) -> Iterator[np.ndarray]:
         """Modal forces (n, m) N kg^-1/2 from step `start` on, block by block. Root process only."""
@@ -85,23 +98,32 @@ class PatchForces:
             yield self._force(slice(first, first + _ROWS)) @ self.seen
 
     def _force(self, some: slice) -> np.ndarray:
-        """Forces (n, k) N in the order of the driven points.
-
-        Bristles begin unloaded; a static state with friction has horizontal forces of its own.
-        """
+        """Forces (n, k) N in the order of the driven points."""
         prescribed = histories(self.job.scene.force, self.time[some])
         if self.setup is None:
             return prescribed
-        patch = self.setup.patch
         with h5py.File(self.job.path("contact")) as file:
-            parts = [file["normal_force"][some] - file["static_force"][:]]
-            if self.job.scene.horizontal_forces:
-                held = file.get("static_horizontal_force")
-                begun = np.zeros(2) if held is None else held[:]
-                parts += [(file["horizontal_force"][some] - begun)[:, :, k] for k in (0, 1)]
-        if patch.weights is not None:
-            parts = [(patch.weights.T @ part.T).T for part in parts]
-        return np.hstack([*parts, prescribed])
+            horizontal = self.job.scene.horizontal_forces
+            given = (
+                file["normal_force"][some],
+                file["horizontal_force"][some] if horizontal else None,
+            )
+            return np.hstack([*self._on_nodes(file, *given), prescribed])
+
+    def _on_nodes(
+        self, file: h5py.File, normal: np.ndarray, horizontal: np.ndarray | None
+    ) -> list[np.ndarray]:
+        """Changes (n, p) N of the forces on the nodes from the static state, in z and, if given, x and y.
+
+        A static state with friction has horizontal forces of its own.
+        """
+        parts = [normal - file["static_force"][:]]
+        if horizontal is not None:
+            held = file.get("static_horizontal_force")
+            begun = np.zeros(2) if held is None else held[:]
+            parts += [(horizontal - begun)[:, :, k] for k in (0, 1)]
+        weights = self.setup.patch.weights if self.setup else None
+        return parts if weights is None else [(weights.T @ part.T).T for part in parts]
 
 
 P = TypeVar("P")
@@ -209,7 +231,8 @@ def replayed(basis: Basis, forces: PatchForces, wanted: Collection[int]) -> np.n
     """
     unit = np.eye(basis.coordinates)
     response = couple(basis.states, unit, unit, np.zeros((3, len(unit))))
-    given = response, forces.step, recursive(forces.scheme), forces.begun, forces.pushes()
+    begun = forces.begun, forces.pushes(), forces.always
+    given = response, forces.step, recursive(forces.scheme), *begun
     found = np.empty((len(wanted), len(unit)))
     number = filled = 0
     for moved in marched(*given):
