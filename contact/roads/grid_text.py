@@ -262,7 +262,7 @@ def _corner(text: str, keys: Keys, stated: Stated, source: str) -> tuple[Column,
         for word in re.findall(r"[^\W\d_]+", text)
         if (role := role_of(word)) in ("x", "y", "time")
     ]
-    if named[:1] == ["y"] or named == ["x"] and _ACROSS.search(text):
+    if named[:1] == ["y"] or _ACROSS.search(text):
         raise InputError(
             f'{source}: by the corner "{text}" the first column is y: it must hold x, the first line y; transpose the matrix, or '
             "write x/y"

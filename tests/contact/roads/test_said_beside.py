@@ -129,7 +129,9 @@ def test_the_unit_in_a_corner_is_read(tmp_path: Path, corner: str) -> None:
     assert [reading.unit[:2] for reading in every.readings] == ["mm"] * 3
 
 
-@pytest.mark.parametrize("corner", ["y", "y/x", "y\\x", "lateral", "y [mm]", "x->", "t", "t [s]"])
+@pytest.mark.parametrize(
+    "corner", ["y", "y/x", "y\\x", "lateral", "y [mm]", "x->", "x across", "t", "t [s]"]
+)
 def test_a_corner_that_puts_y_or_time_down_is_refused(tmp_path: Path, corner: str) -> None:
     with pytest.raises(InputError, match="by the corner"):
         read_grid(matrix(tmp_path, corner), length_unit="mm", height_unit="mm")
