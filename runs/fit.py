@@ -316,6 +316,11 @@ def tir_of(text: str, path: Path) -> Tir:
             section = plain[1:].partition("]")[0].strip().upper()
             continue
         if not (match := _LINE.match(line)):
+            word = re.match(r"\w+", plain)
+            if word and word[0].upper() in _USED:
+                raise InputError(
+                    f"{path}, line {number}: {plain[:40]!r} is not {word[0].upper()} = number"
+                )
             tables.setdefault(section, []).append((re.split(r"[$!]", plain)[0].strip(), number))
             continue
         key, value = match[1].upper(), match[2].strip().strip("'\"").strip()

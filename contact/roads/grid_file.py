@@ -28,7 +28,16 @@ from tireroad.contact.roads.grid import (
     check_count,
 )
 from tireroad.contact.roads.grid_text import Found, Keys, read_csv
-from tireroad.contact.roads.meaning import UNITS, Column, ReadAs, Stated, unit_of
+from tireroad.contact.roads.meaning import (
+    UNITS,
+    Column,
+    ReadAs,
+    Stated,
+    counts_down,
+    downwards_note,
+    mentions_unit,
+    unit_of,
+)
 from tireroad.contact.roads.missing import CodeSearch, refused
 from tireroad.fem.errors import InputError
 
@@ -165,7 +174,11 @@ def read_numbers(archive: zipfile.ZipFile, name: str, most: int) -> Array:
     return numbers.reshape(header.shape, order="F" if header.by_columns else "C").astype(float)
 
 
-_UNIT_NAME = re.compile(r"(?:(x|y|z|lengths?|heights?)[_ ]?)?units?", re.IGNORECASE)
+_WHOSE = r"(x|y|z|lengths?|heights?)"
+_UNIT_NAME = re.compile(
+    rf"(?:{_WHOSE}[_ -]?)?(?:units?|uom)(?:[_ -](?:of[_ ])?{_WHOSE})?|.*(?:unit|\buom).*",
+    re.IGNORECASE,
+)
 _MISSING_NAMES = (
     "_fillvalue",
     "fill_value",
@@ -176,7 +189,24 @@ _MISSING_NAMES = (
     "no_data",
     "nodata_value",
 )
-_FACTORS = re.compile(r"scale|scaling|factor|gain|multiplier|slope", re.IGNORECASE)
+_FACTORS = re.compile(
+    r"scale|scaling|factor|gain|multiplier|slope|\blsb|conversion|quant(?:um|isation|ization)",
+    re.IGNORECASE,
+)
+_OFFSETS = re.compile(r"offset|intercept|\bbias|shift", re.IGNORECASE)
+_MASKS = "mask", "z_mask"
+_OTHER_MASKS = re.compile(r"mask|valid|nodata|no_data|missing|flag|quality", re.IGNORECASE)
+_TEXTS = (
+    "long_name",
+    "standard_name",
+    "description",
+    "comment",
+    "title",
+    "name",
+    "note",
+    "notes",
+    "positive",
+)
 
 
 @dataclass
@@ -186,6 +216,8 @@ class _Meaning:
     units: dict[str, tuple[str, str]] = field(default_factory=dict)
     codes: dict[str, dict[str, Any]] = field(default_factory=lambda: {name: {} for name in "xyz"})
     down: bool = False  # heights are positive downwards
+    texts: dict[str, tuple[str, str]] = field(default_factory=dict)  # that mention a unit
+    notes: list[str] = field(default_factory=list)
 
     def take(self, whose: str, name: str, value: Any, source: str) -> bool:
         """Take the attribute or entry `name` of the array `whose` ("" for all); False where it says nothing that is known."""
@@ -194,18 +226,15 @@ class _Meaning:
         where = f"{name} of {whose}" if whose else name
         if match := _UNIT_NAME.fullmatch(plain):
             text = _text_of(value)
-            roles = {"l": "xy", "h": "z"}.get((match[1] or "")[:1], match[1] or whose or "xyz")
+            named = (match[1] or match[2] or "").lower()
+            roles = {"l": "xy", "h": "z"}.get(named[:1], named or whose or "xyz")
             if text and text.strip():
                 for role in roles:
                     self.units.setdefault(role, (text, where))
             return True
         of = self.codes[whose or "z"]
         if numbers.dtype.kind not in "iuf" or not numbers.size:
-            down = (
-                plain == "positive" and (_text_of(value) or "").lower() == "down" and whose == "z"
-            )
-            self.down |= down
-            return down
+            return self._take_text(whose, plain, _text_of(value) or "", where, source)
         if plain in _MISSING_NAMES:
             of["missing"] = (*of.get("missing", ()), *(float(one) for one in numbers if one == one))
         elif plain == "scale_factor":
@@ -222,14 +251,45 @@ class _Meaning:
             raise InputError(
                 f"{source}: {where} = {numbers[0]:g} may be a factor, and is not known: apply it, or name it scale_factor"
             )
+        elif _OFFSETS.search(plain) and float(numbers[0]) != 0.0:
+            raise InputError(
+                f"{source}: {where} = {numbers[0]:g} may be added to heights, and is not known: apply it, or name it add_offset"
+            )
         else:
             return False
         return True
 
+    def _take_text(self, whose: str, name: str, text: str, where: str, source: str) -> bool:
+        """Take a text beside heights: their direction, and whether it mentions a unit. False where it says neither."""
+        if whose not in ("", "z") or name not in _TEXTS:
+            return False
+        if name == "positive":
+            if text.lower().strip() not in (
+                "up",
+                "upward",
+                "upwards",
+                "down",
+                "downward",
+                "downwards",
+            ):
+                raise InputError(f'{source}: {where} = "{text}" is neither up nor down')
+            self.down |= text.lower().strip().startswith("down")
+            return True
+        if counts_down(text):
+            raise InputError(
+                f'{source}: {where} = "{text}": heights that are counted downwards; say positive = "down" beside them, or write '
+                "them upwards"
+            )
+        self.notes += downwards_note(text)
+        if mentions_unit(text):
+            self.texts.setdefault("z", (text, where))
+        return mentions_unit(text)
+
     def column(self, role: str) -> Column:
         """The unit of x, y or z."""
-        text, where = self.units.get(role, ("", ""))
-        unit = unit_of(text)
+        text, where = self.units.get(role) or self.texts.get(role, ("", ""))
+        text = re.sub(r"^\s*[\[(](.*)[\])]\s*$", r"\1", text)
+        unit = unit_of(text) if role in self.units else None
         return Column(unit=unit, unclear="" if unit else text.strip(), said=where)
 
     def coding(self, role: str) -> Coding:
@@ -268,6 +328,7 @@ def _found(
             *notes,
             f"heights are {coding.scale:g} times the numbers of the file, plus {coding.offset:g}",
         )
+    notes = (*notes, *meaning.notes)
     if rows.shape[0] == rows.shape[1]:
         notes = (*notes, "z is square: its rows are taken along x, its columns along y")
     return Found(x, y, rows, scales, coding, ("x", "y", "z"), notes, mask)
@@ -294,12 +355,16 @@ def read_npz(file: Path, keys: Keys) -> Found:
             for name in members:
                 if name in names.values():
                     continue
-                if name.lower() in ("mask", "z_mask"):
+                if name.lower() in _MASKS:
                     mask = _mask(archive, name, rows.shape, source)
+                elif _OTHER_MASKS.search(name) and _shape(archive, name) == rows.shape:
+                    raise _unread_mask(name, source)
                 elif not (value := _beside(archive, name)) or not meaning.take(
                     "", name, value[0], source
                 ):
                     unused.append(name)
+        except InputError:
+            raise
         except (ValueError, TypeError) as error:
             raise InputError(f"{source}: x, y and z must hold numbers ({error})") from error
     notes = (f"not used of the file: {', '.join(unused)}",) if unused else ()
@@ -328,6 +393,19 @@ def _beside(archive: zipfile.ZipFile, name: str) -> tuple[Any] | None:
             return (np.lib.format.read_array(stream, allow_pickle=False),)
     except (KeyError, ValueError):
         return None
+
+
+def _unread_mask(name: str, source: str) -> InputError:
+    return InputError(
+        f"{source}: {name} may say where heights are missing: name it mask, true where there is none, or leave it out"
+    )
+
+
+def _shape(archive: zipfile.ZipFile, name: str) -> tuple[int, ...]:
+    with archive.open(f"{name}.npy") as stream:
+        version = np.lib.format.read_magic(stream)
+        read = np.lib.format.read_array_header_1_0
+        return (read if version == (1, 0) else np.lib.format.read_array_header_2_0)(stream)[0]
 
 
 def _mask(archive: zipfile.ZipFile, name: str, shape: tuple[int, int], source: str) -> Rows:
@@ -440,8 +518,13 @@ def read_hdf5(file: Path, keys: Keys) -> Found:
     meaning = _Meaning()
     for role, dataset in datasets.items():
         _check(file, role, dataset)
-        for name, value in dataset.attrs.items():
-            meaning.take(role, name, value, source)
+        unused = [
+            name
+            for name, value in dataset.attrs.items()
+            if not meaning.take(role, name, value, source)
+            and role == "z"
+            and np.asarray(value).dtype.kind in "iuf"
+        ]
     for name, value in store.attrs.items():
         meaning.take("", name, value, source)
     z = datasets["z"]
@@ -452,7 +535,14 @@ def read_hdf5(file: Path, keys: Keys) -> Found:
     except (ValueError, TypeError) as error:
         raise InputError(f"{source}: x, y and z must hold numbers ({error})") from error
     turned, notes = _turned(z, (len(x), len(y)))
-    other = store.get("mask") if isinstance(store.get("mask"), h5py.Dataset) else None
+    if unused:
+        notes = (*notes, f"not used of z: {', '.join(unused)}")
+    other = None
+    for name in store:
+        if name.lower() in _MASKS and isinstance(store.get(name), h5py.Dataset):
+            other = store[name]
+        elif _OTHER_MASKS.search(name) and getattr(store.get(name), "shape", None) == z.shape:
+            raise _unread_mask(name, source)
     if other is not None and (other.shape != z.shape or other.dtype.kind not in "biu"):
         raise InputError(f"{source}: mask is {other.dtype} of shape {other.shape}, z has {z.shape}")
     mask = None if other is None else Hdf5Rows(other, turned)
@@ -494,6 +584,8 @@ def read_netcdf(file: Path, keys: Keys) -> Found:
                 for key, value in variable._attributes.items():
                     meaning.take(role, key, value, source)
             turned = [name.lower() for name in store.variables[names["z"]].dimensions] == ["y", "x"]
+    except InputError:
+        raise
     except (ValueError, TypeError, IndexError, AssertionError) as error:
         raise InputError(f"{source}: cannot be read ({error}); is it complete?") from error
     if arrays["z"].ndim != 2 or arrays["x"].ndim != 1 or arrays["y"].ndim != 1:
@@ -591,6 +683,12 @@ def _grid(
                 f"{source}: a unit stands beside others, {other.text}, and not beside {name}: say road.{key}"
             )
     height = up or (along and replace(along, text=f"{along.text}, as x"))
+    for name, axis, scale in (("x", found.x, along), ("y", found.y, across)):
+        if scale is None and counted(axis):
+            raise InputError(
+                f"{source}: {name} is {axis[0]:g}, {axis[1]:g}, {axis[2]:g}, … {axis[-1]:g}, which may count the heights: if it "
+                'is a length, say road.length_unit = "m" or "mm"; otherwise write the positions in its place'
+            )
     lengths = [scale.metres if scale else 1.0 for scale in (along, across)]
     metre = height.metres if height else 1.0
     coding = replace(found.coding, unit=metre, missing=_all_missing(found.coding, missing))
@@ -636,6 +734,12 @@ def _grid(
         *([f"{' and '.join(unsaid)} in {ASSUMED}: assumed"] if unsaid else []),
     )
     return grid
+
+
+def counted(axis: Array) -> bool:
+    """Whether positions are 0, 1, 2, … or 1, 2, 3, …, at least five of them."""
+    steps = np.diff(axis)
+    return len(axis) >= 5 and axis[0] in (0.0, 1.0) and bool((steps == 1.0).all())
 
 
 def _all_missing(coding: Coding, missing: tuple[float, ...] | None) -> tuple[float, ...]:

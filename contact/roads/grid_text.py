@@ -20,6 +20,7 @@ from tireroad.contact.roads.meaning import (
     Stated,
     check_late,
     column_of,
+    downwards_note,
     layout_of,
     role_of,
     scale_of,
@@ -156,9 +157,12 @@ def _list(file: Path, head: list[Line], lines: Iterator[Line], layout: Layout, k
     x, y, z = _points(file, np.concatenate(blocks))
     columns = [layout.columns[k] for k in at]
     scales = keys.scales(columns, layout.stated, source)
-    _check_counts(file, (x, y), scales, layout, source)
     x_at, y_at, z_at = (f'column {k + 1} "{layout.columns[k].title}"' for k in at)
-    notes = () if layout.headed else ("three columns without headings: x, y, height assumed",)
+    notes = (
+        tuple(downwards_note(columns[2].title))
+        if layout.headed
+        else ("three columns without headings: x, y, height assumed",)
+    )
     return Found(
         x,
         y,
@@ -174,27 +178,6 @@ def _list(file: Path, head: list[Line], lines: Iterator[Line], layout: Layout, k
 
 def _forms(layout: Layout, notes: tuple[str, ...]) -> tuple[str, ...]:
     return (*notes, "decimal commas") if layout.form.comma else notes
-
-
-def _check_counts(
-    file: Path,
-    axes: tuple[Array, Array],
-    scales: tuple[Scale | None, ...],
-    layout: Layout,
-    source: str,
-) -> None:
-    """InputError for positions 0, 1, 2, … in no unit: they count the heights."""
-    for name, axis, scale in zip("xy", axes, scales, strict=False):
-        counts = (
-            len(axis) >= 5
-            and axis[0] in (0.0, 1.0)
-            and np.array_equal(np.diff(axis), np.ones(len(axis) - 1))
-        )
-        if counts and scale is None:
-            raise InputError(
-                f"{source}: {name} is {axis[0]:g}, {axis[1]:g}, {axis[2]:g}, … {axis[-1]:g}, which may count the heights: if it "
-                'is a length, say road.length_unit = "m" or "mm"; otherwise write the positions in its place'
-            )
 
 
 def _matrix(
@@ -217,7 +200,6 @@ def _matrix(
     x = np.concatenate(positions)
     titles = _corner(corner, keys, layout.stated, source)
     scales = keys.scales(titles, layout.stated, source)
-    _check_counts(file, (x, axis), scales, layout, source)
     return Found(
         x,
         axis,
@@ -275,6 +257,20 @@ def _across(
 def _corner(text: str, keys: Keys, stated: Stated, source: str) -> tuple[Column, Column, Column]:
     """x, y and z by the corner of a matrix: x [mm], x/y [m], ... InputError for a unit of which it does not say whose it is."""
     one = column_of(text)
+    named = [
+        role
+        for word in re.findall(r"[^\W\d_]+", text)
+        if (role := role_of(word)) in ("x", "y", "time")
+    ]
+    if named[:1] == ["y"] or _ACROSS.search(text):
+        raise InputError(
+            f'{source}: by the corner "{text}" the first column is y: it must hold x, the first line y; transpose the matrix, or '
+            "write x/y"
+        )
+    if one.role == "time" or named[:1] == ["time"]:
+        raise InputError(
+            f'{source}: by the corner "{text}" the first column is a time: it must hold x'
+        )
     bracketed = bool(_BRACKETS.search(text))
     words = re.findall(r"[^\W\d_]+", text)
     odd = [
@@ -307,6 +303,7 @@ def _corner(text: str, keys: Keys, stated: Stated, source: str) -> tuple[Column,
 _PLAIN = re.compile(
     r"grid|data|matrix|table|road|corner|nan|na|rows?|columns?|and|by|over|down", re.I
 )
+_ACROSS = re.compile(r"\bx\b[^a-z]*(?:[-=]+>|→|across|columns?\b)", re.I)
 _BRACKETS = re.compile(r"[\[({<][^\])}>]*[\])}>]")
 _SAME = 1e-3  # of a usual step: positions that close are one
 

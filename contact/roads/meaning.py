@@ -43,10 +43,23 @@ _OTHERS = {
     "m/km", "mm/m", "in/mi", "m2", "m²", "mm2", "mm²", "m3",
 }  # fmt: skip
 _PER = re.compile(
-    r"(?:(?P<number>\d+(?:[.,]\d+)?(?:e[-+]?\d+)?)(?:\s*/\s*(?P<by>\d+))?|10\s*(?:\^|\*\*)\s*\(?(?P<power>[-+]?\d+)\)?)"
-    r"\s*[*x×·]?\s*(?P<word>\D.*)",
+    r"(?:[*x×·]\s*)?(?:10\s*(?:\^|\*\*)\s*\(?(?P<power>[-+]?\d+)\)?|"
+    r"(?P<number>\d+(?:[.,]\d+)?(?:e[-+]?\d+)?)(?:\s*/\s*(?P<by>\d+))?)"
+    r"\s*[*x×·]?\s*(?P<word>[^\W\d].*|''|\")",
     re.IGNORECASE,
 )
+_PARTS = {"tenth": "0.1", "zehntel": "0.1", "hundredth": "0.01", "hundertstel": "0.01", "thousandth": "0.001",
+          "tausendstel": "0.001"}  # fmt: skip
+_PART = re.compile(rf"({'|'.join(_PARTS)})s?(?:\s+of)?(?:\s+an?)?\s+(?=\w)")
+_RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺", "0123456789-+")
+_POWER = re.compile(r"10\s*([⁻⁺]?[⁰¹²³⁴-⁹]+)")
+
+
+def _plain(text: str) -> str:
+    """A text with µ as the Greek letter, 10⁻⁶ as 10^-6, and tenths and the like as numbers; lower case."""
+    plain = _POWER.sub(lambda match: f"10^{match[1].translate(_RAISED)}", text).replace("µ", "μ")
+    plain = re.sub(r"\b(milli|micro|centi|deci|nano|kilo)[ -](?=met)", r"\1", plain.lower())
+    return _PART.sub(lambda match: f"{_PARTS[match[1]]} ", plain)
 
 
 @dataclass(frozen=True)
@@ -59,9 +72,9 @@ class Unit:
 
 
 def unit_of(text: str) -> Unit | None:
-    """The unit that a text is, also with a factor (0.1 mm, 1/10 mm, 10^-3 m); None where it is none."""
+    """The unit that a text is, also with a factor (0.1 mm, 1/10 mm, 10^-3 m, tenths of mm); None where it is none."""
     shown = text.strip().strip(".").strip()
-    word = " ".join(shown.replace("µ", "μ").lower().split())
+    word = " ".join(_plain(shown).split())
     if word in _LENGTHS:
         return Unit(shown, _LENGTHS[word])
     if word in _TIMES:
@@ -86,8 +99,9 @@ _ROLES: tuple[tuple[str, str], ...] = (
     (
         "count",
         r"|#|index|idx|no|nr|n|num|number|nummer|samples?|sample[ _-]?(?:no|nr|number|index|id)|points?|point[ _-]?(?:no|nr|"
-        r"number|id)|pts?|punkt|id|fid|rows?|lines?|zeile|count(?:er)?|i|k|lfd|lfd\.? ?nr|record|scan|frame|unnamed: \d+"
-        r"|messpunkt|pkt",
+        r"number|id)|pts?|punkt|id|fid|oid|rows?|lines?|zeile|count(?:er)?|i|j|k|lfd|lfd\.? ?nr|record|scan|frame|unnamed: \d+"
+        r"|messpunkt|pkt|(?:sample|point|record|row|scan|line|data ?point|messung|punkt|zeilen|seq)[ _.-]*(?:#|no|nr|n°|number|nummer)"
+        r"|n°|num[ée]ro|seq(?:uence)?|observation|entry|data ?points?|messung|z[äa]hler|pulses?|ticks?|trigger|encoder|row ?names",
     ),
     (
         "time",
@@ -99,7 +113,8 @@ _ROLES: tuple[tuple[str, str], ...] = (
     (
         "x",
         r"(?:dist|pos|abstand|weg|station|chain|stre[ck]|l[aä]ng|laeng|length|longitud|absci|absz|along|travel|afstand|"
-        r"avst|long\b|lange\b|fahrtr|posi|u$|progressiv).*",
+        r"avst|long\b|longpos|lange\b|fahrtr|posi|u$|s$|d$|l$|progressiv|rolling|absc|pk$|kilometr|coord|entf|running|arc).*|x\d+"
+        r"|.*[ _](?:distance|position|length|entfernung)",
     ),
     ("y", r"(?:lateral|width|across|transv|quer|breit|breed|larg|anch|v$).*"),
     (
@@ -110,7 +125,8 @@ _ROLES: tuple[tuple[str, str], ...] = (
     (
         "other",
         r".*(?:force|kraft|speed|veloc|geschw|temper|accel|angle|winkel|mpd|iri\b|lat$|lon$|latit|gps|press|druck|qualit|"
-        r"intens|valid|flag|status|snr|weight|error|std|sigma|comment|remark|easting|northing).*",
+        r"intens|valid|flag|status|snr|weight|error|std|sigma|comment|remark|easting|northing|\brms\b|\b[esm]m?td\b|slope|"
+        r"gradient|curvature|cross ?fall).*",
     ),
 )
 _MATCHES = tuple((role, re.compile(pattern, re.IGNORECASE)) for role, pattern in _ROLES)
@@ -123,6 +139,37 @@ _BRACKETED = re.compile(r"[\[({<]([^\])}>]*)[\])}>]")
 _PARTED = re.compile(r"\s+in\s+|\s*[,/_:;|-]\s*|\s+")
 _JOINED = re.compile(r"^(x|y|z|height|depth|dist|distance|elevation|h)(mm|cm|dm|um|μm)$", re.I)
 _CAMEL = re.compile(r"^(.*[a-z])(MM|Mm|CM|Cm|DM|Dm|UM|Um|μm)$")
+
+
+# What in a heading multiplies its numbers; a heading of which the last word is half a unit: z_e-3 m.
+_TIMES_IN = re.compile(
+    r"(?<=\w)\s*[×*·]\s*\d|\s+x\s*10+\b|^[x×*]\s*(?:\d\.|10)|\d\s*[×*]|10\s*(?:\^|\*\*)|[*/]\s*10+\b"
+)
+_HALF = re.compile(
+    r"(?:[-+^]\s*\d+|(?:\b|_)e[-+]?\d+|(?:\b|_)(?:milli|micro|centi|deci|nano|kilo)|(?:\b|_)(?:tenth|hundredth|thousandth)s?(?:\s+of)?(?:\s+an?)?"
+    r"|(?:\b|_)(?:per|times)|[*×])$"
+)
+# Heights counted downwards, or distances from a sensor above.
+_DOWN = re.compile(
+    r"\b(?:positiv\w*|point(?:s|ing)|axis|measured|count(?:s|ed)|increas\w*|direction)\b.{0,24}\b(?:down(?:wards?)?|nach unten)\b"
+    r"|\b(?:down(?:wards?)?|nach unten)\b.{0,16}\bpositiv|\b(?:z|heights?|depths?|profile|sign|data|values|y)\b.{0,12}\b"
+    r"(?:inverted|upside[ -]?down|reversed|flipped|invertiert|negated)|\b(?:z|heights?|depths?)[ _-]?down\b|[(\[{]down(?:wards?)?[)\]}]"
+    r"|\b(?:distance|range|abstand)\s+(?:to|from|between|zu[mr]?|von|vom)\b.*\b(?:surface|road|pavement|sensor|laser|oberfl\w+)"
+    r"|\b(?:sensor|laser)[ _-]?(?:distance|range|abstand)\b|\bstand[ -]?off\b|\bclearance\b",
+    re.IGNORECASE,
+)
+_DOWN_FROM = re.compile(r"\b(?:depths?|height|distance)\b.*\bbelow\b", re.IGNORECASE)
+_DEEP = re.compile(r"\b(?:depth|tiefe|prof(?:ondeur|undidad|undit))|(?:^|_)depth", re.IGNORECASE)
+
+
+def counts_down(text: str) -> bool:
+    """Whether a text says that heights are counted downwards, or are distances from a sensor above."""
+    return bool(_DOWN.search(text) or _DOWN_FROM.search(text))
+
+
+def downwards_note(title: str) -> list[str]:
+    """A note where a heading may mean that heights are counted downwards."""
+    return [f'heights under "{title}" are taken upwards: assumed'] if _DEEP.search(title) else []
 
 
 def role_of(name: str) -> str:
@@ -166,6 +213,9 @@ def column_of(title: str, where: str = "") -> Column:
     role = role_of(name)
     if len({unit.metres for unit in units}) > 1:
         units, odd = [], [", ".join(unit.text for unit in units)]
+    beside = (name, *(text for text in inside if not unit_of(text)))
+    if units and any(_TIMES_IN.search(_plain(text)) for text in beside):  # Height x 10 [mm]
+        units, odd = [], [shown]
     unit = units[0] if units else None
     if unit is not None and unit.time and role in ("", "x", "y"):
         role = "time"
@@ -186,8 +236,8 @@ def _without_unit(plain: str) -> tuple[str, list[Unit], list[str]]:
             continue
         # x_s and n h are names, x, s is a time; Profile 10 mm may be the tenth, in 0.1 mm is a unit.
         if unit and (unit.metres or sign in (",", "/", ":", ";", "|")):
-            if not sign and re.match(r"\d+\s*[a-zμ]", tail):
-                return name, [], [tail]
+            if (not sign and re.match(r"\d+\s*[a-zμ]", tail)) or _HALF.search(_plain(name)):
+                return name, [], [tail if not sign else plain]
             return name, [unit], []
         strange = sign in (",", "/", "|", "in") and not unit and not _HARMLESS.fullmatch(tail)
         if strange and not odd and role_of(name) in ("x", "y", "z"):
@@ -198,7 +248,8 @@ def _without_unit(plain: str) -> tuple[str, list[Unit], list[str]]:
 @dataclass(frozen=True)
 class Stated:
     """What the lines before the numbers state: units by role ("" for all), `missing` values, the distance `pitch` m between
-    heights; `unclear`, `unclear_pitch`: a line that states a unit or factor, or a distance, which is not understood.
+    heights; `unclear`, `unclear_pitch`: a line that states a unit or factor, or a distance, which is not understood; `down`: a
+    line by which heights are counted downwards.
     """
 
     units: dict[str, tuple[Unit, str]] = field(default_factory=dict)
@@ -206,6 +257,7 @@ class Stated:
     pitch: tuple[float, str] | None = None
     unclear: str = ""
     unclear_pitch: str = ""
+    down: str = ""
 
 
 @dataclass(frozen=True)
@@ -246,17 +298,29 @@ def layout_of(head: Sequence[Line], source: str, fewest: int = 3) -> Layout | No
     before = tuple(line for line in head if line.number < first.number)
     width = len(form.fields(first.text))
     columns, used = _headings(before, form, width)
+    across = next((one.number for one in reversed(before) if _is_axis(one, form, width)), None)
+    rest = [line for line in before if line.number not in {*used, across}]
     if (
         not any(one.headed for one in columns)
         and width > 1
-        and (odd := next((one for one in before if _names_columns(one)), None))
+        and (odd := next((one for one in rest if _names_columns(one)), None))
     ):
         raise InputError(
             f"{source}, line {odd.number}: {odd.text[:60]!r} may name the columns, and cannot be parted into {width} names: "
             "separate them as the numbers are"
         )
-    stated = _stated([line for line in before if line.number not in used], columns, width, used)
+    stated = _stated(rest, columns, width, used)
     return Layout(form, first.number, width, columns, stated, before)
+
+
+def _is_axis(line: Line, form: Form, width: int) -> bool:
+    """Whether a line is the first of a matrix: a corner, also behind an index, and then ascending positions."""
+    fields = form.fields(line.text)
+    if line.comment or len(fields) != width or width < 3:
+        return False
+    values = [form.number(text) for text in fields[1 + (form.number(fields[1]) is None) :]]
+    found = [value for value in values if value is not None]
+    return len(found) == len(values) > 1 and bool(np.all(np.diff(found) > 0))
 
 
 def _splits(text: str, form: Form, width: int) -> Iterator[list[str]]:
@@ -424,6 +488,14 @@ _STEP = re.compile(
 )
 
 
+_MULTIPLIED = re.compile(
+    rf"\b(?:multipl(?:y|ied)|divided?|multipliziert|dividiert)\b(?:\s+\w+){{0,3}}?\s+(?:by|with|mit|durch)\s+(?P<value>{_NUMERIC})"
+    rf"|(?P<count>\b(?:1\s+)?(?:lsb|digits?|counts?|bit|ticks?|increment))\s*[:=]\s*{_NUMERIC}\s*(?P<unit>[^\W\d]+)"
+    rf"|\b(?:values?|heights?|numbers?|data|raw|counts?|[xyz])\s*[*×]\s*(?P<factor>{_NUMERIC})",
+    re.I,
+)
+
+
 def _names_columns(line: Line) -> bool:
     """Whether the words of a line that is no headings name two columns or more."""
     words = re.findall(r"[^\W\d_]+", line.text)
@@ -442,8 +514,9 @@ def _stated(
     units: dict[str, tuple[Unit, str]] = {}
     missing: list[float] = []
     pitch: tuple[float, str] | None = None
-    unclear = unclear_pitch = ""
+    unclear = unclear_pitch = down = ""
     spoken = any(column.unit or column.unclear for column in columns)
+    heard = {column.unit.metres for column in columns if column.unit and column.unit.metres}
 
     def state(role: str, unit: Unit, line: Line) -> None:
         nonlocal unclear
@@ -465,18 +538,32 @@ def _stated(
             elif found is None:
                 unclear_pitch = unclear_pitch or f"line {line.number}: {text[:60]!r}"
             continue
-        if match := _SCALE.search(text):
-            if float(match["value"].replace(",", ".")) != 1.0:
+        if (factor := _factor_in(text)) is not None:
+            if factor != 1.0:
                 unclear = unclear or f"line {line.number}: {text[:60]!r}"
+            continue
+        if counts_down(text):
+            down = down or f"line {line.number}: {text[:60]!r}"
+        if pairs := _pairs(text):
+            for role, unit in pairs:
+                state(role, unit, line)
             continue
         if _UNIT_WORD.search(text):
             parsed = _units_in(text, width)
-            if not parsed:
+            if not parsed or (
+                heard and any(not role and one.metres not in heard for role, one in parsed)
+            ):
                 unclear = unclear or f"line {line.number}: {text[:60]!r}"
             for role, unit in parsed:
                 state(role, unit, line)
             continue
         found_in = list(_IN.finditer(text))
+        others = _lengths_in(text) - heard
+        others -= {
+            one.metres for match in found_in if (one := unit_of(match["unit"])) and one.metres
+        }
+        if others and (found_in or spoken and _mentions_unit(text)):
+            unclear = unclear or f"line {line.number}: {text[:60]!r}"
         below = bool(used) and line.number > max(used) and not found_in  # where units stand
         if not spoken and not found_in and (below or _mentions_unit(text)):
             unclear = unclear or f"line {line.number}: {text[:60]!r}"
@@ -487,15 +574,64 @@ def _stated(
                 unclear = unclear or f"line {line.number}: {text[:60]!r}"
             if one is None or one.metres is None or role in ("count", "time", "other"):
                 continue
-            state(role if role in ("x", "y", "z") else "", one, line)
-    return Stated(units, tuple(missing), pitch, unclear, unclear_pitch)
+            role = role if role in ("x", "y", "z") else ""
+            if not role and heard and one.metres not in heard:
+                unclear = unclear or f"line {line.number}: {text[:60]!r}"
+            state(role, one, line)
+    return Stated(units, tuple(missing), pitch, unclear, unclear_pitch, down)
+
+
+def _factor_in(text: str) -> float | None:
+    """The factor that a line states; nan for the size of a count (LSB = 0.1 um), None where it states none."""
+    if match := _SCALE.search(text):
+        return float(match["value"].replace(",", "."))
+    match = _MULTIPLIED.search(text)
+    if match is None:
+        return None
+    if match["count"]:  # Count: 200 is none
+        unit = unit_of(match["unit"])
+        return np.nan if unit and unit.metres else None
+    return float((match["value"] or match["factor"]).replace(",", "."))
+
+
+def _pairs(text: str) -> list[tuple[str, Unit]]:
+    """(role, unit) of a line that is nothing but these: z: um; x [mm], z [um]; vertical / um."""
+    found = []
+    for part in re.split(r"[,;\t]\s*|\s+(?=[xyz]\b)", text.strip()):
+        one = column_of(
+            re.sub(r"[:=]", " ", re.sub(r"^\W*(?:col(?:umn)?s?\s*\d*\s*[:=.])?", "", part))
+        )
+        if (
+            one.unit is None
+            or not one.unit.metres
+            or re.search(r"\d|unit", one.name + one.unit.text)
+        ):
+            return []  # Length: 1 m
+        found.append((_UPRIGHT.get(one.name.lower(), one.role), one.unit))
+    return found if all(role in ("x", "y", "z") for role, _ in found) else []
+
+
+_UPRIGHT = {"vertical": "z", "longitudinal": "x", "lateral": "y", "transverse": "y"}
+_OF_ALL = re.compile(
+    r"\W*(?:(?:all|the|data|measur\w*|si|coordinates?|values?|grid|table|file|column|numbers?|mess\w*|maß|default|base|its|of|in)"
+    r"[ _-]*)*",
+    re.I,
+)
+
+
+def mentions_unit(text: str) -> bool:
+    """Whether a text about heights mentions a unit of length: height in mm, z [mm]."""
+    units = [unit_of(match["unit"]) for match in _IN.finditer(text)]
+    return _mentions_unit(text) or any(unit and unit.metres for unit in units)
 
 
 def _mentions_unit(text: str) -> bool:
     """Whether a line has a unit of length in it that could be a column's: in brackets, or a word such as mm."""
     words = re.findall(r"[^\W\d_]+", text.replace("µ", "μ"))
     roles = {role_of(word) for word in words} & {"x", "y", "z"}
-    if len(roles) > 1 or (words and all(unit_of(word) for word in words)):
+    if words and all((unit := unit_of(word)) and unit.metres for word in words):
+        return True
+    if len(roles) > 1:
         return _has_unit(text)
     if re.search(r"[:=]\s*[-+]?\d", text) or re.search(r"\d\s*(?:mm|cm|dm|[uμµ]m|m)\b", text):
         return False  # Lane width: 3.5 m
@@ -503,9 +639,17 @@ def _mentions_unit(text: str) -> bool:
 
 
 def _has_unit(text: str) -> bool:
+    return bool(_lengths_in(text))
+
+
+def _lengths_in(text: str) -> set[float]:
+    """Metres of the units of length that stand in a line: in brackets, or a word such as mm."""
     words = re.findall(r"[^\W\d_]+", text.replace("µ", "μ").lower())
-    inside = any((unit := unit_of(part)) and unit.metres for part in _BRACKETED.findall(text))
-    return inside or any(word in _LENGTHS and len(word) > 1 and word != "in" for word in words)
+    inside = [unit.metres for part in _BRACKETED.findall(text) if (unit := unit_of(part))]
+    plain = [
+        _LENGTHS[word] for word in words if word in _LENGTHS and len(word) > 1 and word != "in"
+    ]
+    return {metres for metres in (*inside, *plain) if metres}
 
 
 def _code_in(text: str) -> float | None:
@@ -531,10 +675,16 @@ def _units_in(text: str, width: int) -> list[tuple[str, Unit]]:
         r"^\s*(?:are|is|in|of(?= \w+ (?:is|are)))?\s*[:=;,\t]?\s*", "", text[match.end() :]
     )
     rest = rest.strip(" ;,\t\"'")
-    whose = role_of(re.sub(r"[_\s-]+$", "", who)) if who else ""
-    whose = whose if whose in ("x", "y", "z") else ""
-    if re.fullmatch(r"(?:.*[ _-])?lengths?", who, re.I) and (unit := unit_of(rest)):
+    who = re.sub(r"[_\s-]+$", "", who)
+    whose = _UPRIGHT.get(who.lower(), role_of(who)) if who else ""
+    if re.fullmatch(r"(?:.*[ _-])?lengths?|horizontal|x/?y|xy", who, re.I) and (
+        unit := unit_of(rest)
+    ):
         return [("x", unit), ("y", unit)]
+    if whose not in ("x", "y", "z"):
+        if who and not _OF_ALL.fullmatch(who):
+            return []  # Intensity unit: mm
+        whose = ""
     bare = re.sub(r"^[\[({<]|[\])}>]$", "", rest).strip()
     if unit := unit_of(bare):
         return [(whose, unit)]
@@ -565,13 +715,13 @@ def _units_in(text: str, width: int) -> list[tuple[str, Unit]]:
 
 
 def late_statement(line: Line) -> bool:
-    """Whether a comment among or below the numbers states a unit, a factor or a missing value."""
+    """Whether a comment among or below the numbers states a unit, a factor, a direction or a missing value."""
     text = line.text
     if _code_in(text) is not None or _UNIT_WORD.search(text):
         return True
     if any((unit := unit_of(match["unit"])) and unit.metres for match in _IN.finditer(text)):
         return True
-    if (match := _SCALE.search(text)) and float(match["value"].replace(",", ".")) != 1.0:
+    if _factor_in(text) not in (None, 1.0) or counts_down(text):
         return True
     return any((unit := unit_of(inside)) and unit.metres for inside in _BRACKETED.findall(text))
 
@@ -617,6 +767,11 @@ def scale_of(
         raise InputError(
             f"{source}: {what} are in {column.unclear} by the lines above the numbers: say {name}"
         )
+    if role == "z" and (down := column.title if counts_down(column.title) else stated.down):
+        raise InputError(
+            f"{source}, {down}: heights that are counted downwards, or distances from a sensor; a road has heights upwards: "
+            "write them so, with that changed"
+        )
     unit, said = column.unit, column.said
     for other in (role, ""):
         if other not in stated.units:
@@ -624,7 +779,7 @@ def scale_of(
         theirs, where = stated.units[other]
         if unit is None:
             unit, said = theirs, where
-        elif unit.metres != theirs.metres and other == role:
+        elif unit.metres != theirs.metres and (other == role or not column.unit):
             raise InputError(
                 f"{source}: {what} are in {unit.text} by the {said}, and in {theirs.text} by {where}: which is right? "
                 "Correct the file"

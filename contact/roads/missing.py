@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 _FEWEST = 20  # known heights
 _SHARE = 0.3  # of the heights: a value more frequent than that is the ground
 _FAR = 0.3  # m from all other heights: no cleat, whatever the number
+_DEEPEST = 2.0  # m: no kerb, whatever part of the road lies there
 _GAP = 5.0  # largest spacings between the other heights
 _JUMP = 20.0  # usual differences of neighbours
 _RUNS = 3
@@ -33,6 +34,8 @@ def _usual_codes() -> Array:
     whole = {one * count for one in "12345678" for count in range(3, 7)}
     whole |= {"127", "128", "255", "256", "1000", "10000", "100000"}
     found = [float(one) for one in whole]
+    found += [float(one) / 10 for one in whole if len(set(one)) == 1]
+    found += [999.25, 9999.25]  # of well logs
     found += [float(f"{one}e-{k}") for one in scaled for k in range(5) if k < len(one)]
     return np.unique([0.0, -1.0, *found, *(-one for one in found)])
 
@@ -45,16 +48,17 @@ def special(values: Array | np.float64) -> NDArray[np.bool_]:
     return np.isin(values, _CODES) | (np.abs(values) >= _LARGE)
 
 
-def codes(z: Array, metre: float) -> list[float]:
+def codes(z: Array, metre: float, *, single: bool = False) -> list[float]:
     """Values among heights z (rows, n) in units of `metre` m, nan where missing, that mean there is none.
 
-    Neighbours are those along the second axis.
+    Neighbours are those along the second axis. `single`: whether one height alone, farther than any kerb, is one, too; in
+    a profile it is an outlier, which is bridged.
     """
     known = np.isfinite(z)
     values, counts = np.unique(z[known], return_counts=True)
     found: list[float] = []
     while counts.sum() >= _FEWEST and len(values) > 1:
-        more = _far(values, counts, metre)
+        more = _far(values, counts, metre, 0 if single else 1)
         if not more:
             break
         found += more
@@ -65,7 +69,7 @@ def codes(z: Array, metre: float) -> list[float]:
     return sorted(found)
 
 
-def _far(values: Array, counts: NDArray[np.intp], metre: float) -> list[float]:
+def _far(values: Array, counts: NDArray[np.intp], metre: float, spike: int) -> list[float]:
     """One or two of the lowest and of the highest values that lie apart from all others."""
     most = _SHARE * counts.sum()
     for low, high in ((1, 0), (0, 1), (1, 1), (2, 0), (0, 2), (2, 1), (1, 2), (2, 2)):
@@ -73,19 +77,30 @@ def _far(values: Array, counts: NDArray[np.intp], metre: float) -> list[float]:
         if len(rest) < 1:
             continue
         outer = [*range(low), *range(len(values) - high, len(values))]
-        if counts[outer].sum() > most:
-            continue
         gaps = [rest[0] - values[k] if k < low else values[k] - rest[-1] for k in outer]
+        if counts[outer].sum() > most and not _no_ground(values[outer], gaps, rest, metre):
+            continue
         if all(
-            _apart(values[k], int(counts[k]), gap, rest, metre)
+            _apart(values[k], int(counts[k]), gap, rest, metre, spike)
             for k, gap in zip(outer, gaps, strict=True)
         ):
             return [float(values[k]) for k in outer]
     return []
 
 
-def _apart(value: float, count: int, gap: float, rest: Array, metre: float) -> bool:
-    """Whether a value `gap` below or above the others (ascending) is none of them."""
+def _no_ground(values: Array, gaps: list[float], rest: Array, metre: float) -> bool:
+    """Whether values that many heights have are no road beside `rest`: numbers that programs use, and far away."""
+    spread = float(rest[-1] - rest[0])
+    if len(rest) < 3 or any(gap <= 3 * spread for gap in gaps):
+        return False
+    if all(gap * metre > _DEEPEST for gap in gaps):
+        return True
+    nines = len(rest) >= _FEWEST and bool((np.abs(values) >= 9).all())
+    return bool(special(values).all()) and (nines or all(gap * metre > _FAR for gap in gaps))
+
+
+def _apart(value: float, count: int, gap: float, rest: Array, metre: float, spike: int) -> bool:
+    """Whether a value `gap` below or above the others (ascending) is none of them; `spike` heights far away are outliers."""
     spread = float(rest[-1] - rest[0])
     if spread == 0:  # on an even plate
         return (
@@ -94,9 +109,9 @@ def _apart(value: float, count: int, gap: float, rest: Array, metre: float) -> b
             and abs(value) >= 99
         )
     if not special(np.float64(value)):
-        return gap * metre > _FAR and gap > 3 * spread and count > 1
+        return gap * metre > _FAR and gap > 3 * spread and count > spike
     if count == 1 and abs(value) < 99:
-        return False  # a single spike is an outlier
+        return count > spike and gap * metre > _FAR and gap > 3 * spread
     spacing = float(np.diff(rest).max())
     smallest = float(np.diff(rest).min())
     return gap > spread or (count > 2 and gap > _GAP * spacing and gap > 4 * _GAP * smallest)
@@ -186,7 +201,7 @@ class CodeSearch:
         most = max(_PIECE // max(len(y), 1), 2)
         for first in range(0, len(x), most):
             part = np.round(z[first : first + most] / self.metre, 9)  # as written
-            if found := codes(part, self.metre):
+            if found := codes(part, self.metre, single=True):
                 at = np.isin(part, found)
                 i, j = np.argwhere(at)[0]
                 where = f"at x = {x[first + i]:.6g} m, y = {y[j]:.4g} m"

@@ -427,7 +427,8 @@ def _refuse_blocks(file: Path, blocks: Blocks) -> list[str]:
     ):
         for key, value in key_values(file, blocks.get(block, [])).items():
             scale = key.startswith("SCALE_")
-            without_effect = key in (*SCALES, *OF_THE_LINE) or value == (1.0 if scale else 0.0)
+            applied = block == "ROAD_CRG_MODS" and key in (*SCALES, *OF_THE_LINE)
+            without_effect = applied or value == (1.0 if scale else 0.0)
             if not without_effect and key.startswith(BEYOND):
                 unused.append(f"{key} = {value:g}")
             elif not without_effect and not key.startswith(harmless):
@@ -447,6 +448,12 @@ def _definition(file: Path, blocks: Blocks) -> tuple[str, list[Channel]]:
             if code not in FORMATS:
                 known = ", ".join(FORMATS)
                 raise InputError(f"{file}, line {number}: format {code!r}, not one of {known}")
+        elif text.upper().startswith("U:"):
+            along = [*text[2:].split(","), ""][1].strip()
+            if along.strip("[]()").lower() not in ("", "m", "meter", "metre"):
+                raise InputError(
+                    f"{file}, line {number}: the reference line u is in {along!r}, not in m"
+                )
         elif text.upper().startswith("D:"):
             name, _, unit = text[2:].partition(",")
             channels.append((number, " ".join(name.lower().split()), unit.strip().lower()))

@@ -23,12 +23,14 @@ from tireroad.contact.roads.meaning import (
     ReadAs,
     Scale,
     check_late,
+    downwards_note,
     layout_of,
     scale_of,
 )
 from tireroad.contact.roads.missing import codes, refused
 from tireroad.contact.roads.text_table import (
     MISSING,
+    NUMBER,
     Decimals,
     Line,
     head_of,
@@ -89,7 +91,7 @@ def read_profile(path: Path, source: str, given: Given = Given()) -> Profile:
             if len(rows) >= _FEWEST and MISSING.fullmatch(last):
                 count = len(rows) + sum(1 for _ in lines)
                 raise InputError(f"{source}: none of the {count} heights is a number")
-            raise InputError(f"{source}: no {_FEWEST} rows of numbers: too few heights for a road")
+            raise InputError(f"{source}: {_no_rows(rows)}")
         data = check_late(
             chain((line for line in head if line.number >= layout.first), lines), source
         )
@@ -97,6 +99,21 @@ def read_profile(path: Path, source: str, given: Given = Given()) -> Profile:
     if len(table) < _FEWEST:
         raise InputError(f"{source}: only {len(table)} heights: too few for a road")
     return _profile(table, numbers, odd, layout, rows, given, source)
+
+
+def _no_rows(rows: Sequence[Line]) -> str:
+    """Why a text has no rows of numbers: its last line with a word that is none."""
+    few = f"no {_FEWEST} rows of numbers: too few heights for a road"
+    if len(rows) < _FEWEST:
+        return few
+    line = rows[-1]
+    odd = next(
+        (text for text in re.split(r"[;,\t|]", line.text) if not NUMBER.fullmatch(text.strip())),
+        line.text,
+    )
+    return (
+        f"{few}; line {line.number} is {line.text[:40]!r}, where {odd.strip()[:20]!r} is no number"
+    )
 
 
 def _table(
@@ -128,6 +145,7 @@ def _profile(
 ) -> Profile:
     """Columns, units and missing heights of a table."""
     at, z, notes = _columns(table, layout, given, source)
+    notes += downwards_note(layout.columns[z].title)
     stated = layout.stated
     height = scale_of("z", layout.columns[z], stated, ("height_unit", given.height_unit), source)
     length = None
@@ -234,9 +252,14 @@ def _stated_pitch(layout: Layout, given: Given, x: int | None, source: str) -> f
 
 def _is_count(values: Array) -> bool:
     """Whether a column counts its lines: 0, 1, 2, … or 1, 2, 3, …"""
+    return _consecutive(values) and values[0] in (0.0, 1.0)
+
+
+def _consecutive(values: Array) -> bool:
+    """Whether a column has consecutive whole numbers."""
     return bool(
         len(values) > 1
-        and values[0] in (0.0, 1.0)
+        and values[0] == round(values[0])
         and np.array_equal(np.diff(values), np.ones(len(values) - 1))
     )
 
@@ -293,8 +316,11 @@ def _by_headings(
     x, z, y = layout.of("x"), layout.of("z"), layout.of("y")
     if not z and len(y) == 1:
         z, y = y, []  # a plot of y over x
-    counts = [k for k in layout.of("count") if _is_count(table[:, k])]
+    counts = [k for k in layout.of("count") if _consecutive(table[:, k])]
     unknown = [k for k in range(width) if columns[k].role == ""]
+    if z and not x and width == 2:  # whatever it is called, it counts
+        counts += [k for k in unknown if _is_count(table[:, k]) and columns[k].unit is None]
+        unknown = [k for k in unknown if k not in counts]
     if width == 1:
         if columns[0].role in ("x", "time", "other"):
             raise InputError(f"{source}: the only column is {titles}: no heights")

@@ -148,6 +148,7 @@ def _utf8(file: IO[bytes], head: bytes, source: str) -> str:
     return "utf-8"
 
 
+_TYPED = {ord("\x1a"): None, ord("\ufeff"): None, ord("−"): "-", 0xA0: " ", 0x202F: " "}
 MAX_LINE = 16_000_000  # characters of a line: about a million heights across the road
 
 
@@ -162,7 +163,7 @@ def lines_of(stream: TextIO, source: str) -> Iterator[Line]:
                     f"{source}, line {number}: longer than {MAX_LINE:,} characters; write a line "
                     "for each x, or a list of points with the first line x,y,z"
                 )
-            text = line.replace("\x1a", "").replace("\ufeff", "").strip(" \r\n\f\v")
+            text = line.translate(_TYPED).strip(" \r\n\f\v")
             mark = next((mark for mark in COMMENTS if text.lstrip().startswith(mark)), None)
             # "#" alone over a column is a heading: #;x;z
             if mark == "#" and re.match(r"#\s*[;\t,]", text):
@@ -177,8 +178,10 @@ def lines_of(stream: TextIO, source: str) -> Iterator[Line]:
 
 
 def _bare(line: str) -> str:
-    """Without a comment at its end; `#` within a word is part of that."""
-    return re.sub(r"\s+(?:#|//).*$", "", line) if "#" in line or "//" in line else line
+    """Without a comment at its end; `#` within a word or at the end of a heading (Sample #, z) is part of that."""
+    if "#" not in line and "//" not in line:
+        return line
+    return re.sub(r"\s+(?:#(?!\s*(?:[;,\t|]|$))|//).*$", "", line)
 
 
 def quoted(text: str, separator: str) -> list[str]:

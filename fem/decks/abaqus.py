@@ -363,6 +363,7 @@ CONTACT DAMPING|FASTENER|CONNECTOR SECTION|CONNECTOR BEHAVIOR|BEAM SECTION|RELEA
 # Ignoring these would give a different tire.
 _REFUSED = {
     "NMAP": "nodes are read as they are given, moved by no map: write their places out",
+    "IMPERFECTION": "nodes are read as they are given, without imperfections: write their places out",
 }
 
 

@@ -203,11 +203,12 @@ def rubber(compound: DeckCompound, units: Units) -> Rubber:
         MATERIALS.make(law.model, **values)
     except InputError as error:
         raise place.error(f"material {compound.name}: {error}{_by_fit(law)}") from None
+    density = _density(parts, units, compound, notes)
     return Rubber(
         name=compound.name,
         model=law.model,
         coefficients=values,
-        density=_density(parts, units, compound),
+        density=density,
         dynamic=series.dynamic,
         loss_factor=series.loss,
         spectrum=series.spectrum,
@@ -242,13 +243,14 @@ def cord(compound: DeckCompound, units: Units) -> CordMaterial:
             modulus = 3 * _hyperelastic(parts, compound, []).shear
         _check_modulus(modulus * units.stress, units, place, compound.name)
         slack = 0.01 if "NO COMPRESSION" in parts else 1.0
-        return CordMaterial(modulus * units.stress, _density(parts, units, compound) or 0.0, slack)
+        density = _density(parts, units, compound, [])
+        return CordMaterial(modulus * units.stress, density or 0.0, slack)
     raise compound.place.error(f"material {compound.name} of cords has no *ELASTIC")
 
 
 def density_of(compound: DeckCompound, units: Units) -> float | None:
     """Density, kg/m3; None if it has none."""
-    return _density(_parts(compound), units, compound)
+    return _density(_parts(compound), units, compound, [])
 
 
 def _parts(compound: DeckCompound) -> dict:
@@ -402,10 +404,10 @@ def _slope(parts: dict, compound: DeckCompound) -> float:
     raise compound.place.error(f"material {compound.name} of cords has no *UNIAXIAL TEST DATA")
 
 
-def _density(parts: dict, units: Units, compound: DeckCompound) -> float | None:
+def _density(parts: dict, units: Units, compound: DeckCompound, notes: list[str]) -> float | None:
     if "DENSITY" not in parts:
         return None
-    _, numbers, place = _numbers(parts["DENSITY"], compound, [])
+    _, numbers, place = _numbers(parts["DENSITY"], compound, notes)
     density = numbers[0] * units.density if numbers else 0.0
     if not _DENSITY[0] <= density <= _DENSITY[1]:
         raise place.error(

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tireroad.contact.roads.kinds.iso8608 import CLASSES
 from tireroad.contact.roads.kinds.iso8608 import REFERENCE as PER_METRE
-from tireroad.contact.roads.meaning import layout_of
+from tireroad.contact.roads.meaning import ReadAs, layout_of
 from tireroad.contact.roads.road import ROADS
 from tireroad.contact.roads.text_table import head_of, lines_of, opened
 from tireroad.contact.roads.under_tire import REFERENCE, Texture, texture_of
@@ -288,6 +288,7 @@ def describe_road(path: Path, out: Path) -> str:
     lines = [
         f'{path}: a road of kind "{kind}"',
         f"  {length:.6g} m long every {1e3 * along:.4g} mm, {width:.4g} m wide every {1e3 * across:.4g} mm",
+        *(f"  {_reading(one)}" for one in road.readings),
         *(f"  {note}" for note in road.notes),
         f"  along its middle: heights from {1e3 * z.min():.4g} to {1e3 * z.max():.4g} mm, standard deviation {1e3 * z.std():.3g} mm",
     ]
@@ -310,6 +311,11 @@ def describe_road(path: Path, out: Path) -> str:
         lines.append(f"  not drawn: {out / 'road.png'}: {error.strerror}")
     table = ["[road]", f'kind = "{kind}"', f"file = {literal(str(path.resolve()))}", *more]
     return "\n".join([*lines, "", *table])
+
+
+def _reading(one: ReadAs) -> str:
+    """What was read of the file as what."""
+    return f"{one.quantity}: {one.place}, {one.unit}" + (f", {one.remark}" if one.remark else "")
 
 
 def _read(path: Path) -> tuple[str, Any, list[str]]:

@@ -165,16 +165,16 @@ class LaserFile(Levelled):
         from scipy.ndimage import gaussian_filter1d  # not needed to read a scene
 
         step = max(math.floor(self.shortest_wave / 4 / pitch), 1)
+        if len(profile) <= 15 * step:  # before the filter, which is as long as the shortest wave
+            raise InputError(
+                f"{source}: {len(profile) * pitch:.3g} m are too short a road for waves of "
+                f"{self.shortest_wave:g} m"
+            )
         if step > 1:
             profile = gaussian_filter1d(
                 profile, DEVIATION * self.shortest_wave / pitch, mode="nearest"
             )
             profile, pitch = profile[::step], pitch * step
-        if len(profile) < 16:
-            raise InputError(
-                f"{source}: {len(profile) * pitch:.3g} m are too short a road for waves of "
-                f"{self.shortest_wave:g} m"
-            )
         return profile, pitch
 
     def _check_size(self, count: int, pitch: float) -> None:

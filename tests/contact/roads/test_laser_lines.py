@@ -1,6 +1,7 @@
 """A line measured by a laser is cleaned openly and widened by isotropy."""
 
 import tracemalloc
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -140,3 +141,12 @@ def test_a_measured_road_shorter_than_the_drum_is_refused(tmp_path) -> None:
     road = make_road(kind="laser", file=file, across="ruts", drum_radius=0.5)
     with pytest.raises(InputError, match="the run needs the road from x = 0 to 3.142 m"):
         road.prepare(0.0, 2.0, -0.1, 0.1)
+
+
+def test_a_road_of_micrometres_is_refused_at_once(tmp_path: Path) -> None:
+    """The filter of 2 mm had 10^8 points for a scan every 17 pm, which x in m is when it is read in mm."""
+    x = 1.6655563e-8 * np.arange(3000)
+    rows = "\n".join(f"{a:.7e} {1.3e-3 * (1 + np.sin(k)):.7e}" for k, a in enumerate(x))
+    (tmp_path / "scan.txt").write_text(rows)
+    with pytest.raises(InputError, match="too short a road"):
+        LaserFile(file=str(tmp_path / "scan.txt"), height_unit="mm").make()

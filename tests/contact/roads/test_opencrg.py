@@ -335,3 +335,22 @@ def test_codes_in_an_opencrg_file(tmp_path: Path) -> None:
     assert read_opencrg(tmp_path / "road.crg", missing=()).lowest(0, 14.5, -1, 1) == pytest.approx(
         -9.999
     )
+
+
+@pytest.mark.parametrize("unit", ["mm", "cm", "in", "rad"])
+def test_a_reference_line_in_another_unit_is_refused(tmp_path: Path, unit: str) -> None:
+    """Its unit was passed over: a road of 1.2 m was read, whatever it said."""
+    sections = "".join(f"D:long section {i + 1},m\n" for i in range(Z.shape[1]))
+    file = tmp_path / "road.crg"
+    file.write_bytes(crg("LRFI", Z, channels=f"U:reference line u,{unit},3,0.5\n{sections}"))
+    with pytest.raises(InputError, match=f"reference line u is in '{unit}'"):
+        read_opencrg(file)
+    file.write_bytes(crg("LRFI", Z, channels=f"U:reference line u,m,3,0.5\n{sections}"))
+    assert read_opencrg(file).steps[0] == 0.5
+
+
+def test_a_modifier_among_the_options_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "road.crg"
+    file.write_bytes(crg("LRFI", Z, blocks="$ROAD_CRG_OPTS\nscale_z_grid = 2\n"))
+    with pytest.raises(InputError, match="ROAD_CRG_OPTS SCALE_Z_GRID = 2 is not supported"):
+        read_opencrg(file)

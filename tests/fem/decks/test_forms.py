@@ -388,3 +388,12 @@ def test_labels_beyond_those_of_abaqus_are_named(tmp_path: Path) -> None:
         InputError, match=r"3000000001 is not a label of a node: .*up to 1,000,000,000"
     ):
         abaqus.read(tmp_path / "deck.inp")
+
+
+def test_a_density_by_temperature_is_told(own):
+    """That the first of several lines is taken was told of moduli, and not of the density."""
+    found = own(
+        plain(Torus(), materials=RUBBER.replace("1200.", "1200., 20.\n1100., 60.")), **dict(FULL)
+    )
+    assert found.rubbers[0].density == 1200.0
+    assert any("the first of 2 lines of data" in note for note in found.notes)

@@ -180,6 +180,7 @@ BAD = {
     "*ELGEN\n1, 3, 1, 1\n*ELEMENT, TYPE=CAX4\n3, 1, 5, 7, 8\n": r"line 8: element 3 is defined twice",
     "*ELCOPY, OLD SET=E, SHIFT NODES=1\n": r"line 6: .*ELEMENT SHIFT=",
     "*NMAP, NSET=A, TYPE=CYLINDRICAL\n0., 0., 0.\n": r"line 6: \*NMAP is not read",
+    "*IMPERFECTION, SYSTEM=R\n1, 0.01, 0.\n": r"line 6: \*IMPERFECTION is not read",
     "*SYSTEM\n1., 0., 0., 1., 0., 0.\n": r"line 6: \*SYSTEM: its points give no axes",
     "*REBAR, ELEMENT=CONTINUUM, MATERIAL=M\nE, 1., 1.\n": r"line 7: .*edge 0 is not one of 1 to 4",
     "*REBAR, ELEMENT=CONTINUUM, MATERIAL=M\nE, 1., 1., 0., 1.5, 2\n": r"line 7: 1.5 of the way across",

@@ -207,3 +207,12 @@ def test_what_can_be_is_written_and_the_rest_is_said(
     assert values["TYRESIDE"] == "SYMMETRIC" and "VERTICAL_STIFFNESS" not in values
     assert read(tmp_path / "export" / "tire.tir").values["mass"] == pytest.approx(9.2)
     assert main(["export", str(tmp_path), "--tir"]) == 0
+
+
+@pytest.mark.parametrize("line", ["MASS : 9.0", "MASS 9.0", "mass:9.0", "FREQ_LAT\t42.4"])
+def test_a_key_without_its_equals_sign_is_refused(tmp_path: Path, line: str) -> None:
+    """The mass was left out of the fit without a word."""
+    key = line.replace(":", " ").split()[0].upper()
+    text = re.sub(rf"^{key} = [\d.]+$", line, TIR.format(**SI), flags=re.M)
+    with pytest.raises(InputError, match=f"line .* is not {key} = number"):
+        read(tir(tmp_path, text))
