@@ -230,7 +230,7 @@ class StaticStage(Computed[StaticState]):
         if self.job.scene.static.error_estimate and state.load:
             with record.timing("error estimate"):
                 state = _estimate(record, state, loader)
-        _describe(record, state, loader)
+        _describe(record, state, loader, self.job.scene.tire.shape.land)
         record.headline |= friction_headline(state, self.job.scene.static.friction)
         record.notes += self._from_file()
         self._warn_at_rest(record)
@@ -379,7 +379,8 @@ def _show(progress) -> None:
     )
 
 
-def _describe(record: Record, state: StaticState, loader: LoadStepper) -> None:
+def _describe(record: Record, state: StaticState, loader: LoadStepper, land: float) -> None:
+    """Record the figures of the state; `land` is the share of the footprint that grooves leave."""
     free = 3 * len(state.displacement)
     record.headline["unknowns"] = (free, "-")
     record.headline |= cord_headline(state)
@@ -395,6 +396,9 @@ def _describe(record: Record, state: StaticState, loader: LoadStepper) -> None:
             "mean contact pressure": (extent.pressure(state.load), "Pa"),
             "largest contact pressure": (float(state.pressure.max()), "Pa"),
         }
+        if land < 1:
+            net = (extent.pressure(state.load) / land, "Pa")
+            record.headline["mean contact pressure between grooves"] = net
         if (even := state.evenness()) is not None:
             record.headline |= {
                 "footprint shape factor": (even.shape_factor, "-"),

@@ -159,12 +159,18 @@ class RadialSection(SectionKind):
 
     def in_layers(self, tire: TireTable) -> dict[str, Material]:
         """The tread without what its grooves take of it."""
-        from tireroad.fem.sections.radial import GROOVED, land
+        from tireroad.fem.sections.radial import GROOVED
 
-        rubbers, share = self.rubbers(tire), land(self.grooves)
+        rubbers, share = self.rubbers(tire), self.land
         tread = rubbers[GROOVED]
         grooved = replace(tread, law=tread.law.times(share), density=share * tread.density)
         return rubbers | {GROOVED: grooved}
+
+    @property
+    def land(self) -> float:
+        from tireroad.fem.sections.radial import land
+
+        return land(self.grooves)
 
     def tread_over_own(self, tire: TireTable) -> float:
         from tireroad.fem.sections.radial import GROOVED
@@ -206,11 +212,11 @@ class RadialSection(SectionKind):
         return replace(self, elements_arc=self.elements_arc // 2)
 
     def described(self, tire: TireTable) -> list[str]:
-        from tireroad.fem.sections.radial import land, size
+        from tireroad.fem.sections.radial import size
         from tireroad.runs.scene.parts import in_lines, listed
         from tireroad.runs.scene.resolved import as_toml
 
-        share = land(self.grooves)
+        share = self.land
         grooved = (
             f"  the tread between its {self.grooves} grooves, which leave {share:.2f} of its layer: "
             f"E and density of the layer are {share:.2f} of these"

@@ -130,6 +130,11 @@ class SectionKind(Parameters):
         """Dynamic modulus of the tread over that which the section has by itself; None where it has none."""
         return None
 
+    @property
+    def land(self) -> float:
+        """Share of the tread's face that the grooves spread over it leave."""
+        return 1.0
+
     def cords(self, tire: TireTable) -> list[Cords]:
         """The cords on the plies of the section."""
         raise NotImplementedError

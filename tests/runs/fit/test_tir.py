@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -55,6 +56,10 @@ def test_there_and_back(tmp_path: Path) -> None:
     at = np.interp(3000, curve["load"], curve["footprint_length"])
     assert found.values["footprint_length"] == pytest.approx(at, rel=0.15)
     assert 4 < float(values["BELT_MASS"]) < found.values["mass"]
+    figures = json.loads((out / "summary.json").read_text())["stages"]["static"]["headline"]
+    net = figures["mean contact pressure between grooves"]["value"]
+    area = figures["footprint area"]["value"]
+    assert net == pytest.approx(figures["load"]["value"] / (area * (1 - 4 * 0.07)))
 
 
 def test_without_a_static_state(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:

@@ -248,3 +248,15 @@ cords = [
 youngs_modulus = 5e6
 density = 1100
 """
+
+
+@pytest.mark.parametrize(
+    ("text", "share"),
+    [
+        ("", 1.0),
+        ('[tire]\nsection = "radial"\n', 0.72),
+        ('[tire]\nsection = "radial"\ngrooves = 0\n', 1.0),
+    ],
+)
+def test_grooves_leave_a_share_of_the_tread(tmp_path, text, share):
+    assert scene(tmp_path, text).tire.shape.land == pytest.approx(share)
