@@ -205,8 +205,12 @@ def _workshop() -> Path:
 
 
 def _leave(folder: Path) -> None:
-    if any(process.poll() is None for process in _begun.values()):
+    working = [process for process in _begun.values() if process.poll() is None]
+    if working:
         end_compilers(folder)
+    for process in working:  # killed is not yet gone
+        process.kill()
+        process.wait()
     shutil.rmtree(folder, ignore_errors=True)
 
 

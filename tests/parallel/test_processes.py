@@ -59,10 +59,11 @@ def values(folder, file, name):
         ("modes.h5", "surface/shape", 1e-6),  # signs and order too
         ("rotating.h5", "eigenvalue", 1e-6),
         ("greens.h5", "contact/static_flexibility", 1e-6),
-        ("contact.h5", "normal_force", 1e-6),
-        ("contact.h5", "displacement", 1e-6),
-        ("contact.h5", "axle_force", 1e-6),
-        ("spectra.h5", "axle_force", 1e-6),
+        # Rounding may end a turn of friction earlier or later, at a residual of 1e-3 of the bound.
+        ("contact.h5", "normal_force", 2e-4),
+        ("contact.h5", "displacement", 2e-4),
+        ("contact.h5", "axle_force", 2e-4),
+        ("spectra.h5", "axle_force", 2e-4),
     ],
 )
 def test_results_do_not_depend_on_the_number_of_processes(

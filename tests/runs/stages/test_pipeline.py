@@ -53,7 +53,7 @@ step = 1e-4
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("rotation", ["", "[rotation]\nspeed = 40.0\n"])
+@pytest.mark.parametrize("rotation", ["", "[rotation]\nspeed = 40.0\nfree_rolling = false\n"])
 def test_flat_road_at_rest_leaves_the_tire_exactly_at_rest(run, rotation):
     folder, stages = run("rolling-flat" if rotation else "flat", FLAT + rotation)
     force = dataset(folder, "contact.h5", "normal_force")
