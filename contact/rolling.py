@@ -117,7 +117,8 @@ def rolling_steadily(
     """The setup (settled) with the state in which its tire rolls steadily, and with the slip of free rolling if it is free.
 
     The contact problem on a smooth road, in steps of a point each and then in the loop's own of `step` s, of a tire that
-    follows its forces at once (`response` at 0 Hz). Freely rolling, the slip along the road is set from step to step so that the force along it is none,
+    follows its forces at once (`response` at 0 Hz). Freely rolling, the slip along the road is set from step to step so that
+    the force along it is none,
 
         s+ = s_0 - F_x / (K way),   s_0 = s - (F_x - F_x before) / (K way),
 
@@ -132,9 +133,10 @@ def rolling_steadily(
     rolls = spec.has_friction and spec.brush == "rolling" and setup.rolled.speed > 0
     if not (rolls and touching.any()) or setup.steady is not None:
         return setup
-    pitch = _pitch(patch)
+    p, pitch = len(patch.index), _pitch(patch)
+    flexibility = (response.static() + response.residual)[: 3 * p, : 3 * p]
     length = float(np.ptp(patch.points[touching, 0])) + pitch
-    rolled = _Rolled(spec, setup, response, pitch)
+    rolled = _Rolled(spec, setup, flexibility, pitch)
     found = setup
     if setup.free:
         rolled.freely(given[1])
@@ -146,7 +148,7 @@ def rolling_steadily(
     if spec.law.creep is not None:
         return found
     if (way := setup.rolled.speed * step) < pitch:
-        rolled = _Rolled(spec, setup, response, way, rolled)
+        rolled = _Rolled(spec, setup, flexibility, way, rolled)
         rolled.held(found.slip)
         rolled.until_steady(length)
     contact = rolled.loop.contact
@@ -163,16 +165,14 @@ class _Rolled:
         self,
         spec: ContactSpec,
         setup: ContactSetup,
-        response: Response,
+        flexibility: Array,
         way: float,
         before: _Rolled | None = None,
     ) -> None:
-        """In steps of `way` m, from rest or where it was `before`."""
+        """In steps of `way` m, from rest or where it was `before`; `flexibility` (3p, 3p) m/N to constant forces."""
         patch, p = setup.patch, len(setup.patch.index)
         step = way / setup.rolled.speed
-        flexibility = (response.static() + response.residual)[: 3 * p, : 3 * p]
-        begun = replace(setup.smooth(step), free=False)
-        self.loop = make_loop(spec, begun, StaticTire(flexibility), step, FINE)
+        self.loop = make_loop(spec, setup.smooth(step), StaticTire(flexibility), step, FINE)
         self._load, self._step = float(patch.force.sum()), way
         share = patch.force / self._load
         nodes = share if patch.weights is None else patch.weights.T @ share

@@ -122,10 +122,10 @@ class PlaneCompliance:
     def precondition(self, spring: float) -> None:
         """Let Newton steps use the inverse of the tread in series with springs (m/N), where it is a grid."""
         if self.shear is not None:
-            self._held |= self.shear.inverse(COMPILED, spring)
-            for name in ("inverse", "within"):
-                if name in self._held:
-                    setattr(self.compiled, name, self._held[name])
+            found = self.shear.inverse(COMPILED, spring)
+            self._held |= found
+            for name, value in found.items():
+                setattr(self.compiled, name, value)
 
     @property
     def bound(self) -> float:

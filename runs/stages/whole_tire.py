@@ -86,11 +86,10 @@ class PatchForces:
         return found @ self.seen[: len(found)]
 
     @property
-    def begun(self) -> np.ndarray:
-        """Modal forces (m,) N kg^-1/2 at t = 0: the prescribed ones, and those that have always been there."""
+    def sudden(self) -> np.ndarray:
+        """Modal forces (m,) N kg^-1/2 that come at t = 0: the prescribed ones alone."""
         given = self.job.scene.force
-        sudden = histories(given, np.zeros(1))[0] @ self.seen[len(self.seen) - len(given) :]
-        return self.always + sudden
+        return histories(given, np.zeros(1))[0] @ self.seen[len(self.seen) - len(given) :]
 
     def pushes(self, start: int = 0) -> Iterator[np.ndarray]:
         """Modal forces (n, m) N kg^-1/2 from step `start` on, block by block. Root process only."""
@@ -231,7 +230,8 @@ def replayed(basis: Basis, forces: PatchForces, wanted: Collection[int]) -> np.n
     """
     unit = np.eye(basis.coordinates)
     response = couple(basis.states, unit, unit, np.zeros((3, len(unit))))
-    begun = forces.begun, forces.pushes(), forces.always
+    always = forces.always
+    begun = always + forces.sudden, forces.pushes(), always
     given = response, forces.step, recursive(forces.scheme), *begun
     found = np.empty((len(wanted), len(unit)))
     number = filled = 0
