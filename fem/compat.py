@@ -158,15 +158,19 @@ class _PlainLoader(importlib.machinery.ExtensionFileLoader):
         return types.ModuleType(spec.name)
 
     def exec_module(self, module: Any) -> None:
-        reader, module.ffi = cffi.FFI(), cffi.FFI()
-        reader.cdef(f"extern const char {_DECLARED}[];")
-        text = getattr(reader.dlopen(self.path), _DECLARED)
-        module.ffi.cdef(reader.string(text).decode())
-        module.lib = module.ffi.dlopen(self.path)
-        _LOADED.append(module.lib)
+        module.ffi, module.lib = _loaded(self.path)
 
 
-_LOADED: list = []  # a library is unloaded with its last reference, and forms point into it
+@functools.cache
+def _loaded(path: str) -> tuple[cffi.FFI, Any]:
+    """The library of a form, loaded once: for good, since forms point into it, and named by a hash of its code."""
+    reader, ffi = cffi.FFI(), cffi.FFI()
+    reader.cdef(f"extern const char {_DECLARED}[];")
+    text = getattr(reader.dlopen(path), _DECLARED)
+    ffi.cdef(reader.string(text).decode())
+    return ffi, ffi.dlopen(path)
+
+
 _DECLARED = "tireroad_declarations"  # the C declarations of a plain library, kept inside it
 
 
