@@ -105,13 +105,15 @@ def test_corner_free_wheel_and_the_fixed_axle_as_its_limit(run):
 
     short = ("--until", "contact")
     limit = ("axle.stiffness=[0,0,1e15,0,0,0]", "axle.body_mass=")
-    stiff, again, _ = run(SCENE + CAR, *(f"--set={one}" for one in limit), *short)
-    assert again["modes"]["status"] == "reused"
-    fixed, _, _ = run(SCENE, *short)
-    for name in ("axle_force", "total_force", "hub_moment"):
-        vary = np.ptp(fixed[name], axis=0).max()
-        # Turns of friction end at 1e-3 of the bound: rounding may end them earlier or later.
-        assert np.abs(stiff[name] - fixed[name]).max() < 2e-4 * vary, name
+    # Turns of friction end at 1e-3 of the bound: rounding may end them earlier or later.
+    for friction, allowed in ((0.0, 1e-6), (1.0, 2e-4)):
+        rubs = f"--set=contact.friction={friction}"
+        stiff, again, _ = run(SCENE + CAR, *(f"--set={one}" for one in limit), rubs, *short)
+        assert again["modes"]["status"] == "reused"
+        fixed, _, _ = run(SCENE, rubs, *short)
+        for name in ("axle_force", "total_force", "hub_moment"):
+            vary = np.ptp(fixed[name], axis=0).max()
+            assert np.abs(stiff[name] - fixed[name]).max() < allowed * vary, name
     assert np.abs(car["hub_moment"] - fixed["hub_moment"]).max() > 0.01 * vary
 
     free, _, _ = run(SCENE + '[axle]\nkind = "free"\n', *short)
@@ -232,11 +234,12 @@ def test_the_hub_moment_of_point_forces_is_that_of_a_held_axle_in_the_limit(
 @pytest.mark.long
 def test_moments_with_every_residual_in_a_loop(run) -> None:
     """Beside those with attachment modes: as far off as sixty modes are, and none about x and z, which mirror symmetry forbids."""
-    base, _, _ = run(SCENE, "--set=greens.residual=attachment", "--until", "contact")
+    short = ("--set=contact.friction=0", "--until", "contact")
+    base, _, _ = run(SCENE, "--set=greens.residual=attachment", *short)
     force, moment = (np.ptp(base[name], axis=0).max() for name in ("axle_force", "hub_moment"))
     for change in ("greens.residual=dirac", "rotation.method=full"):
-        found, _, _ = run(SCENE, f"--set={change}", "--until", "contact")
+        found, _, _ = run(SCENE, f"--set={change}", *short)
         off = np.abs(found["hub_moment"] - base["hub_moment"]).max(axis=0) / moment
         assert 0 < off[1] < 0.12, change
-        assert off[[0, 2]].max() < 1e-5, change
+        assert off[[0, 2]].max() < 1e-7, change
         assert np.abs(found["axle_force"] - base["axle_force"]).max() < 0.03 * force, change
