@@ -322,6 +322,7 @@ class FullTire:
         )
         system = stiffness.copy()
         different = PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
+        self._stiffness = stiffness
         share = self._gamma / (self._beta * step)
         system.axpy(share, self._drag, different)
         diagonal = system.getDiagonal()
@@ -367,6 +368,20 @@ class FullTire:
     def start(self, force: np.ndarray) -> None:
         """Start from rest with a force (k,) N that is present at t = 0."""
         self.acceleration = self.balanced = self._columns @ force / self._mass
+
+    def start_steady(self, force: np.ndarray, sudden: np.ndarray | None = None) -> np.ndarray:
+        """Begin at rest in the non-rotating frame under a force (k,) N that always was, with a `sudden` one beside it.
+
+        Factorises the stiffness once. Returns the displacement (r,) m; InputError with air or a moving wheel.
+        """
+        if self._air:
+            raise InputError(
+                "full finite elements with air or a moving wheel begin without horizontal forces"
+            )
+        self.start(np.zeros_like(force) if sudden is None else sudden)
+        pushed = (self._columns @ force)[:, None]
+        self.displacement = solve_columns(factorise(self._stiffness), self._stiffness, pushed)[:, 0]
+        return summed(self.comm, self._outputs @ self.displacement)
 
     def predict(self) -> np.ndarray:
         """Displacement (r,) m at the end of the step without new force."""

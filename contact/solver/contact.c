@@ -41,15 +41,17 @@ typedef struct {
 
 int pivot_solve(pivot *s, const double *q, const uint8_t *guess, double *force);
 
-/* Normal forces for the turns of a brush: `all` points at once, the `usual` ones, after which `others` are looked at, or
-   `another` solver. */
+/* Normal forces for the turns of a brush: `all` points at once, the `usual` ones, or `another` solver, which may take
+   `some` of them. After these the `others` are looked at, where not all take part. */
 typedef int (*normal_solver)(const double *q, const uint8_t *guess, double *force);
-typedef int (*look)(const double *q, const double *force);  /* SOLVED, or AGAIN with more points */
+typedef int (*look)(const double *q, double *force);  /* SOLVED, the forces exact, or AGAIN with more points */
 typedef struct {
     active_set *all;
     pivot *usual;
     look others;
     normal_solver another;
+    int count;
+    const int *some;
 } normal_contact;
 
 /* What moves in the plane of the road, and away from it, under forces in the plane and normal to it: the tire
@@ -1325,8 +1327,8 @@ int brush_solve(brush *s, normal_contact *normal, const double *q, const uint8_t
     memset(w->lifted, 0, c);
     for (int i = 0; i < 2 * c; i++) w->trial[i] = 2.0 * s->horizontal[i] - s->before[i]; /* saves a turn */
     for (s->turns = 1; s->turns <= TURNS; s->turns++) {
-        const pivot *usual = normal->usual;
-        lifted_by(s, q, w->trial, usual ? usual->taken : c, usual ? usual->places : w->every);
+        const int *looked = normal->usual ? normal->usual->places : normal->some ? normal->some : w->every;
+        lifted_by(s, q, w->trial, normal->usual ? normal->usual->taken : normal->some ? normal->count : c, looked);
         if ((failed = normal_forces(normal, s->turns, w->q, guess, at_rest, force))) return failed;
         drag(s, force, free, w->moved);
         for (int i = 0; i < c; i++) w->set[i] = force[i] > 0.0;
@@ -1357,7 +1359,7 @@ int brush_solve(brush *s, normal_contact *normal, const double *q, const uint8_t
             for (int k = 0; k < a; k++) w->found[d * c + w->index[k]] = w->force[d * a + k];
         for (int i = 0; i < 2 * c; i++) cut = fmax(cut, fabs(w->found[i] - w->trial[i]));
         if (fmax(problem.off, cut) <= limit) {
-            if (usual) {
+            if (normal->others) {
                 lifted_by(s, q, w->trial, c, w->every);
                 failed = normal->others(w->q, force);
                 if (failed == AGAIN) continue; /* with more points */

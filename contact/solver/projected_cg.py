@@ -102,8 +102,8 @@ class MatrixCompliance:
 
 Mask = NDArray[np.bool_]
 
-# A tenth of the tolerance, since the residual is evaluated again for the record.
-TARGET = 1e-10
+# A tenth of the tolerance, since the residual is evaluated again for the record; and where horizontal forces still change.
+TARGET, LOOSE = 1e-10, 1e-7
 MAX_ITERATIONS = 1000
 # Rows and columns of points around those that touch, among which a step looks for others: a footprint is half of
 # the points within reach of the road.
@@ -149,6 +149,7 @@ class ProjectedCG:
         self._cells = self._grid.cells if self._grid else ()
         self._box = _EMPTY
         self._inner, self._index = compliance, np.arange(n)
+        self._base, self.force = np.zeros(n), np.zeros(n)  # of this step
         self._last: Array | None = None
         self._before: Array | None = None
         self.active: Mask = np.zeros(n, dtype=bool)
@@ -162,26 +163,42 @@ class ProjectedCG:
         self, q: Array, guess_active: Mask | None = None, reference: Array | None = None
     ) -> Array:
         """Forces f (n,) N; see ActiveSet.solve. ConvergenceError after 1000 iterations."""
+        self.begin(q, guess_active, reference)
+        while not self.settled(q):
+            pass
+        assert self._last is not None, "settled"
+        return self._last
+
+    @property
+    def index(self) -> Index:
+        """The points (a,) of the box, which take part."""
+        return self._index
+
+    def begin(self, q: Array, guess_active: Mask | None, reference: Array | None) -> None:
+        """Prepare for a step."""
         if not np.all(np.isfinite(q)):
             check_residual("projected-cg", np.nan)
-        base = np.zeros(len(q)) if reference is None else reference
-        force = self._begin(base, guess_active)
-        near = (base != 0.0) | (force > 0.0)
+        self._base = np.zeros(len(q)) if reference is None else reference
+        self.force = self._begin(self._base, guess_active)
+        near = (self._base != 0.0) | (self.force > 0.0)
         self._cover(near if guess_active is None else near | guess_active)
-        self.iterations, largest = 0, float(np.abs(q).max())
-        while True:
-            index = self._index
-            found, gap = self._iterate(q[index], base[index], force[index], largest)
-            if len(index) < len(q):
-                force = np.zeros(len(q))
-                force[index] = found
-                gap = _gap(self._compliance, force, base, q)
-            else:
-                force = found
-            scale = largest + float((self._diagonal * force).max())
-            self.residual = complementarity_residual(force, gap, self._diagonal, scale)
-            if self.residual <= TOLERANCE or not self._cover(gap < -TARGET * scale):
-                return self._finish(force, gap)
+        self.iterations = 0
+
+    def turn(self, q: Array) -> Array:
+        """Forces (n,) N of the box's points to a residual of 1e-7, from those of the last turn; q (n,) m within it."""
+        self._iterate(q, LOOSE)
+        return self.force
+
+    def settled(self, q: Array) -> bool:
+        """Make the forces exact; whether no point beyond the box touches, else the box has grown."""
+        largest = self._iterate(q, TARGET)
+        gap = _gap(self._compliance, self.force, self._base, q)
+        scale = largest + float((self._diagonal * self.force).max())
+        self.residual = complementarity_residual(self.force, gap, self._diagonal, scale)
+        if self.residual > TOLERANCE and self._cover(gap < -TARGET * scale):
+            return False
+        self._finish(self.force, gap)
+        return True
 
     def _cover(self, points: Mask) -> bool:
         """Let the box contain these points; whether it grew."""
@@ -199,18 +216,21 @@ class ProjectedCG:
         self._inner, self._index = self._grid.inside(box)
         return True
 
-    def _iterate(self, q: Array, base: Array, force: Array, largest: float) -> tuple[Array, Array]:
-        """Forces and gaps of the points of the box; `largest` gap of all."""
-        inner = self._inner
-        diagonal = self._diagonal[self._index]
+    def _iterate(self, q: Array, target: float) -> float:
+        """Find the forces of the box's points to the `target`; the largest of all gaps q."""
+        inner, index, largest = self._inner, self._index, float(np.abs(q).max())
+        diagonal = self._diagonal[index]
+        force, base, q = self.force[index], self._base[index], q[index]
         gap = _gap(inner, force, base, q)
         touching = (force > 0.0) | (gap < 0.0)
         direction, old, old_product = None, None, 0.0
         for _ in range(MAX_ITERATIONS):
             scale = float(largest + (diagonal * force).max())
             self.residual = complementarity_residual(force, gap, diagonal, scale)
-            if self.residual <= TARGET:
-                return force, gap
+            if self.residual <= target:
+                self.force = np.zeros(len(self.force))
+                self.force[index] = force
+                return largest
             self.iterations += 1
             defect = np.where(touching, -gap, 0.0)
             raised = np.where(touching, inner.precondition(defect), 0.0)
@@ -271,10 +291,9 @@ class ProjectedCG:
             )
         return along / curvature
 
-    def _finish(self, force: Array, gap: Array) -> Array:
+    def _finish(self, force: Array, gap: Array) -> None:
         check_residual("projected-cg", self.residual)
         self.active = force > 0.0
         self._before, self._last = self._last, force
         self.penetration = penetration(gap)
         self.gap = np.where(self.active, 0.0, gap)
-        return force

@@ -10,6 +10,7 @@ from scipy import sparse
 from tireroad.contact.choices import DENSE_POINTS
 from tireroad.contact.solver.active_set import COMPILED, ActiveSet, UsualSet, array, guarded
 from tireroad.contact.solver.conditions import Array, ContactSolver, Mask, check_residual
+from tireroad.contact.solver.projected_cg import ProjectedCG
 from tireroad.contact.tread.brush import Brush
 from tireroad.contact.tread.shear import Shear
 from tireroad.fem.errors import ConvergenceError
@@ -234,7 +235,7 @@ class BrushFriction:
         }  # fmt: skip
         self._pressed, self._dragged = pressed, np.zeros((2, c))
         self._static: Array | None = None
-        self._another: tuple[ContactSolver, tuple[Any, Any], list[BaseException]] | None = None
+        self._another: tuple[ContactSolver, tuple[Any, ...], list[BaseException]] | None = None
         doubles["dragged"] = self._dragged
         self._held: dict[str, Any] = {
             name: COMPILED.doubles(values) for name, values in doubles.items()
@@ -311,6 +312,8 @@ class BrushFriction:
             )
         if isinstance(normal, UsualSet):
             guess = normal.begin(q, guess, static)
+        elif isinstance(normal, ProjectedCG):
+            normal.begin(q, guess, static)
         given = (
             COMPILED.doubles(np.ascontiguousarray(q)),
             _FFI.NULL if guess is None else COMPILED.flags(np.ascontiguousarray(guess, dtype=bool)),
@@ -337,18 +340,44 @@ class BrushFriction:
             return normal.contact, normal.raised
         if self._another is None or self._another[0] is not normal:
             raised: list[BaseException] = []
+            self._another = normal, self._called(normal, raised), raised
+        _, (contact, *_), raised = self._another
+        if isinstance(normal, ProjectedCG):
+            self._place(contact, normal)
+        return contact, raised
 
-            def solve(q: Any, guess: Any, force: Any) -> int:
-                size = len(self._touched)
+    def _called(self, normal: ContactSolver, raised: list[BaseException]) -> tuple[Any, ...]:
+        """The normal problem of a solver that is called back, and the callbacks, which must live as long."""
+        size = len(self._touched)
+
+        def solve(q: Any, guess: Any, force: Any) -> int:
+            q = array(q, size).copy()
+            if isinstance(normal, ProjectedCG):
+                array(force, size)[:] = normal.turn(q)
+            else:
                 touching = None if guess == _FFI.NULL else array(guess, size, bool).copy()
-                found = normal.solve(array(q, size).copy(), touching, reference=self._static)
-                array(force, size)[:] = found
-                return int(_C.SOLVED)
+                array(force, size)[:] = normal.solve(q, touching, reference=self._static)
+            return int(_C.SOLVED)
 
-            called = _FFI.callback("normal_solver", guarded(solve, raised))
-            contact = _FFI.new("normal_contact *", {"another": called})
-            self._another = normal, (contact, called), raised
-        return self._another[1][0], self._another[2]
+        def look(q: Any, force: Any) -> int:
+            assert isinstance(normal, ProjectedCG), "another solver takes all points at once"
+            if not normal.settled(array(q, size).copy()):
+                self._place(contact, normal)
+                return int(_C.AGAIN)
+            array(force, size)[:] = normal.force
+            return int(_C.SOLVED)
+
+        solver = _FFI.callback("normal_solver", guarded(solve, raised))
+        others = _FFI.callback("look", guarded(look, raised))
+        contact = _FFI.new("normal_contact *", {"another": solver})
+        if isinstance(normal, ProjectedCG):
+            contact.others = others
+        return contact, solver, others
+
+    def _place(self, contact: Any, normal: ProjectedCG) -> None:
+        """Let turns lift the points that take part."""
+        self._some = np.ascontiguousarray(normal.index, np.int32)
+        contact.count, contact.some = len(self._some), COMPILED.ints(self._some)
 
     def _unsolved(self) -> ConvergenceError:
         unbounded = self._brush.law.friction is None

@@ -13,9 +13,9 @@ from mpi4py import MPI
 from scipy import sparse
 from threadpoolctl import threadpool_limits
 
-from tireroad.contact.loop import roll
-from tireroad.contact.model import ContactSpec, step_solver
+from tireroad.contact.model import ContactSpec
 from tireroad.contact.results.spectra import BAND, Distance, distance
+from tireroad.contact.rolling import make_loop, rolling_steadily
 from tireroad.contact.setup import ContactSetup
 from tireroad.fem.transient import FullTire, ModalDamping, NonlinearTire
 from tireroad.greens.coupling import Wheel
@@ -49,33 +49,36 @@ class FullHistory:
 
 @dataclass(frozen=True)
 class Conditions:
-    """The conditions of any tire model's run: table [contact], patch and road, `duration` s."""
+    """The conditions of any tire model's run: table [contact], patch and road, `duration` s.
+
+    `response`: of the same tire, exact at 0 Hz, in whose steady rolling all models begin; None: at rest.
+    """
 
     spec: ContactSpec
     setup: ContactSetup
     duration: float
+    response: Response | None = None
 
 
 def follow(trial: Conditions, tire, step: float, setup: float) -> FullHistory:
-    """Run the tire over the trial's road, with the same points, tread and solver for any tire.
+    """Run the tire over the trial's road, with the same points, tread, friction and solver for any tire.
 
     Contact and axle force (n, 3) N, displacement of the contact points (n, c) m.
     """
-    patch, drive = trial.setup.patch, trial.setup.drive
-    p = len(patch.index)
-    solver = step_solver(trial.spec, patch, tire.same_step[:p, :p])
-    steps = round(trial.duration / step)
-    contact, axle = np.zeros((2, steps, 3))
-    moved = np.zeros((steps, len(patch.points)))
+    given, steps = trial.setup, round(trial.duration / step)
+    if trial.response is not None:
+        given = rolling_steadily(trial.spec, given, trial.response, step)
+    loop = make_loop(trial.spec, given, tire, step)
     with threadpool_limits(1, "blas"):
         began = time.process_time()
-        instants = roll(tire, solver, patch, drive, step, steps)
-        for k, instant in enumerate(instants):
-            contact[k] = patch.resultant(instant.force, instant.horizontal)
-            axle[k] = instant.axle_force
-            moved[k] = instant.displacement
+        blocks = list(loop.roll(given.drive, step, steps))
         seconds = time.process_time() - began
-    values = {"contact force": contact, "axle force": axle, "displacement": moved}
+    contact = [
+        [given.patch.resultant(*of) for of in zip(b.force, b.horizontal, strict=True)] for b in blocks
+    ]
+    parts = [contact, [b.axle_force for b in blocks], [b.displacement for b in blocks]]
+    names = "contact force", "axle force", "displacement"
+    values = {name: np.concatenate(part) for name, part in zip(names, parts, strict=True)}
     return FullHistory(step, values, seconds, setup)
 
 
@@ -157,7 +160,9 @@ class Tires:
         leans = setup is not None and leaning(self.job)
         self.aside = leaning_loads(static, setup) if leans else None
         if setup:
-            self.trial = Conditions(contact, setup, self.job.scene.time.duration)
+            begins = contact.has_friction and self.job.scene.rotation.speed > 0
+            exact = self.response(len(self.modes.frequency), "static") if begins else None
+            self.trial = Conditions(contact, setup, self.job.scene.time.duration, exact)
 
     @property
     def wheel(self) -> Wheel:

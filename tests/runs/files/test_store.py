@@ -103,31 +103,35 @@ def test_a_file_is_used_only_when_it_is_what_would_be_computed(tmp_path: Path) -
     assert why_not(path, "abd", "static") == "the inputs have changed since"
 
 
+@pytest.mark.parametrize(
+    ("stage", "folder", "changed"),
+    [("static", "fem", "equilibrium.py"), ("static", "fem", "products.h")],
+)
 def test_code_and_libraries_are_part_of_what_a_stage_is_computed_from(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stage: str, folder: str, changed: str
 ) -> None:
-    """Half the shear stiffness in the sources, or another SciPy, and nothing is reused."""
-    path, inputs = tmp_path / "static.h5", {"load": 1.0}
-    written = wanted_hash("static", inputs)
+    """Half the shear stiffness in the sources, a kernel in C, or another SciPy, and nothing is reused."""
+    path, inputs = tmp_path / f"{stage}.h5", {"load": 1.0}
+    written = wanted_hash(stage, inputs)
     with writing(path, replace(ORIGIN, input_hash=written)):
         pass
-    assert why_not(path, wanted_hash("static", inputs), "static") == ""
+    assert why_not(path, wanted_hash(stage, inputs), stage) == ""
     libraries = store.libraries()
     monkeypatch.setattr(store, "libraries", lambda: libraries | {"scipy": "0.1"})
-    now = wanted_hash("static", inputs)
+    now = wanted_hash(stage, inputs)
     assert now != written
-    assert "scipy" in why_not(path, now, "static") and "-> 0.1" in why_not(path, now, "static")
+    assert "scipy" in why_not(path, now, stage) and "-> 0.1" in why_not(path, now, stage)
     monkeypatch.undo()
     copy = tmp_path / "program"
-    for folder in ("fem", "runs/stages"):
-        shutil.copytree(store.ROOT / folder, copy / folder)
-    source = next((copy / "fem").rglob("equilibrium.py"))
+    for part in (*store._ALL, "runs/stages"):
+        shutil.copytree(store.ROOT / part, copy / part, dirs_exist_ok=True)
+    source = next((copy / folder).rglob(changed))
     source.write_text(source.read_text() + "FACTOR = 0.5\n")
     monkeypatch.setattr(store, "ROOT", copy)
     store._code.cache_clear()
-    now = wanted_hash("static", inputs)
+    now = wanted_hash(stage, inputs)
     assert now != written
-    assert why_not(path, now, "static") == "the program's code has changed since"
+    assert why_not(path, now, stage) == "the program's code has changed since"
     store._code.cache_clear()
 
 
