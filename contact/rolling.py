@@ -22,6 +22,7 @@ PASSAGES = 100  # lengths of the footprint, within which a tire is to roll stead
 FEWEST_STEPS = 8  # of a length
 STEADY = 1e-4  # of the load: changes of the forces from one length to the next
 MOST_SLIP = (-0.2, 0.2)
+FIRST_SLIP = 2e-3  # of a wheel that is to slip; doubled with each step
 FINE = 1e-6  # tolerance of stick and slip, so that the slip is not that of its residual
 
 
@@ -181,9 +182,9 @@ class _Rolled:
         self._road, self._free = np.zeros(len(patch.points)), np.zeros(3 * p)
         self._shape = replace(setup, slip=(0.0, 0.0)).slips
         self._across: float | None = None
-        self.slip, self.way, self._before = 0.0, 0.0, 0.0
+        self._slip, self.way, self._before = (0.0, 0.0), 0.0, 0.0
         if before is not None:
-            self.way = before.way
+            self._slip, self.way = before._slip, before.way
             self.loop.contact.set_state(before.loop.contact.state())
 
     def freely(self, across: float) -> None:
@@ -192,11 +193,23 @@ class _Rolled:
         self._creep(self.slip, across)
 
     def held(self, slip: tuple[float, float]) -> None:
-        """From now on the wheel slips so."""
+        """From now on the wheel slips so, reached step by step: a sudden slip moves more than a step can solve."""
         self._across = None
+        begun, more = np.array(self._slip), np.subtract(slip, self._slip)
+        part, whole = FIRST_SLIP, float(np.hypot(*more))
+        while part < whole:
+            self._creep(*(begun + part / whole * more))
+            self._roll()
+            part *= 2.0
         self._creep(*slip)
 
+    @property
+    def slip(self) -> float:
+        """The slip along the road."""
+        return self._slip[0]
+
     def _creep(self, along: float, across: float) -> None:
+        self._slip = along, across
         self.loop.contact.creep(self._shape + (along, across))
 
     def until_steady(self, length: float) -> None:
@@ -230,8 +243,7 @@ class _Rolled:
         if self._across is not None:
             unchanged = self.slip - (force[0] - self._before) / self._more
             self._before = force[0]
-            self.slip = float(np.clip(unchanged - force[0] / self._more, *MOST_SLIP))
-            self._creep(self.slip, self._across)
+            self._creep(float(np.clip(unchanged - force[0] / self._more, *MOST_SLIP)), self._across)
         return force
 
 

@@ -380,11 +380,15 @@ class BrushFriction:
         contact.count, contact.some = len(self._some), COMPILED.ints(self._some)
 
     def _unsolved(self) -> ConvergenceError:
-        unbounded = self._brush.law.friction is None
-        key = (
-            "give contact.friction, which bounds them," if unbounded else "lower contact.friction,"
-        )
+        law = self._brush.law
+        if law.friction is None:
+            cure = "give contact.friction, which bounds them, or a smaller brush stiffness or time.step"
+        else:
+            cure = (
+                f"lower contact.friction (now {law.friction:g}): a tire that slides as a whole, braked, driven or at a large "
+                "slip angle, may have no steady sliding where friction is near 1"
+            )
         return ConvergenceError(
             f"contact: normal and horizontal forces do not converge in {TURNS} iterations; the horizontal forces "
-            f"are too large for this step: {key} the brush's stiffness or time.step"
+            f"are too large for this step: {cure}"
         )

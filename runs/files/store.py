@@ -83,7 +83,9 @@ def identity(stage: str) -> Identity:
 def _code(folders: tuple[str, ...]) -> str:
     digest = hashlib.sha256()
     for folder in folders:
-        sources = (path for path in (ROOT / folder).rglob("*") if path.suffix in (".py", ".c", ".h"))
+        sources = (
+            path for path in (ROOT / folder).rglob("*") if path.suffix in (".py", ".c", ".h")
+        )
         for path in sorted(sources):
             digest.update(f"{path.relative_to(ROOT)}\0".encode())
             digest.update(path.read_bytes() + b"\0")

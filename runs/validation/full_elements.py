@@ -74,11 +74,15 @@ def follow(trial: Conditions, tire, step: float, setup: float) -> FullHistory:
         blocks = list(loop.roll(given.drive, step, steps))
         seconds = time.process_time() - began
     contact = [
-        [given.patch.resultant(*of) for of in zip(b.force, b.horizontal, strict=True)] for b in blocks
+        given.patch.resultant(*of)
+        for block in blocks
+        for of in zip(block.force, block.horizontal, strict=True)
     ]
-    parts = [contact, [b.axle_force for b in blocks], [b.displacement for b in blocks]]
-    names = "contact force", "axle force", "displacement"
-    values = {name: np.concatenate(part) for name, part in zip(names, parts, strict=True)}
+    values = {
+        "contact force": np.array(contact),
+        "axle force": np.concatenate([block.axle_force for block in blocks]),
+        "displacement": np.concatenate([block.displacement for block in blocks]),
+    }
     return FullHistory(step, values, seconds, setup)
 
 
@@ -160,7 +164,7 @@ class Tires:
         leans = setup is not None and leaning(self.job)
         self.aside = leaning_loads(static, setup) if leans else None
         if setup:
-            begins = contact.has_friction and self.job.scene.rotation.speed > 0
+            begins = contact.has_friction and self.wheel.speed > 0
             exact = self.response(len(self.modes.frequency), "static") if begins else None
             self.trial = Conditions(contact, setup, self.job.scene.time.duration, exact)
 
