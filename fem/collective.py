@@ -27,6 +27,7 @@ from petsc4py import PETSc
 from scipy import sparse
 
 T = TypeVar("T")
+_kept: list[tuple[MPI.Comm, weakref.ref, PETSc.Vec]] = []
 
 
 def summed(comm: MPI.Comm, values: np.ndarray) -> np.ndarray:
@@ -67,9 +68,6 @@ def broadcast(comm: MPI.Comm, value: T, root: int = 0) -> T:
     sent = pkl5.Intracomm(comm).bcast(value, root)
     # Root returns its own object, so that resources reached through it stay open.
     return value if comm.rank == root else sent
-
-
-_kept: list[tuple[MPI.Comm, weakref.ref, PETSc.Vec]] = []
 
 
 def watch(comm: MPI.Comm, owner: object, mesh: Any) -> None:

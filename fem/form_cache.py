@@ -42,6 +42,11 @@ _SUFFIX = EXTENSION_SUFFIXES[0]  # of the libraries that are built here
 _AHEAD = "ahead-"  # before the names of what is built ahead of its use
 
 _LOG = logging.getLogger(__name__)  # tells the user that forms are being compiled
+_ahead: list[bool] = []  # whether forms are asked for ahead of their use
+_begun: dict[
+    Path, subprocess.Popen
+] = {}  # compilers at work for libraries of this process's folder
+_held: list[int] = []  # locks of this process's folders, released however it ends
 
 
 def kept_in() -> Path:
@@ -100,12 +105,6 @@ def begin(comm: Any, make: Callable[[Path], Any]) -> None:
 
 class Begun(RuntimeError):
     """A form's compiler is at work."""
-
-
-_ahead: list[bool] = []  # whether forms are asked for ahead of their use
-_begun: dict[
-    Path, subprocess.Popen
-] = {}  # compilers at work for libraries of this process's folder
 
 
 def build(
@@ -212,9 +211,6 @@ def _leave(folder: Path) -> None:
         process.kill()
         process.wait()
     shutil.rmtree(folder, ignore_errors=True)
-
-
-_held: list[int] = []  # locks of this process's folders, released however it ends
 
 
 def _new_folder(kept: Path) -> Path:

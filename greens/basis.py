@@ -15,6 +15,10 @@ from tireroad.modal.corner import MOMENTS, SEEN
 from tireroad.modal.rolling import RollingModes
 from tireroad.modal.states import StateModes
 
+Array = np.ndarray
+Probes = sparse.csr_matrix  # (k, 3 s) over the outer face, or (k, 3 s + 6) with the rim
+ABOUT_AXLE = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])  # e_y x
+
 
 class Statics(NamedTuple):
     """Static answers of loads: `compliance` (r, k) m/N; `momentum` (3, k) kg m/N, int rho x, or (12, k),
@@ -30,11 +34,6 @@ def modal_statics(
     """Static answers between outputs (r, m) and loads (k, m) of a pencil with stiffness K~."""
     x = np.linalg.solve(stiffness, loads.T)
     return Statics(outputs @ x, carried @ x)
-
-
-Array = np.ndarray
-Probes = sparse.csr_matrix  # (k, 3 s) over the outer face, or (k, 3 s + 6) with the rim
-ABOUT_AXLE = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])  # e_y x
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -29,6 +29,13 @@ from tireroad.modal.basis import ModalBasis
 from tireroad.modal.damping import beyond
 from tireroad.modal.rolling import RollingModes, rolling_modes
 
+Figures = dict[str, tuple[float, str]]
+Answer = TypeVar("Answer")
+RESIDUALS = ("none", "dirac", "static", "attachment")
+# Points and frequencies at which the truncation error is estimated: enough for its magnitude.
+_SAMPLE = 40
+_FREQUENCIES = 25
+
 
 @dataclass(frozen=True)
 class Cutoff:
@@ -84,15 +91,6 @@ def estimate_axle(response: Response, cutoff: Cutoff, frequency: np.ndarray) -> 
 
 def _size(matrices: np.ndarray) -> np.ndarray:
     return np.linalg.norm(matrices, axis=(-2, -1))
-
-
-Figures = dict[str, tuple[float, str]]
-
-Answer = TypeVar("Answer")
-RESIDUALS = ("none", "dirac", "static", "attachment")
-# Points and frequencies at which the truncation error is estimated: enough for its magnitude.
-_SAMPLE = 40
-_FREQUENCIES = 25
 
 
 @dataclass(frozen=True, kw_only=True)

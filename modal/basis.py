@@ -21,6 +21,16 @@ from tireroad.modal.solver.fields import between, gram, projected, strain_energi
 from tireroad.modal.solver.slicing import Modes
 from tireroad.modal.waves import ModeNames
 
+Array = np.ndarray
+
+# Fraction of the largest squared length below which a direction is rounding.
+_ROUNDING = 1e-12
+# Share of a unit column, or its squared length afterwards, from which taking it off leaves rounding
+# of more than a hundred times the last digit.
+_CLEAN = 1e-4
+_ROWS = 4096  # of all fields at a time, when they are changed in place
+_SAME = 1e-9  # of the largest trace: two solutions of the same modes differ at least in signs
+
 
 @dataclass(frozen=True)
 class Air:
@@ -48,16 +58,6 @@ class Air:
         """The air's share (q,) of the states' kinetic energy, from their vectors (m + a ..., q)."""
         squares, own = np.abs(right) ** 2, self.coupling.shape[1]
         return squares[own : own + self.count].sum(axis=0) / squares.sum(axis=0)
-
-
-Array = np.ndarray
-
-# Fraction of the largest squared length below which a direction is rounding.
-_ROUNDING = 1e-12
-# Share of a unit column, or its squared length afterwards, from which taking it off leaves rounding
-# of more than a hundred times the last digit.
-_CLEAN = 1e-4
-_ROWS = 4096  # of all fields at a time, when they are changed in place
 
 
 def extended(modes: Modes, columns: Array, operators: Operators) -> Modes:
@@ -140,9 +140,6 @@ def with_corner(
 def with_air(projection: Projection, modes: Modes, air: Column | None) -> Projection:
     """The projection on the modes (all rows), with the air added where there is any. Collective."""
     return replace(projection, air=Air(air.duct, air.coupling(modes.vectors)) if air else None)
-
-
-_SAME = 1e-9  # of the largest trace: two solutions of the same modes differ at least in signs
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -32,6 +32,7 @@ BODY = 6  # index of the body's height, after the six motions of the rim
 # Motions that probes can read or load after the outer face: the rim's six and the body's height.
 SEEN = 7
 MOMENTS = slice(3, 6)  # of the six; after the motions probes can read the hub moments, N m
+_PER_MODE = ("mass", "stiffness", "gyroscopic", "convective")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -189,7 +190,6 @@ class Corner:
         return np.hstack([tire, whole[:, self.taking_part]])
 
 
-_PER_MODE = ("mass", "stiffness", "gyroscopic", "convective")
 ARRAYS = tuple(item.name for item in fields(Corner) if item.name != "axle")
 
 

@@ -41,6 +41,7 @@ MOTION = {
 RIGID = "rigid", "rigid body"
 STILL = "overdamped", "does not oscillate"
 WHEEL = "wheel", "wheel and body on their springs"
+_EVEN = 4  # angles a node, at which the elements' fields are read
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -243,9 +244,6 @@ def air_waves(share: np.ndarray, cosine: np.ndarray, sine: np.ndarray) -> AirWav
         np.concatenate([none, along]), np.abs(cosine + 1j * sine) ** 2
     )
     return AirWaves(mostly=share >= HALF, wave=wave, pure=pure, travel=travel)
-
-
-_EVEN = 4  # angles a node, at which the elements' fields are read
 
 
 def _weights(lattice: NodeGrid, number: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -59,6 +59,7 @@ Writes a scene with that tire and prints the figures beside those reached.
 """
 
 Arguments = Callable[[argparse.ArgumentParser], object]
+READERS = "check", "report", "export", "compare", "info", "cache"  # leave nothing to go on from
 
 
 @dataclass(frozen=True)
@@ -581,9 +582,6 @@ ALONE: dict[str, Callable[[argparse.Namespace], None]] = {
     "validate": _validate,
     "cache": _cache,
 }
-
-
-READERS = "check", "report", "export", "compare", "info", "cache"  # leave nothing to go on from
 
 
 def _alone(args: argparse.Namespace) -> int:

@@ -108,6 +108,8 @@ _ARGUMENTS = {
     **{f"tire.{name}": name for name in ("footprint_size", "order")},
 }
 _KEYS = re.compile("|".join(rf"(?<![\w.]){re.escape(key)}(?!\w)" for key in _ARGUMENTS))
+Array = NDArray[np.float64]
+_OF_ONE_TIRE = 1e-5  # relative difference of a mode's mass and stiffness from 1 kg and omega^2
 
 
 def in_arguments(text: str) -> str:
@@ -157,10 +159,6 @@ def _maker(hint: Any) -> str | None:
     """What makes the class of an annotation, which may also allow None."""
     names = [getattr(one, "__name__", "") for one in (hint, *get_args(hint))]
     return next((_MADE_BY[name] for name in names if name in _MADE_BY), None)
-
-
-Array = NDArray[np.float64]
-_OF_ONE_TIRE = 1e-5  # relative difference of a mode's mass and stiffness from 1 kg and omega^2
 
 
 @typed

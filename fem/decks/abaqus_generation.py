@@ -37,6 +37,13 @@ from tireroad.fem.decks.deck import (
 from tireroad.fem.errors import InputError
 
 _FACE = re.compile(r"S([1-6])")
+_FACES = 16  # more than the faces of an element
+_NAME = re.compile(r"[^\d\s+.-]")  # marks a field as the name of a set, not a number
+_FEW = 64  # blocks searched one by one; more are merged first
+_APART = 1e-9  # of the deck's size: tolerance for a node defined again at the same place
+_SAME = 1e-6  # of a radius: tolerance for the two ends of an arc
+MOST = 10**7  # limit of generated nodes and elements per deck
+Line = tuple[Place, list[str]]
 
 
 def _among(first: np.ndarray, second: np.ndarray) -> np.ndarray:
@@ -45,13 +52,11 @@ def _among(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     return np.isin(one, other)
 
 
-_FACES = 16  # more than the faces of an element
 _COMBINED = {
     "UNION": lambda first, second: np.concatenate([first, second]),
     "INTERSECTION": lambda first, second: first[_among(first, second)],
     "DIFFERENCE": lambda first, second: first[~_among(first, second)],
 }
-_NAME = re.compile(r"[^\d\s+.-]")  # marks a field as the name of a set, not a number
 
 
 def data_lines(lines: list[Data]) -> Iterator[tuple[Place, list[str]]]:
@@ -392,10 +397,6 @@ class InstancePlacement:
         return bool(x[0] * y[1] - x[1] * y[0] < 0)
 
 
-_FEW = 64  # blocks searched one by one; more are merged first
-_APART = 1e-9  # of the deck's size: tolerance for a node defined again at the same place
-
-
 class KnownNodes:
     """Blocks of nodes in the order of definition; of repeated nodes the last one holds."""
 
@@ -531,9 +532,6 @@ class KnownElements:
             raise block.place.error(f"element {again[0] % SCOPE} is defined twice")
 
 
-_SAME = 1e-6  # of a radius: tolerance for the two ends of an arc
-
-
 def along_line(first: np.ndarray, last: np.ndarray, share: np.ndarray) -> np.ndarray:
     """Points (..., k, 3) at fractions (k,) of the way from `first` to `last`."""
     return first + share[:, None] * (last - first)
@@ -601,11 +599,6 @@ def _unit(direction: np.ndarray, card: Card) -> np.ndarray:
     if not length > 0:
         raise card.place.error("*NCOPY: its points give no line or plane")
     return direction / length
-
-
-MOST = 10**7  # limit of generated nodes and elements per deck
-
-Line = tuple[Place, list[str]]
 
 
 class Generator:

@@ -35,6 +35,13 @@ from tireroad.fem.decks.quads import (
 from tireroad.fem.errors import InputError
 
 _NEWTON = 12
+Marks = dict[int, float]  # by a side's middle node: position of its cut from its lower end node
+SNAP = 0.01  # of a cell: tolerance within which a point lies on a node or side
+# A line that ends nearer than this to a side ends on it: a cell of a hundredth of its neighbours'
+# length left no correct digits in the modes (relative residual 0.6), one of a twentieth does not.
+_SNAP_END = 0.05
+_WITHIN = 1e-3  # of an element of the line: from its end to where its last cell is looked for
+_LEAST_ANGLE = 0.1  # sine between a line and a side; below it the line runs along the side
 
 
 def rate(t: np.ndarray) -> np.ndarray:
@@ -94,9 +101,6 @@ def locate(quads: Quads, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np
     for into, value in zip(found, (cells, where, beyond), strict=True):
         into[there] = value[best]
     return found
-
-
-Marks = dict[int, float]  # by a side's middle node: position of its cut from its lower end node
 
 
 class Origins:
@@ -241,14 +245,6 @@ def _tidy(quads: Quads) -> Quads:
     """Remove nodes that no cell uses any more."""
     used, cells = np.unique(quads.cells, return_inverse=True)
     return replace(quads, points=quads.points[used], cells=cells.reshape(quads.cells.shape))
-
-
-SNAP = 0.01  # of a cell: tolerance within which a point lies on a node or side
-# A line that ends nearer than this to a side ends on it: a cell of a hundredth of its neighbours'
-# length left no correct digits in the modes (relative residual 0.6), one of a twentieth does not.
-_SNAP_END = 0.05
-_WITHIN = 1e-3  # of an element of the line: from its end to where its last cell is looked for
-_LEAST_ANGLE = 0.1  # sine between a line and a side; below it the line runs along the side
 
 
 @dataclass(frozen=True)

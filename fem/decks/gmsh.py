@@ -58,6 +58,8 @@ FACES = {2: ("M3D3", 3), 3: ("M3D4", 4), 9: ("M3D6", 6), 10: ("M3D9", 9), 16: ("
 
 LARGEST = 1 << 29  # bytes
 _BEGIN = re.compile(rb"^\$([A-Za-z]+)[ \t\r]*\n", re.MULTILINE)
+Elements = list[tuple[int, tuple[int, ...], int, np.ndarray]]  # type, physical groups, label, nodes
+Groups = dict[tuple[int, int], tuple[int, ...]]  # (dimension, entity) -> its physical groups
 
 
 @dataclass(frozen=True)
@@ -185,7 +187,6 @@ class BinaryNumbers(_Numbers):
 
 
 Numbers = TextNumbers | BinaryNumbers
-Elements = list[tuple[int, tuple[int, ...], int, np.ndarray]]  # type, physical groups, label, nodes
 
 
 def read(path: Path) -> Deck:
@@ -245,9 +246,6 @@ def _names(part: Part | None) -> dict[tuple[int, int], str]:
         except (ValueError, IndexError):
             raise part.line(offset).error('a physical name is: dimension number "name"') from None
     return names
-
-
-Groups = dict[tuple[int, int], tuple[int, ...]]  # (dimension, entity) -> its physical groups
 
 
 def _entities(numbers: Numbers) -> Groups:

@@ -9,6 +9,9 @@ from tireroad.fem.decks.abaqus_generation import data_lines
 from tireroad.fem.decks.deck import Card, Data, cards, number
 from tireroad.fem.errors import InputError
 
+_Table = list[list[str]]
+_Values = list[list[float | None]]
+
 
 @dataclass
 class DeckHistory:
@@ -64,10 +67,6 @@ def _number(text: str, card: Card) -> float | None:
         return number(text, card.place) if text else None
     except InputError:
         return None
-
-
-_Table = list[list[str]]
-_Values = list[list[float | None]]
 
 
 def _revolve(found: DeckHistory, card: Card, _: _Table, values: _Values) -> None:

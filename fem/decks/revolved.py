@@ -33,6 +33,7 @@ from tireroad.fem.decks.deck import (
 from tireroad.fem.errors import InputError
 
 _SAME = 1e-6  # of the body's size (positions) or of a radian (angles): tolerance for equality
+_NODES = 2_000_000
 
 
 @dataclass(frozen=True)
@@ -170,9 +171,6 @@ def _from_circumference(deck: Deck, layer: CordLayer, axis: int) -> int:
     if system.turn:
         raise system.place.error("a system with a further turn about its normal is not read")
     return 1 if line[axis] > 0 else -1
-
-
-_NODES = 2_000_000
 
 
 @dataclass

@@ -47,6 +47,12 @@ from tireroad.fem.tire.body import Body
 _WEAK = 0.5  # spectral radius up to which the tangent does without the product
 _MARGIN = 1.3  # over it: held nodes and the deformed tire's other tangent
 _ROUNDS = 20  # of the power method: within 2 % of the spectral radius
+_ROAD = "active", "force", "height"
+MOST_STEPS = 25  # tangents; a load step that needs more is better halved
+TOLERANCE = 1e-12  # of the force scale
+_SERVES = 0.2  # error ratio up to which a tangent is reused, at 1/20 of a new one's cost
+_STAYS = 1e-10  # of the wall: rounding when a state is transferred from half the ring and back
+_DIVERGED = 1e8  # times the force scale, beyond which Newton's method does not recover
 
 
 class ShapeDamping:
@@ -145,9 +151,6 @@ def _rates(body: Body, clamp: list[fem.DirichletBC]) -> tuple[PETSc.Mat, float]:
         fastest = x.norm()
     rates.diagonalScale(inverse, root)
     return rates, fastest
-
-
-_ROAD = "active", "force", "height"
 
 
 class SolutionHistory:
@@ -354,13 +357,6 @@ class Forces:
     def _inside_out(self) -> bool:
         """Whether det F <= 0 at some Gauss point: the energy does not distinguish J from -J."""
         return self.body.comm.allreduce(fem.assemble_scalar(self._inverted)) > 0
-
-
-MOST_STEPS = 25  # tangents; a load step that needs more is better halved
-TOLERANCE = 1e-12  # of the force scale
-_SERVES = 0.2  # error ratio up to which a tangent is reused, at 1/20 of a new one's cost
-_STAYS = 1e-10  # of the wall: rounding when a state is transferred from half the ring and back
-_DIVERGED = 1e8  # times the force scale, beyond which Newton's method does not recover
 
 
 class Equilibrium(Forces):

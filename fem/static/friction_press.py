@@ -23,6 +23,13 @@ from tireroad.fem.timing import Timing
 from tireroad.fem.tire.body import Body
 
 Array = np.ndarray
+_NUDGE = 1e-5  # of the last point of a curve: step of the tangent's difference quotient
+_NEAR, _CLOSE = 1e-4, 1e-8  # of the travel: first offset tried, and tolerance of the secant method
+_MOST = 40  # secant iterations
+_ADVICE = (
+    "Take a smaller static.friction or slip, smaller elements at the footprint (tire.footprint_size), or more "
+    "static.friction_steps"
+)
 
 
 class RubbingSystem:
@@ -175,9 +182,6 @@ class RubbingEquilibrium(Equilibrium):
         return pulled
 
 
-_NUDGE = 1e-5  # of the last point of a curve: step of the tangent's difference quotient
-
-
 @dataclass(frozen=True)
 class Slid:
     """State at `moved` (m of the road, or slip of a rolling wheel).
@@ -308,14 +312,6 @@ class Slide:
         stuck, whole = self.problem.body.comm.allreduce(sums)
         rate = self._rate(self._shift(moved), size)
         return Slid(moved, self._force(), rate, float(state.moment[2]), float(stuck / whole))
-
-
-_NEAR, _CLOSE = 1e-4, 1e-8  # of the travel: first offset tried, and tolerance of the secant method
-_MOST = 40  # secant iterations
-_ADVICE = (
-    "Take a smaller static.friction or slip, smaller elements at the footprint (tire.footprint_size), or more "
-    "static.friction_steps"
-)
 
 
 @dataclass(frozen=True, kw_only=True)

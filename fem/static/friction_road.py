@@ -12,6 +12,9 @@ from tireroad.fem.static.road import FLAT, RoadContact, RoadShape
 from tireroad.fem.tire.body import Body
 
 Array = np.ndarray
+_ROUNDING, _BRINK = 1e-9, 1e-7  # of a node's friction bound
+# k over c of a node about to stick: with 1e6 the rounding of g prevented convergence
+_STIFFEST = 1e3
 
 
 class Sliding(Protocol):
@@ -155,11 +158,6 @@ class Couplings:
     own: Array
     springs: Array
     ahead: Array
-
-
-_ROUNDING, _BRINK = 1e-9, 1e-7  # of a node's friction bound
-# k over c of a node about to stick: with 1e6 the rounding of g prevented convergence
-_STIFFEST = 1e3
 
 
 class RubbingRoad(RoadContact):

@@ -31,6 +31,22 @@ _DRAGGED = 1.0  # of the load: residual after the steps with springs
 _FIRST = 1e-2  # of the typical stiffness of an unknown
 _EASED, _RAISED = 0.1, 10.0
 _MOST = 6  # steps with springs
+_FIRST_DRAG = 1e-2  # of an unknown's typical stiffness: a step then moves the tread by < 1 mm
+_LAST = 1e-5  # of the first: the tire is at rest
+_MOST_FALLS = 80  # steps; a section that folds at a tenth of a metre takes 20 to 30
+_DRAG_EASED, _DRAG_RAISED = 0.25, 8.0
+_SMALLEST = 1e-4  # of the first step: smaller load steps are abandoned
+# Of a rolling tire: one that needs smaller steps is at its critical speed. At 160 rad/s a radial
+# tire (critical at 157) was given up after ten minutes.
+_SMALLEST_ROLLING = 2e-2
+_LARGEST = 4  # times the first step
+_STUCK = 3  # consecutive failures after which a fall is tried, once
+_EASY = 6  # tangents up to which the next load step may grow
+Attempt = Callable[[float], SolveOutcome]
+LOAD_TOLERANCE = 1e-9  # of the requested load; a tenth of the tolerance of other comparisons
+_REACH = 2.2  # times the largest deflection so far: limit of the next trial
+_NEAR = 0.1  # of a requested load: residual allowed in intermediate states
+_CLOSED, _JUMP = 1e-6, 0.01  # of a deflection: bracket, across which that part of a load is a jump
 
 
 def cords_strained(equilibrium: Equilibrium, load: float) -> bool:
@@ -95,12 +111,6 @@ def _balance_with_springs(
     return replace(step, iterations=tangents)
 
 
-_FIRST_DRAG = 1e-2  # of an unknown's typical stiffness: a step then moves the tread by < 1 mm
-_LAST = 1e-5  # of the first: the tire is at rest
-_MOST_FALLS = 80  # steps; a section that folds at a tenth of a metre takes 20 to 30
-_DRAG_EASED, _DRAG_RAISED = 0.25, 8.0
-
-
 def pseudo_transient(
     equilibrium: Equilibrium, road_height: float, allowed: float = 0.0
 ) -> SolveOutcome:
@@ -140,17 +150,6 @@ def pseudo_transient(
     return SolveOutcome(
         False, tangents, step.residual, "pseudo-transient continuation does not converge either"
     )
-
-
-_SMALLEST = 1e-4  # of the first step: smaller load steps are abandoned
-# Of a rolling tire: one that needs smaller steps is at its critical speed. At 160 rad/s a radial
-# tire (critical at 157) was given up after ten minutes.
-_SMALLEST_ROLLING = 2e-2
-_LARGEST = 4  # times the first step
-_STUCK = 3  # consecutive failures after which a fall is tried, once
-_EASY = 6  # tangents up to which the next load step may grow
-
-Attempt = Callable[[float], SolveOutcome]
 
 
 @dataclass(frozen=True)
@@ -202,12 +201,6 @@ def march(
                 f"static: {show.what} stops at {done * scale:.6g} {unit} of {end * scale:.6g} {unit}; "
                 f"a further step of {size * scale:.2g} {unit} does not converge ({step.reason})"
             )
-
-
-LOAD_TOLERANCE = 1e-9  # of the requested load; a tenth of the tolerance of other comparisons
-_REACH = 2.2  # times the largest deflection so far: limit of the next trial
-_NEAR = 0.1  # of a requested load: residual allowed in intermediate states
-_CLOSED, _JUMP = 1e-6, 0.01  # of a deflection: bracket, across which that part of a load is a jump
 
 
 @dataclass(frozen=True)

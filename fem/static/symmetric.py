@@ -19,6 +19,9 @@ from tireroad.fem.timing import Timing
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.mesh import NodeGrid
 
+TURN = np.array([-1.0, -1.0, 1.0])  # of x, y, z under a half turn about the vertical
+_SAME = 1e-9  # of the section's size: distance of a cell's centre from another's image
+
 
 class AxisymmetricEquilibrium(Equilibrium):
     """Equilibrium of a ring's axisymmetric shape, on the shortest of its elements around.
@@ -109,9 +112,6 @@ def _turned(body: Body) -> sparse.csr_matrix:
     columns = np.broadcast_to((3 * number[node[own]] + np.arange(3)[:, None])[None], axes.shape)
     size = 3 * body.nodes, 3 * int((~held).sum())
     return sparse.csr_matrix((axes.ravel(), (rows.ravel(), columns.ravel())), size)
-
-
-TURN = np.array([-1.0, -1.0, 1.0])  # of x, y, z under a half turn about the vertical
 
 
 @dataclass(frozen=True)
@@ -298,9 +298,6 @@ class _Folding:
         summed = np.bincount(self._place, weights=given, minlength=len(self._columns))
         self.matrix.setValuesCSR(self._begin, self._columns, summed)
         self.matrix.assemble()
-
-
-_SAME = 1e-9  # of the section's size: distance of a cell's centre from another's image
 
 
 def looks_the_same(ring: Ring, rolling: Rolling) -> bool:

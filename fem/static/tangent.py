@@ -30,6 +30,10 @@ from tireroad.fem.timing import Timing
 
 _CHUNK = 64  # right-hand sides per solve
 _SINGULAR = (-6, -10)  # MUMPS's INFOG(1): structurally, numerically
+_ROUNDS = 10  # updates of the sets in one step
+_MOST = 400  # columns per factorisation
+_OFF = 1e-12  # m from the road: rounding leaves less
+Array = np.ndarray
 
 
 @dataclass(frozen=True)
@@ -253,13 +257,6 @@ def _solver(comm: MPI.Comm, matrix: PETSc.Mat, factorisation: str) -> PETSc.KSP:
         room["mat_mumps_icntl_14"] = 100
     ksp.setFromOptions()
     return ksp
-
-
-_ROUNDS = 10  # updates of the sets in one step
-_MOST = 400  # columns per factorisation
-_OFF = 1e-12  # m from the road: rounding leaves less
-
-Array = np.ndarray
 
 
 def held_step(

@@ -28,6 +28,12 @@ from tireroad.fem.parameters import Parameters, Registry, keys, plain
 if TYPE_CHECKING:
     from ufl.core.expr import Expr
 
+DYNAMIC_FREQUENCY = (
+    100.0  # Hz, at which `dynamic` and `loss_factor` hold, in the middle of 10 Hz to 1 kHz
+)
+_SAMPLED = 0.1, 1e5, 20  # Hz, Hz, samples in a decade of a Prony series
+_TURNS, _SETTLED = 50, 1e-12  # of the own frequencies; relative change of their squares
+
 
 class MaterialLaw(Parameters):
     """Base of hyperelastic laws, each a function of the right Cauchy-Green tensor C alone.
@@ -85,12 +91,6 @@ class MaterialLaw(Parameters):
 
 MATERIALS: Registry[MaterialLaw] = Registry("material model", "tireroad.fem.tire.laws", MaterialLaw)
 material_law = MATERIALS.register
-
-
-DYNAMIC_FREQUENCY = (
-    100.0  # Hz, at which `dynamic` and `loss_factor` hold, in the middle of 10 Hz to 1 kHz
-)
-_SAMPLED = 0.1, 1e5, 20  # Hz, Hz, samples in a decade of a Prony series
 
 
 @dataclass(frozen=True)
@@ -227,9 +227,6 @@ def kinds(compounds: Sequence[tuple[Spectrum, float, float]]) -> dict[Kind, list
         share = found.setdefault(kind, [0.0] * len(compounds))
         share[number] = dynamic * (loss if constant else 1.0)
     return found
-
-
-_TURNS, _SETTLED = 50, 1e-12  # of the own frequencies; relative change of their squares
 
 
 def own_moduli(

@@ -33,6 +33,7 @@ from tireroad.fem.tire.cords import Cords
 from tireroad.fem.tire.mesh import TireMesh
 
 AXES = 3
+RULE = "reduced"
 
 
 def edge_rule(order: int, kind: str) -> tuple[np.ndarray, np.ndarray]:
@@ -201,9 +202,6 @@ class Plies:
         if not any(one.density for one in self.cords):
             return 0
         return _sum(sheet.face.integral(sheet.mass * integrand, kind) for sheet in self.sheets)
-
-
-RULE = "reduced"
 
 
 def _sum(forms: Iterable[ufl.Form]) -> ufl.Form | int:

@@ -46,6 +46,31 @@ _NAMES = {
 }
 AXLE = 1000  # number of the axle as a point
 _EVEN = 1e-9
+SHAPES = 20  # modes written
+INSTANTS = 400  # contact states written: each takes 1 kB of page and an entry of the time slider
+_BORROWED = 'xpointer(//Grid[@Name="states"]/Grid[1]/*[self::Topology or self::Geometry])'
+AXES = ("x", "y", "z")
+NAMES = {  # levels in third_octave/ whose names do not give the quantity
+    "level": "axle force level",
+    "level_a_weighted": "axle force level a weighted",
+    "level_error": "error of the axle force level",
+    "contact_level": "contact force level",
+    "contact_level_a_weighted": "contact force level a weighted",
+    "contact_level_error": "error of the contact force level",
+}
+MADE = {
+    "tire.tir",
+    *(f"{name}.csv" for name in ("stiffness", "stiffness_longitudinal", "stiffness_lateral")),
+    *(f"{name}.csv" for name in ("footprint", "modes", "contact_force", "spectra", "third_octave")),
+    *(f"{name}.csv" for name in ("density", "response", "receptance", "vibration", "sound")),
+    *(f"{name}.csv" for name in ("rolling_modes", "campbell")),
+    "response.uff",
+    *(f"{name}.xdmf" for name in ("static", "modes", "contact", "motion")),
+    *(f"{name}_fields.h5" for name in ("static", "modes", "contact", "motion")),
+}
+"""The names of all files that an export may write."""
+Columns = dict[str, NDArray]  # heading with unit -> values (n)
+Remark = Callable[[str, str], None]  # name of a file, what cannot be made of it and why
 
 
 def frequency_responses(file: h5py.File, directions: Sequence[Sequence[float]]) -> str:
@@ -115,11 +140,6 @@ def dataset(
         for f, value in zip(frequency, values, strict=True):
             yield f"{f:13.5E}{value.real:20.11E}{value.imag:20.11E}"
     yield f"{-1:6d}"
-
-
-SHAPES = 20  # modes written
-INSTANTS = 400  # contact states written: each takes 1 kB of page and an entry of the time slider
-_BORROWED = 'xpointer(//Grid[@Name="states"]/Grid[1]/*[self::Topology or self::Geometry])'
 
 
 @dataclass
@@ -268,30 +288,6 @@ def _item(shape: tuple[int, ...], dtype: np.dtype, place: str) -> str:
         f'<DataItem Dimensions="{sizes}" NumberType="{kind}" '
         f'Precision="{dtype.itemsize}" Format="HDF">{place}</DataItem>'
     )
-
-
-AXES = ("x", "y", "z")
-NAMES = {  # levels in third_octave/ whose names do not give the quantity
-    "level": "axle force level",
-    "level_a_weighted": "axle force level a weighted",
-    "level_error": "error of the axle force level",
-    "contact_level": "contact force level",
-    "contact_level_a_weighted": "contact force level a weighted",
-    "contact_level_error": "error of the contact force level",
-}
-MADE = {
-    "tire.tir",
-    *(f"{name}.csv" for name in ("stiffness", "stiffness_longitudinal", "stiffness_lateral")),
-    *(f"{name}.csv" for name in ("footprint", "modes", "contact_force", "spectra", "third_octave")),
-    *(f"{name}.csv" for name in ("density", "response", "receptance", "vibration", "sound")),
-    *(f"{name}.csv" for name in ("rolling_modes", "campbell")),
-    "response.uff",
-    *(f"{name}.xdmf" for name in ("static", "modes", "contact", "motion")),
-    *(f"{name}_fields.h5" for name in ("static", "modes", "contact", "motion")),
-}
-"""The names of all files that an export may write."""
-Columns = dict[str, NDArray]  # heading with unit -> values (n)
-Remark = Callable[[str, str], None]  # name of a file, what cannot be made of it and why
 
 
 def export(

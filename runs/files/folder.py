@@ -29,6 +29,11 @@ from tireroad.runs.scene.resolved import MARK, scene_name
 from tireroad.runs.version import PROGRAM, RESULT_FORMAT, VERSION
 
 OTHER = "choose another folder with --out, or remove this one; nothing was written"
+MADE_OF = "made_of.txt"
+CHOSEN = "chosen.toml"
+"""The scene with the settings that a search has found."""
+UNFINISHED = ("checkpoint.h5", "static_last.h5")
+"""Files of a stage that has not ended: no entry of the summary tells of them."""
 
 
 def earlier_summary(directory: Path) -> dict[str, Any] | None:
@@ -115,9 +120,6 @@ def make_folder(directory: Path) -> None:
         raise _unusable(directory, error) from None
 
 
-MADE_OF = "made_of.txt"
-
-
 def folder_of(file: Path, of: Path = Path("results")) -> Path:
     """The folder for what is made from a file that is no scene: results/NAME, results/NAME-2, …
 
@@ -194,12 +196,6 @@ def _unusable(directory: Path, error: OSError) -> InputError:
         f"{directory}: cannot be written: {error.strerror}; choose another with --out"
     )
     return InputError(str(clear))
-
-
-CHOSEN = "chosen.toml"
-"""The scene with the settings that a search has found."""
-UNFINISHED = ("checkpoint.h5", "static_last.h5")
-"""Files of a stage that has not ended: no entry of the summary tells of them."""
 
 
 def has_result(entry: Mapping[str, Any] | None) -> bool:

@@ -54,6 +54,11 @@ LIBRARIES = {
 }
 """Libraries whose version can change a result, with the distributions that may hold them."""
 
+LOADED = ("mpi4py", "h5py")
+"""Libraries named in result files besides those in `identity`."""
+
+AGAIN = "run its scene again, which computes it anew"
+
 
 @dataclass(frozen=True)
 class Identity:
@@ -174,12 +179,6 @@ class Disk(io.RawIOBase):
     def close(self) -> None:
         self._file.close()
         super().close()
-
-
-LOADED = ("mpi4py", "h5py")
-"""Libraries named in result files besides those in `identity`."""
-
-AGAIN = "run its scene again, which computes it anew"
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,23 @@ _NEEDS_STIFFNESS = (
     "VERTICAL_STIFFNESS, the curves of load, effective rolling radius and footprint, and the horizontal stiffnesses "
     "are left out: add [stiffness] to the scene and run it again"
 )
+_STATIC = (
+    "mass",
+    "load",
+    "deflection",
+    "inflation",
+    "rolling_radius",
+    "footprint_length",
+    "footprint_width",
+)
+_UNITS = (
+    ("LENGTH", "meter"),
+    ("FORCE", "newton"),
+    ("ANGLE", "radians"),
+    ("MASS", "kg"),
+    ("TIME", "second"),
+)
+_STIFF = "load", "vertical", "longitudinal", "lateral", "torsional"
 
 
 def written(
@@ -75,24 +92,6 @@ def written(
 
 def _shown(value: float | str) -> str:
     return f"'{value}'" if isinstance(value, str) else f"{value:.8g}"
-
-
-_STATIC = (
-    "mass",
-    "load",
-    "deflection",
-    "inflation",
-    "rolling_radius",
-    "footprint_length",
-    "footprint_width",
-)
-_UNITS = (
-    ("LENGTH", "meter"),
-    ("FORCE", "newton"),
-    ("ANGLE", "radians"),
-    ("MASS", "kg"),
-    ("TIME", "second"),
-)
 
 
 def _sections(
@@ -168,9 +167,6 @@ def _sections(
         structural.append((KINDS[f"{name}_damping"].tir, mode.damping, "-, damping ratio"))
     yield "STRUCTURAL", structural
     yield "CONTACT_PATCH", patch
-
-
-_STIFF = "load", "vertical", "longitudinal", "lateral", "torsional"
 
 
 def _vertical(

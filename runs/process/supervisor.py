@@ -27,6 +27,14 @@ from tireroad.runs.process.signals import (
     rank_before_mpi,
 )
 
+PATIENCE = 8.0
+"""Seconds from a stop request to killing the worker. A loop that has noted the request writes its
+checkpoint first, however long that takes; elsewhere files are complete or absent, so nothing is
+lost."""
+
+_AGAIN = "completed stages are kept; run the same command or `resume` to continue"
+_PR_SET_PDEATHSIG = 1
+
 
 class _Sink(io.RawIOBase):
     """A file descriptor for output. Once it fails, output is dropped and `error` holds the reason.
@@ -99,15 +107,6 @@ def refused() -> OSError | None:
     sink = getattr(getattr(sys.stdout, "buffer", None), "raw", None)
     error = sink.error if isinstance(sink, _Sink) else None
     return None if isinstance(error, BrokenPipeError) else error
-
-
-PATIENCE = 8.0
-"""Seconds from a stop request to killing the worker. A loop that has noted the request writes its
-checkpoint first, however long that takes; elsewhere files are complete or absent, so nothing is
-lost."""
-
-_AGAIN = "completed stages are kept; run the same command or `resume` to continue"
-_PR_SET_PDEATHSIG = 1
 
 
 def supervise() -> None:

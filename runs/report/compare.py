@@ -44,6 +44,8 @@ from tireroad.runs.version import PROGRAM, VERSION
 Array = NDArray[np.float64]
 _ROUNDING = 1e-9  # relative: a load that is given comes out so near
 MATCHED = 24  # lowest modes of the first run that are matched in the others
+DASHES = ("-", "--")
+MOST = 12
 
 
 @dataclass(frozen=True)
@@ -166,9 +168,6 @@ def assurance(first: Array, second: Array) -> Array:
     return (a @ b.T) ** 2 / np.maximum(square, 1e-300)
 
 
-DASHES = ("-", "--")
-
-
 def pen(number: int) -> dict[str, str]:
     """Colour and dashes for the curve of run `number`."""
     return {"color": CYCLE[number % len(CYCLE)], "ls": DASHES[number // len(CYCLE) % 2]}
@@ -236,9 +235,6 @@ def footprints(runs: Mapping[str, tuple[Array, Array]], width: float) -> str:
     axes[0, 0].set_ylabel("y in mm")
     figure.colorbar(ScalarMappable(scale, PRESSURE), ax=axes, label="pressure in kPa", pad=0.01)
     return encode(figure, "png")
-
-
-MOST = 12
 
 
 def compare(directories: Sequence[Path], out: Path) -> Path:

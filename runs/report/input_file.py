@@ -32,6 +32,19 @@ from tireroad.runs.scene.tables.tire import TireTable
 _RIM = re.compile(r"RIM|BEAD|FLANGE|WHEEL")
 _INNER = re.compile(r"INNER|INSIDE|LINER|CAVITY|INFLAT|PRESS|_IN\b|^IN\b")
 _TREAD = re.compile(r"TREAD|OUTSIDE|OUTER|GROUND|ROAD|CONTACT|_OUT\b|^OUT\b")
+KINDS = {
+    ".crg": ("crg",),
+    ".npz": ("grid",),
+    ".h5": ("grid",),
+    ".hdf5": ("grid",),
+    ".csv": ("grid", "laser"),
+    ".nc": ("grid",),
+    **dict.fromkeys((".txt", ".tsv", ".xyz"), ("grid", "laser")),
+    **dict.fromkeys((".dat", ".asc", ".prn"), ("laser",)),
+}
+"""Kinds of road by ending, in the order in which they are tried."""
+_LONG = 0.35  # m: shortest wave of the fit of ISO 8608, 2.83 cycles a metre
+_MOST = 400_000  # heights of the middle line that are evaluated
 
 
 def is_tire_file(path: Path) -> bool:
@@ -255,21 +268,6 @@ def draw_fits(rubbers: list[Rubber]) -> Figure:
         )
         here.legend(fontsize=8)
     return figure
-
-
-KINDS = {
-    ".crg": ("crg",),
-    ".npz": ("grid",),
-    ".h5": ("grid",),
-    ".hdf5": ("grid",),
-    ".csv": ("grid", "laser"),
-    ".nc": ("grid",),
-    **dict.fromkeys((".txt", ".tsv", ".xyz"), ("grid", "laser")),
-    **dict.fromkeys((".dat", ".asc", ".prn"), ("laser",)),
-}
-"""Kinds of road by ending, in the order in which they are tried."""
-_LONG = 0.35  # m: shortest wave of the fit of ISO 8608, 2.83 cycles a metre
-_MOST = 400_000  # heights of the middle line that are evaluated
 
 
 def is_road_file(path: Path) -> bool:

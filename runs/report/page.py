@@ -43,6 +43,41 @@ Fact = tuple[str, str]
 _MODES = 4
 _HEARD = 3  # microphones among the first figures
 _SPREAD = "error of the deviation of the"
+Given = Callable[[str, str], float | None]
+_KNOWN = 0.9  # least part of a total that lies in bands of known error
+
+# (part of the indicator's name, largest good value, largest usable value); the first match counts.
+# At these limits a figure of the report would begin to change: 1e-6 of an eigenvector is 1e-12 of
+# its frequency; 1 % of the load is 1 % of the forces.
+LIMITS: tuple[tuple[str, float, float], ...] = (
+    ("least contact force", 0.0, 0.0),  # no point may pull; see `verdict`
+    ("largest penetration", 1e-9, 1e-6),
+    ("estimated error of the load", 1.0, 3.0),
+    ("residual in the static flexibility", 0.5, 1.0),
+    ("worst complementarity residual", 1e-9, 1e-6),
+    ("energy", inf, inf),  # in joules: rated by the other energy figures
+    ("residual states", inf, inf),  # a count
+    ("residual", 1e-8, 1e-5),
+    ("orthonormality", 1e-9, 1e-6),
+    ("identity", 1e-9, 1e-6),
+    ("biorthogonality", 1e-9, 1e-6),
+    ("basis condition", 1e4, 1e6),
+    ("near-defective", 0.0, 10.0),
+    ("truncation error", 0.05, 0.2),
+)
+GOOD, FAIR, POOR = "good", "fair", "poor"
+
+SECTIONS: Mapping[str, Callable[[Results], Section]] = {
+    "static.h5": tire.static,
+    "contact.h5": forces.contact,
+    "spectra.h5": spectra.spectra,
+    "sound.h5": sound.sound,
+    "vibration.h5": modes.vibration,
+    "response.h5": forces.response,
+    "stiffness.h5": tire.stiffness,
+    "modes.h5": tire.modes,
+    "rotating.h5": modes.rotating,
+}
 
 
 def answer(results: Results, stages: Mapping[str, Any]) -> list[Fact]:
@@ -68,9 +103,6 @@ class _Headlines:
         ]
         value = (groups[0].get(name) or groups[1].get(name) or {}).get("value")
         return float(value) if isinstance(value, int | float) else None
-
-
-Given = Callable[[str, str], float | None]
 
 
 def _standing(results: Results, given: Given) -> list[Fact]:
@@ -150,9 +182,6 @@ def _levels(results: Results, given: Given) -> list[Fact]:
     return [*found, ("valid up to", quantity(end, "Hz"))] if end else found
 
 
-_KNOWN = 0.9  # least part of a total that lies in bands of known error
-
-
 def _error_of(total: float, level: np.ndarray | None, error: np.ndarray | None) -> float:
     """Upper bound (dB) of the error of a vertical total, by those of the bands; NaN where too little is known."""
     if level is None or error is None:
@@ -190,28 +219,6 @@ def _modes(results: Results, _: Given) -> list[Fact]:
     return [("lowest modes, undamped", told)] if len(lowest) else []
 
 
-# (part of the indicator's name, largest good value, largest usable value); the first match counts.
-# At these limits a figure of the report would begin to change: 1e-6 of an eigenvector is 1e-12 of
-# its frequency; 1 % of the load is 1 % of the forces.
-LIMITS: tuple[tuple[str, float, float], ...] = (
-    ("least contact force", 0.0, 0.0),  # no point may pull; see `verdict`
-    ("largest penetration", 1e-9, 1e-6),
-    ("estimated error of the load", 1.0, 3.0),
-    ("residual in the static flexibility", 0.5, 1.0),
-    ("worst complementarity residual", 1e-9, 1e-6),
-    ("energy", inf, inf),  # in joules: rated by the other energy figures
-    ("residual states", inf, inf),  # a count
-    ("residual", 1e-8, 1e-5),
-    ("orthonormality", 1e-9, 1e-6),
-    ("identity", 1e-9, 1e-6),
-    ("biorthogonality", 1e-9, 1e-6),
-    ("basis condition", 1e4, 1e6),
-    ("near-defective", 0.0, 10.0),
-    ("truncation error", 0.05, 0.2),
-)
-GOOD, FAIR, POOR = "good", "fair", "poor"
-
-
 def verdict(name: str, value: Any) -> str:
     """ "good", "fair", "poor", or "" for a figure without a rating."""
     if isinstance(value, bool) or not isinstance(value, int | float):
@@ -235,19 +242,6 @@ def verdicts(stages: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str, An
     ]
     order = {POOR: 0, FAIR: 1, GOOD: 2, "": 3}
     return sorted(rows, key=lambda row: order[row[4]])
-
-
-SECTIONS: Mapping[str, Callable[[Results], Section]] = {
-    "static.h5": tire.static,
-    "contact.h5": forces.contact,
-    "spectra.h5": spectra.spectra,
-    "sound.h5": sound.sound,
-    "vibration.h5": modes.vibration,
-    "response.h5": forces.response,
-    "stiffness.h5": tire.stiffness,
-    "modes.h5": tire.modes,
-    "rotating.h5": modes.rotating,
-}
 
 
 def write_report(directory: Path) -> Path:

@@ -41,6 +41,104 @@ _WEAK = 0.5  # as in fem.static.equilibrium, which is not imported just to estim
 # standing one 6 or 7 a step, and 4 for its load.
 _ROLLING, _TRAVEL, _SLIP, _STEP, _LOAD = 8, 13, 8, 7, 4
 
+# Error bars, of the time of all else: 0.49 in torus.toml and 0.35 in passenger.toml
+# (2026-11-24); the stage bounds its window to keep them below a half.
+_BARS = 0.42
+# The load's error by finer meshes, of the time of the static state: 1.8 of 9,828 and of 29,700
+# unknowns (2026-11-25). The companion runs of error bars go without it.
+_LOAD_ERROR = 1.8
+# s a step of the horizontal forces: some turns of Newton steps with products between all points that touch.
+# Measured with a tread that shears (2026-11-28): 0.3 ms with 81 points that touch, a torus, 0.7 ms with 100, 7 ms with
+# 550, passenger tires; with a brush alone 0.3 ms with 81.
+_SHEARED, _SHEARED_PAIR, _BRISTLES = 3e-4, 2.2e-8, 3e-4
+# One tangent with friction, of the frictionless static state: its factor has two triangles, and is
+# of the whole ring. Measured on the built-in tire (2026-11-25): 0.2 standing, 0.24 and 0.26 rolling.
+_RUBBING = 0.25
+PACKED = 0.3
+"""Size of contact.h5 relative to its raw numbers: most forces are 0 (measured: 0.24 on stones, 0.29
+on texture)."""
+REPORT = 1.6e6
+"""Bytes of report.html and the text files: 0.9 to 2.1 MB in twenty runs (2026-11-25)."""
+HEADER = 3e4
+"""Bytes of a file's scene, settings and empty datasets."""
+INSTANTS = 400
+"""Instants of the outer face in motion.h5 at most (runs.stages.vibration)."""
+MOST_OF_VIBRATION = 2e8
+"""Bytes of the outer face's spectra in vibration.h5 at most (runs.stages.vibration)."""
+
+PROGRAM = 2.1e8
+"""Bytes of one process with all libraries loaded and the mesh made (measured)."""
+MATRICES = 5
+"""Sparse matrices held at peak: K, its scaled copy and parts, those of rotation (measured,
+including the rest: 0.6 to 0.83 GB for torus.toml, 1.1 to 1.4 GB for passenger.toml, 2.3 to 2.8
+GB for a passenger tire of 102,060 unknowns on one process, 1.6 to 1.8 GB on each of two)."""
+BASES = 3
+"""Copies of all modes held at peak: slices, the sorted vectors, their products."""
+ANSWERS = 6 * 64
+"""Columns held while solving for the flexibility of the patch (fem.matrices.compliance.solve_parts):
+loads, solutions, copies."""
+SHAPES = 3
+"""Full-length columns per force on the patch held at peak, with attachment modes; other residuals
+hold only values at the patch."""
+BLOCK = 512
+"""Steps of contact results held between two writes (runs.stages.contact_file)."""
+PIECE = 64
+"""Steps of which the work is computed at a time (contact.results.energy)."""
+PIVOT, PIVOTED, USUAL = 5, 2, 3
+"""Copies of the matrix of the usual set during pivoting and afterwards (contact.solver.active_set), and its
+size over the number of points that touch at rest: 3,094 of 958 (2026-11-25)."""
+SLIPPING = 16
+"""Copies of the matrix of the touching points while the largest unique friction is found: the tread's
+kernels and their indices 7, the normal forces' 1, of twice its width the lifts 2, the coupling 1, its
+singular values 1 (contact.solver.stick_slip). Not during pivoting."""
+
+FOOTPRINT = "columns of the footprint"
+FACTOR = "factor of the stiffness"
+
+# Keys that determine the size of each part.
+KEYS = {
+    "matrices": "tire.segments, tire.elements_arc, tire.elements_thickness, tire.order",
+    FACTOR: "tire.segments, tire.elements_arc, tire.elements_thickness, tire.order",
+    LOAD_ERROR: "static.error_estimate, and the mesh",
+    FRICTION: "static.friction, and the mesh",
+    DAMPING: "damping.stiffness, and the mesh",
+    "modes": "modal.count or modal.up_to, and the mesh",
+    FOOTPRINT: "tire.segments, tire.elements_arc, tire.elements_thickness, tire.order",
+    "rotating pencil": "modal.count or modal.up_to",
+    "flexibility of the patch": "greens.residual, the mesh, contact.reach, the road's height",
+    "contact": "contact.points, contact.reach, the road's height",
+    "receptances": "output.receptance.step, output.receptance.to, the number of forces",
+    "time series": "time.duration, time.step",
+    "contact.h5": "time.duration, time.step, contact.points",
+    "contact loop": "time.duration, time.step, contact.points",
+    "modes.h5": "modal.count, and the mesh",
+    "vibration.h5": "output.vibration, time.duration, and the mesh",
+    "motion.h5": "output.fields, and the mesh",
+    "radiation.h5": "sound.up_to",
+    "radiation": "sound.up_to",
+    "air around": "sound.up_to",
+    "error bars": "accuracy.estimate",
+}
+
+# The estimate is within a factor of 1.5: above CERTAIN a run cannot succeed, above DOUBTFUL it may
+# not.
+CERTAIN, DOUBTFUL = 1.5, 0.8
+# Parts that the processes of a run share by rows; of everything else each process has its own.
+SPREAD = (
+    "matrices",
+    FACTOR,
+    FOOTPRINT,
+    LOAD_ERROR,
+    FRICTION,
+    DAMPING,
+    "modes",
+    "flexibility of the patch",
+)
+# Share of a factor that MUMPS keeps on disk out of core: with 54,000 and 108,000 unknowns, 26 and
+# 22 % of the memory were still taken.
+ON_DISK = 0.7
+LONG = 3600.0  # s: runs estimated to take longer cause a warning
+
 
 def turning(scene: Scene) -> bool:
     """Whether the wheel turns."""
@@ -114,21 +212,6 @@ def _companions(free: float, through: int, order: int) -> float:
         matrices(TANGENTS, one, through, p) + factor(one, through, p)
         for one, p in ((free, order), (rest, other))
     )
-
-
-# Error bars, of the time of all else: 0.49 in torus.toml and 0.35 in passenger.toml
-# (2026-11-24); the stage bounds its window to keep them below a half.
-_BARS = 0.42
-# The load's error by finer meshes, of the time of the static state: 1.8 of 9,828 and of 29,700
-# unknowns (2026-11-25). The companion runs of error bars go without it.
-_LOAD_ERROR = 1.8
-# s a step of the horizontal forces: some turns of Newton steps with products between all points that touch.
-# Measured with a tread that shears (2026-11-28): 0.3 ms with 81 points that touch, a torus, 0.7 ms with 100, 7 ms with
-# 550, passenger tires; with a brush alone 0.3 ms with 81.
-_SHEARED, _SHEARED_PAIR, _BRISTLES = 3e-4, 2.2e-8, 3e-4
-# One tangent with friction, of the frictionless static state: its factor has two triangles, and is
-# of the whole ring. Measured on the built-in tire (2026-11-25): 0.2 standing, 0.24 and 0.26 rolling.
-_RUBBING = 0.25
 
 
 def seconds(
@@ -210,19 +293,6 @@ def boundary_elements(scene: Scene) -> tuple[float, float]:
     return 1000 + 1.75 / size**2, 2 + up_to / 60
 
 
-PACKED = 0.3
-"""Size of contact.h5 relative to its raw numbers: most forces are 0 (measured: 0.24 on stones, 0.29
-on texture)."""
-REPORT = 1.6e6
-"""Bytes of report.html and the text files: 0.9 to 2.1 MB in twenty runs (2026-11-25)."""
-HEADER = 3e4
-"""Bytes of a file's scene, settings and empty datasets."""
-INSTANTS = 400
-"""Instants of the outer face in motion.h5 at most (runs.stages.vibration)."""
-MOST_OF_VIBRATION = 2e8
-"""Bytes of the outer face's spectra in vibration.h5 at most (runs.stages.vibration)."""
-
-
 def disk(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, float]:
     """Peak bytes of the result folder by file, without stages that are `left_out`."""
     parts = {"static.h5": HEADER + 40.0 * size.free}
@@ -273,61 +343,6 @@ def _in_frequency(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[s
         # Eight instants a period of the highest line, the last ones of the run.
         parts["motion.h5"] = HEADER + 4.0 * min(8 * lines, INSTANTS) * outer
     return parts
-
-
-PROGRAM = 2.1e8
-"""Bytes of one process with all libraries loaded and the mesh made (measured)."""
-MATRICES = 5
-"""Sparse matrices held at peak: K, its scaled copy and parts, those of rotation (measured,
-including the rest: 0.6 to 0.83 GB for torus.toml, 1.1 to 1.4 GB for passenger.toml, 2.3 to 2.8
-GB for a passenger tire of 102,060 unknowns on one process, 1.6 to 1.8 GB on each of two)."""
-BASES = 3
-"""Copies of all modes held at peak: slices, the sorted vectors, their products."""
-ANSWERS = 6 * 64
-"""Columns held while solving for the flexibility of the patch (fem.matrices.compliance.solve_parts):
-loads, solutions, copies."""
-SHAPES = 3
-"""Full-length columns per force on the patch held at peak, with attachment modes; other residuals
-hold only values at the patch."""
-BLOCK = 512
-"""Steps of contact results held between two writes (runs.stages.contact_file)."""
-PIECE = 64
-"""Steps of which the work is computed at a time (contact.results.energy)."""
-PIVOT, PIVOTED, USUAL = 5, 2, 3
-"""Copies of the matrix of the usual set during pivoting and afterwards (contact.solver.active_set), and its
-size over the number of points that touch at rest: 3,094 of 958 (2026-11-25)."""
-SLIPPING = 16
-"""Copies of the matrix of the touching points while the largest unique friction is found: the tread's
-kernels and their indices 7, the normal forces' 1, of twice its width the lifts 2, the coupling 1, its
-singular values 1 (contact.solver.stick_slip). Not during pivoting."""
-
-FOOTPRINT = "columns of the footprint"
-FACTOR = "factor of the stiffness"
-
-# Keys that determine the size of each part.
-KEYS = {
-    "matrices": "tire.segments, tire.elements_arc, tire.elements_thickness, tire.order",
-    FACTOR: "tire.segments, tire.elements_arc, tire.elements_thickness, tire.order",
-    LOAD_ERROR: "static.error_estimate, and the mesh",
-    FRICTION: "static.friction, and the mesh",
-    DAMPING: "damping.stiffness, and the mesh",
-    "modes": "modal.count or modal.up_to, and the mesh",
-    FOOTPRINT: "tire.segments, tire.elements_arc, tire.elements_thickness, tire.order",
-    "rotating pencil": "modal.count or modal.up_to",
-    "flexibility of the patch": "greens.residual, the mesh, contact.reach, the road's height",
-    "contact": "contact.points, contact.reach, the road's height",
-    "receptances": "output.receptance.step, output.receptance.to, the number of forces",
-    "time series": "time.duration, time.step",
-    "contact.h5": "time.duration, time.step, contact.points",
-    "contact loop": "time.duration, time.step, contact.points",
-    "modes.h5": "modal.count, and the mesh",
-    "vibration.h5": "output.vibration, time.duration, and the mesh",
-    "motion.h5": "output.fields, and the mesh",
-    "radiation.h5": "sound.up_to",
-    "radiation": "sound.up_to",
-    "air around": "sound.up_to",
-    "error bars": "accuracy.estimate",
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -450,26 +465,6 @@ def _matrices_of_points(scene: Scene, size: Sizes) -> int:
         by_product = size.touching > 1.5 * MOST_TOUCHING  # the estimate may be half too high
     usual = min(size.points, USUAL * size.touching)
     return 0 if by_product else PIVOT * usual**2
-
-
-# The estimate is within a factor of 1.5: above CERTAIN a run cannot succeed, above DOUBTFUL it may
-# not.
-CERTAIN, DOUBTFUL = 1.5, 0.8
-# Parts that the processes of a run share by rows; of everything else each process has its own.
-SPREAD = (
-    "matrices",
-    FACTOR,
-    FOOTPRINT,
-    LOAD_ERROR,
-    FRICTION,
-    DAMPING,
-    "modes",
-    "flexibility of the patch",
-)
-# Share of a factor that MUMPS keeps on disk out of core: with 54,000 and 108,000 unknowns, 26 and
-# 22 % of the memory were still taken.
-ON_DISK = 0.7
-LONG = 3600.0  # s: runs estimated to take longer cause a warning
 
 
 def check_demand(wanted: Estimate, directory: Path, processes: int = 1) -> list[str]:

@@ -56,6 +56,29 @@ from tireroad.runs.scene.tables.tire import SECTIONS, TireTable, check_series
 LARGEST = 1_000_000
 
 Say = Callable[[str], object]
+BAND_EDGE = 10**0.05  # upper edge of a third octave over its middle
+# Of the band's upper edge: damped forces are off by 3/16 (2 pi / 16)^2 = 2.9 % there, 0.25 dB; on a rough road
+# linear ones chatter.
+STEPS_A_PERIOD = 16
+SCHEME = "damped"
+LOOSER = 0.01  # rotation.shape_tolerance where errors count in dB: docs/verification/band.md
+# Points on the shortest wave, where that is closer than the nodes of a mesh lead to: within 1.2 dB of points 0.7
+# times as far apart in every third octave from 79 Hz to 1 kHz, where those at half the nodes' distance (3.8 mm) are
+# 0.6 to 3.7 dB too loud (205/60 R15 at 80 km/h on two-slope; docs/verification/band.md).
+ON_A_WAVE, CLOSE = 8.0, 4e-3  # -, m
+UNHEARD = 1.2  # times the band's upper edge: the rolling radius is not known yet
+COARSE_UP_TO = 450.0  # Hz: to there 24 segments of 16 elements carry the waves of a radial tire
+TREAD_RUBBER = (
+    1e7  # Pa: contact.youngs_modulus of a radial tire, whose own tread is taken for usual
+)
+NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,99}")
+_WRONG = object()
+_OF_A_SWEEP = ("sweep", "axis", "member", "scene", "slurm")  # keys that a scene has not
+_DROPPED: dict[tuple[str, ...], str] = {
+    ("greens", "choice"): "greens.dynamic takes the states that participate most; remove it",
+    ("output", "velocity"): "take the derivative of displacement in response.h5",
+    ("output", "acceleration"): "take the second derivative of displacement in response.h5",
+}
 
 
 def read_text(path: Path) -> str:
@@ -195,20 +218,6 @@ def with_merged(scene: Scene, raw: dict[str, Any], source: Source, say: Say) -> 
     return replace(scene, tire=with_parts(scene.tire, given, read, source, say))
 
 
-BAND_EDGE = 10**0.05  # upper edge of a third octave over its middle
-# Of the band's upper edge: damped forces are off by 3/16 (2 pi / 16)^2 = 2.9 % there, 0.25 dB; on a rough road
-# linear ones chatter.
-STEPS_A_PERIOD = 16
-SCHEME = "damped"
-LOOSER = 0.01  # rotation.shape_tolerance where errors count in dB: docs/verification/band.md
-# Points on the shortest wave, where that is closer than the nodes of a mesh lead to: within 1.2 dB of points 0.7
-# times as far apart in every third octave from 79 Hz to 1 kHz, where those at half the nodes' distance (3.8 mm) are
-# 0.6 to 3.7 dB too loud (205/60 R15 at 80 km/h on two-slope; docs/verification/band.md).
-ON_A_WAVE, CLOSE = 8.0, 4e-3  # -, m
-UNHEARD = 1.2  # times the band's upper edge: the rolling radius is not known yet
-COARSE_UP_TO = 450.0  # Hz: to there 24 segments of 16 elements carry the waves of a radial tire
-
-
 def with_band(scene: Scene, raw: dict[str, Any], say: Say) -> Scene:
     """Choose by accuracy.up_to, where a scene gives it, what it leaves open: mesh, modes, step.
 
@@ -301,11 +310,6 @@ def _unheard(wanted: float, speed: float, scene: Scene) -> float:
     return round(count * digit, 9)
 
 
-TREAD_RUBBER = (
-    1e7  # Pa: contact.youngs_modulus of a radial tire, whose own tread is taken for usual
-)
-
-
 def with_tread_rubber(scene: Scene, raw: dict[str, Any], say: Say) -> Scene:
     """Rubber of the contact of a radial tire where the scene leaves it open: as much stiffer as its tread."""
     contact, stiffer = scene.contact, scene.tire.shape.tread_over_own(scene.tire)
@@ -388,9 +392,6 @@ def with_count(
         text = f"= {count} must be less than the {free} free unknowns of the mesh"
         source.add(("modal", "count"), text)
     return scene
-
-
-NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,99}")
 
 
 def load(
@@ -476,9 +477,6 @@ def _no_table(path: tuple[str, ...], raw: Any) -> str:
         header = ".".join(part for part in path if not part.isdigit())
         return f"must be written [{header}] in the scene, and once"
     return f"must be a table, not {described(raw)}"
-
-
-_WRONG = object()
 
 
 def _without_checks(of: type, values: dict[str, Any]) -> Any:
@@ -578,9 +576,6 @@ def _file(name: str, path: tuple[str, ...], source: Source) -> Any:
     return str(file)
 
 
-_OF_A_SWEEP = ("sweep", "axis", "member", "scene", "slurm")  # keys that a scene has not
-
-
 def _everywhere(of: type, path: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
     """The paths of all keys and tables below dataclass `of`."""
     found = []
@@ -590,13 +585,6 @@ def _everywhere(of: type, path: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
         if part:
             found += _everywhere(part.of, (*path, name))
     return found
-
-
-_DROPPED: dict[tuple[str, ...], str] = {
-    ("greens", "choice"): "greens.dynamic takes the states that participate most; remove it",
-    ("output", "velocity"): "take the derivative of displacement in response.h5",
-    ("output", "acceleration"): "take the second derivative of displacement in response.h5",
-}
 
 
 def _unknown(of: type, path: tuple[str, ...], name: str, values: dict, source: Source) -> None:

@@ -34,6 +34,8 @@ Where = Callable[[tuple[str, ...], str], InputError]
 
 # Least ratio of an inside drum's radius to the tire's outer radius that leaves room to press it.
 _ROOM = 1.15
+_MADE: dict[tuple, Road] = {}  # only the last road
+MOST_SPEEDS = 10_000
 
 
 def check_shape(scene: Scene, raw: dict[str, Any], error: Where) -> None:
@@ -130,9 +132,6 @@ def without_relief(road: RoadTable, first: float, last: float) -> str:
     )
 
 
-_MADE: dict[tuple, Road] = {}  # only the last road
-
-
 def made(surface: RoadKind) -> Road:
     """The road of a scene; the last one is kept, since reading a file may take seconds."""
     found = _MADE.get(_which(surface))
@@ -194,9 +193,6 @@ def full_matrices(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     if scene.tire.shape.varies(scene.tire):
         advice = "needs moduli that do not depend on frequency: set exponent = 0 in [[tire.region]]"
         raise error(("rotation", "method"), f'= "full" {advice}')
-
-
-MOST_SPEEDS = 10_000
 
 
 def check_outputs(scene: Scene, raw: dict[str, Any], error: Where) -> Iterator[InputError]:

@@ -32,6 +32,9 @@ if TYPE_CHECKING:  # a report reads the journal without finite elements
     from tireroad.runs.stages.accuracy import Accuracy
 
 VERTICAL = 2
+FOLDER = "search"
+_SCENE = "scene.toml"
+NAME = "search.json"
 
 
 @dataclass(frozen=True)
@@ -102,10 +105,6 @@ def _number(value: float) -> str:
     return f"{value:.2g}" if np.isfinite(value) else "unknown"
 
 
-FOLDER = "search"
-_SCENE = "scene.toml"
-
-
 def begin(directory: Path, scene_text: str) -> None:
     """Keep the resolved scene of a search; what an earlier one chose is removed. Root only.
 
@@ -132,9 +131,6 @@ def leave(directory: Path) -> None:
 def forget(directory: Path) -> None:
     """Remove the scene as given, and the stages of the trials. Root process only."""
     shutil.rmtree(directory / FOLDER, ignore_errors=True)
-
-
-NAME = "search.json"
 
 
 @dataclass(frozen=True)

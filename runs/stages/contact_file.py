@@ -40,6 +40,32 @@ from tireroad.runs.stages.stage import Job, Record
 
 LEVEL = 1  # higher levels take several times as long for a few percent
 
+# Share of the road's standard deviation that the points have to see.
+_SEEN = 0.5
+# Share of its height from which on an obstacle counts as whole.
+_WHOLE = 0.98
+_LONGEST = 1.0  # m of road that is sampled
+_MOST = 8000  # samples along
+_CHUNK = 512  # steps in a chunk of what is not one number a point
+CHECKPOINT = "checkpoint.h5"
+STATE = "state"  # the group that a checkpoint has in addition to those of contact.h5
+
+_LAYOUT: dict[str, tuple[tuple, str]] = {
+    "time": ((), "s"),
+    "normal_force": ((None,), "N"),
+    "horizontal_force": ((None, 2), "N"),
+    "total_force": ((3,), "N"),
+    "displacement": ((None,), "m"),
+    "gap": ((None,), "m"),
+    "axle_force": ((3,), "N"),
+    "active": ((), "-"),
+    "residual": ((), "-"),
+}
+_OF_BLOCK = (
+    "time", "gap", "displacement", "axle_force", "active", "residual", "penetration", "moved", "total_force",
+)  # fmt: skip
+DRIVEN = "driven_displacement"  # (nt, k, 3) m at the k prescribed forces, if the scene has them
+
 
 def create(file: h5py.File, name: str, rows: int, width: tuple[int, ...]) -> h5py.Dataset:
     """An empty, growing dataset (0, *width) in compressed chunks of `rows` rows.
@@ -95,12 +121,6 @@ def _packed(values: np.ndarray, kind: np.dtype) -> bytes:
     return zlib.compress(np.ascontiguousarray(octets.T).data, LEVEL)
 
 
-# Share of the road's standard deviation that the points have to see.
-_SEEN = 0.5
-# Share of its height from which on an obstacle counts as whole.
-_WHOLE = 0.98
-
-
 def describe(record: Record, setup: ContactSetup, road: RoadTable) -> None:
     """Record the mean profile depth; report the processing of a measured road in words.
 
@@ -150,10 +170,6 @@ def fill(file: h5py.File, setup: ContactSetup) -> None:
         file.attrs["mean_profile_depth"] = road.texture.depth
 
 
-_LONGEST = 1.0  # m of road that is sampled
-_MOST = 8000  # samples along
-
-
 class Relief(NamedTuple):
     """Standard deviation (m) of the heights of the `road`, and of those that the `points` see."""
 
@@ -195,27 +211,6 @@ def _places(setup: ContactSetup) -> np.ndarray:
     length = min(end - first, _LONGEST)
     count = int(np.clip(4 * length / setup.road.spacing, 0, _MOST))
     return first + length * (np.arange(count) + 0.5) / max(count, 1)
-
-
-_CHUNK = 512  # steps in a chunk of what is not one number a point
-CHECKPOINT = "checkpoint.h5"
-STATE = "state"  # the group that a checkpoint has in addition to those of contact.h5
-
-_LAYOUT: dict[str, tuple[tuple, str]] = {
-    "time": ((), "s"),
-    "normal_force": ((None,), "N"),
-    "horizontal_force": ((None, 2), "N"),
-    "total_force": ((3,), "N"),
-    "displacement": ((None,), "m"),
-    "gap": ((None,), "m"),
-    "axle_force": ((3,), "N"),
-    "active": ((), "-"),
-    "residual": ((), "-"),
-}
-_OF_BLOCK = (
-    "time", "gap", "displacement", "axle_force", "active", "residual", "penetration", "moved", "total_force",
-)  # fmt: skip
-DRIVEN = "driven_displacement"  # (nt, k, 3) m at the k prescribed forces, if the scene has them
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -37,6 +37,7 @@ _UNITS = {
 }
 # Of the rate of momentum, the last three rows of the slope, in s instead.
 _KNOWN = {"left_out": "kg m/N", "moments": "-", "slope": "m s"}
+_ATTACHED = "attached"
 
 
 def fill_response(file: h5py.File, name: str, response: Response, points: int) -> None:
@@ -68,9 +69,6 @@ def read_responses(file: h5py.File) -> dict[str, Response]:
         for name, group in file.items()
         if "output" in group
     }
-
-
-_ATTACHED = "attached"
 
 
 @dataclass(frozen=True)

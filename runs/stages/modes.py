@@ -56,6 +56,10 @@ _UNITS = {
     "rise": "1/s2",
     "band_rise": "1/s2",
 }
+NAME = "fields"
+LARGEST = 300e6  # bytes: each process holds all of them while they are written or read
+_KEPT = ("orthonormality", "inertia_count", "counted_below", "rigid", "slices", "segments")
+_NAMED = 10  # modes shown by name
 
 
 def fill(file, basis: ModalBasis, points: np.ndarray, damping: np.ndarray) -> None:
@@ -120,11 +124,6 @@ def read(file, axle: Axle | None) -> ModalBasis:
     return ModalBasis(frequency=frequency, shape=shape, projection=projection)
 
 
-NAME = "fields"
-LARGEST = 300e6  # bytes: each process holds all of them while they are written or read
-_KEPT = ("orthonormality", "inertia_count", "counted_below", "rigid", "slices", "segments")
-
-
 def keep(job: Job, key: str, operators: Operators, modes: Modes) -> None:
     """Store the fields of the modes with the hash `key` in the cache, if any. Collective."""
     body = operators.body
@@ -187,9 +186,6 @@ def _read(file: Any) -> dict[str, Any]:
 
 def _size(operators: Operators, count: int) -> float:
     return 24.0 * operators.body.lattice.size * count
-
-
-_NAMED = 10  # modes shown by name
 
 
 @dataclass(frozen=True, kw_only=True)

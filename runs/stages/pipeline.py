@@ -60,6 +60,23 @@ from tireroad.runs.stages.stiffness import StiffnessStage
 from tireroad.runs.stages.vibration import MotionStage, VibrationStage
 from tireroad.runs.stages.whole_tire import LinesOfRun
 
+PARTS: tuple[type[PipelinePart], ...] = (
+    StaticStage,
+    RadiationStage,
+    StiffnessStage,
+    *STATIC_TO_GREENS,
+    ContactStage,
+    AccuracyStage,
+    ResponseStage,
+    SpectraStage,
+    LinesOfRun,
+    VibrationStage,
+    SoundStage,
+    MotionStage,
+)
+
+"""Each takes its inputs by name from the parts before it."""
+
 
 def share(surface: RoadKind, comm: MPI.Comm) -> None:
     """Make the road of a file available on every process, where `made` finds it.
@@ -97,24 +114,6 @@ def _sent(road: Road | None, node: MPI.Comm) -> Road | None:
         return None
     finally:
         node.Barrier()
-
-
-PARTS: tuple[type[PipelinePart], ...] = (
-    StaticStage,
-    RadiationStage,
-    StiffnessStage,
-    *STATIC_TO_GREENS,
-    ContactStage,
-    AccuracyStage,
-    ResponseStage,
-    SpectraStage,
-    LinesOfRun,
-    VibrationStage,
-    SoundStage,
-    MotionStage,
-)
-
-"""Each takes its inputs by name from the parts before it."""
 
 
 @dataclass(frozen=True)

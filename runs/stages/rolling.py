@@ -25,6 +25,8 @@ from tireroad.runs.scene.tables.scene import PointForceTable, RoadTable, Scene
 from tireroad.runs.stages import corner
 from tireroad.runs.stages.stage import Job, Record
 
+_PER_PERIOD = 16  # steps per shortest period of the excitation
+
 
 def directions(forces: Sequence[PointForceTable]) -> np.ndarray:
     """Unit vectors of the forces, (k, 3)."""
@@ -76,9 +78,6 @@ def first_step(setup: ContactSetup, road: RoadTable, time: np.ndarray) -> int:
     """Index of the first step past the run-in; 0 if that is half the run or more."""
     start = int(np.searchsorted(time, run_in(setup, road)))
     return start if start < len(time) // 2 else 0
-
-
-_PER_PERIOD = 16  # steps per shortest period of the excitation
 
 
 def run_time(time: TimeTable) -> float:

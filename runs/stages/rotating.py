@@ -41,6 +41,8 @@ from tireroad.runs.stages.stage import MUMPS, Computed, Job, Record, Result, Sha
 _STATES = {"eigenvalue": "1/s", "right": "-", "left": "s", "residual": "-", "left_residual": "-"}
 _BLOCK = {"block": "1/s", "block_right": "-", "block_left": "s"}
 _LAST = ("right",)  # the states lie along the last axis; for all others along the first
+LOWER = 0.7  # of the highest mode: the modes by which the critical speed is judged
+CONVERGED = 0.03  # largest relative change by the modes above
 
 
 def of_shapes(rolling: RollingModes) -> np.ndarray:
@@ -263,10 +265,6 @@ def _beyond(speed: float, critical: float) -> str:
         "rad/s, at which a wave is stationary on the road and grows without bound: the results have "
         "little meaning; take a lower speed, a higher static.inflation or a stiffer material"
     )
-
-
-LOWER = 0.7  # of the highest mode: the modes by which the critical speed is judged
-CONVERGED = 0.03  # largest relative change by the modes above
 
 
 def _lower(projection: Projection) -> np.ndarray:

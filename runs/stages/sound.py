@@ -47,6 +47,8 @@ WORST = 1.0  # dB: larger errors of the sources inside are warned of
 
 REGIONS = ("tread ahead", "tread behind", "tread above", "left sidewall", "right sidewall", "wheel")
 SIDE = 0.7  # |n_y| of a sidewall
+PASS_BY = 7.5  # m: distance of the directivity
+KNOWN = 0.9  # least part of a total that lies in bands of known error
 
 
 def microphones(given: tuple, state: StaticState) -> tuple[list[str], np.ndarray]:
@@ -241,9 +243,6 @@ class SoundPressure:
     share: np.ndarray = dataset("-", "contribution/region")
     shares: np.ndarray = dataset("-", "contribution/element")
     outline: np.ndarray = dataset("deg, -", "contribution/outline")
-
-
-PASS_BY = 7.5  # m: distance of the directivity
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -457,9 +456,6 @@ def _sound(
         "shares": shares.astype("f4"),
         "outline": heard.tire.outline,
     }
-
-
-KNOWN = 0.9  # least part of a total that lies in bands of known error
 
 
 def _total_error(band: np.ndarray, every: np.ndarray, error: np.ndarray) -> np.ndarray:

@@ -71,6 +71,8 @@ UNITS = _ONE | {
         (f"density/{what}", per_hertz),
     )
 }
+_FEWEST = 32  # fewest steps for a meaningful spectrum
+ROUNDING = 1e-12  # relative to the largest line: anything below is rounding
 
 
 def series(history: ContactHistory, start: int) -> dict[str, np.ndarray]:
@@ -183,11 +185,6 @@ def write(file: h5py.File, found: dict[str, np.ndarray]) -> None:
 def read(file: h5py.File) -> dict[str, np.ndarray]:
     """The same, read back."""
     return {name: file[name][()] for name in UNITS if name in file}
-
-
-_FEWEST = 32  # fewest steps for a meaningful spectrum
-
-ROUNDING = 1e-12  # relative to the largest line: anything below is rounding
 
 
 @dataclass(frozen=True, kw_only=True)

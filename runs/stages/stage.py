@@ -63,6 +63,15 @@ T = TypeVar("T")
 MUMPS = "MUMPS through PETSc, ICNTL(14) = 100 %"
 
 Figures = dict[str, tuple[Any, str]]
+P = TypeVar("P")
+MOST = 2  # per kind: those of a run and of its coarser companion
+_kept: dict[str, OrderedDict[Hashable, Any]] | None = None
+WORTH = 60.0  # results are written once computing them has taken this many times the writing
+LEAST = 1.0  # s of computing
+_COLUMNS = "by_columns"
+_RATE = 2e8  # bytes per second, until a large part has been written
+_LARGE = 1e6  # bytes from which the write rate is measured: below, opening the file dominates
+FAILURES = "TIREROAD_FAILURES"
 
 
 @dataclass
@@ -196,9 +205,6 @@ class Job:
                 return pick(file)
 
         return on_root(self.comm, opened)
-
-
-P = TypeVar("P")
 
 
 class Result(Generic[P]):
@@ -351,10 +357,6 @@ class Computed(Stage[P]):
         """What has to happen once the product is written. Collective."""
 
 
-MOST = 2  # per kind: those of a run and of its coarser companion
-_kept: dict[str, OrderedDict[Hashable, Any]] | None = None
-
-
 def keep_matrices() -> None:
     """Start keeping: this process computes the members of a family one after the other."""
     global _kept
@@ -378,13 +380,6 @@ def forget_matrices() -> None:
     """Drop everything, before a new static state: matrices belong to one state."""
     if _kept is not None:
         _kept.clear()
-
-
-WORTH = 60.0  # results are written once computing them has taken this many times the writing
-LEAST = 1.0  # s of computing
-_COLUMNS = "by_columns"
-_RATE = 2e8  # bytes per second, until a large part has been written
-_LARGE = 1e6  # bytes from which the write rate is measured: below, opening the file dominates
 
 
 @contextmanager
@@ -543,9 +538,6 @@ def turning_of(job: Job) -> Turning:
 def shapes_of(job: Job) -> Turning | None:
     """The wheel's rotation if rotation shapes join its modes (modal.rotation_shapes), else None."""
     return turning_of(job) if job.speed and job.scene.joins_shapes else None
-
-
-FAILURES = "TIREROAD_FAILURES"
 
 
 @contextmanager

@@ -39,6 +39,10 @@ from tireroad.runs.stages.stage import (
 )
 
 _UNITS = {"points": "m", "force": "N", "area": "m2"}
+_SMALL = 1e-6  # of mu f: tolerance for a node that slips
+_SPEEDS, _SAME_SPEED = 6, 1e-6  # most solutions at a travel speed, and when two speeds agree
+_EXTENT = "length", "width", "area"
+COARSE = 0.02  # estimated relative error of the load above which the user is warned
 
 
 def fill_cords(file: h5py.File, state: StaticState) -> None:
@@ -72,9 +76,6 @@ def cord_headline(state: StaticState) -> dict[str, tuple[float, str]]:
             "%",
         ),
     }
-
-
-_SMALL = 1e-6  # of mu f: tolerance for a node that slips
 
 
 def fill_friction(file: h5py.File, state: StaticState) -> None:
@@ -156,11 +157,6 @@ def fill(file: h5py.File, state: StaticState, tire: TireModel) -> None:
     if (even := state.evenness()) is not None:
         file.attrs["footprint_shape_factor"] = even.shape_factor
         file.attrs["footprint_shoulder"] = even.shoulder
-
-
-_SPEEDS, _SAME_SPEED = 6, 1e-6  # most solutions at a travel speed, and when two speeds agree
-_EXTENT = "length", "width", "area"
-COARSE = 0.02  # estimated relative error of the load above which the user is warned
 
 
 def steady_rolling(job: Job, speed: float | None = None) -> Rolling:

@@ -30,6 +30,27 @@ _STANDING, _ROLLING = 2.0, 3.0
 _MOST = 0.5  # slip
 
 Curve = Mapping[str, np.ndarray]
+_CURVE = {
+    "deflection": "m",
+    "load": "N",
+    "stiffness": "N/m",
+    "tangent": "N/m",
+    "points": "-",
+    "rolling_radius": "m",
+    "pressure": "Pa",
+    "footprint_length": "m",
+    "footprint_width": "m",
+    "footprint_area": "m2",
+}
+_FIGURES = {
+    "load": "N",
+    "vertical": "N/m",
+    "longitudinal": "N/m",
+    "lateral": "N/m",
+    "torsional": "N m/rad",
+    "vertical_tangent": "N/m",
+    "vertical_stuck": "N/m",
+}
 
 
 def slides(job: Job, state: StaticState, stuck: RoadStiffness) -> dict[str, Curve]:
@@ -117,29 +138,6 @@ def describe(record: Record, found: Mapping[str, Curve], rolls: bool) -> None:
                 "N/m",
             )
         record.headline[f"{name} force at most"] = (force, "N")
-
-
-_CURVE = {
-    "deflection": "m",
-    "load": "N",
-    "stiffness": "N/m",
-    "tangent": "N/m",
-    "points": "-",
-    "rolling_radius": "m",
-    "pressure": "Pa",
-    "footprint_length": "m",
-    "footprint_width": "m",
-    "footprint_area": "m2",
-}
-_FIGURES = {
-    "load": "N",
-    "vertical": "N/m",
-    "longitudinal": "N/m",
-    "lateral": "N/m",
-    "torsional": "N m/rad",
-    "vertical_tangent": "N/m",
-    "vertical_stuck": "N/m",
-}
 
 
 @dataclass(frozen=True)

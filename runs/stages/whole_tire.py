@@ -30,6 +30,7 @@ from tireroad.runs.stages.stage import Computed, Job, PipelinePart, Result, Shar
 _ROWS = 1024  # steps read at a time
 _AT_ONCE = 64  # coordinates transformed at a time, to save memory
 FADE = 0.05  # of a record at each end, where its motion over time fades in and out
+P = TypeVar("P")
 
 
 def driven_loads(job: Job, state: StaticState, setup: ContactSetup | None) -> sparse.csr_matrix:
@@ -123,9 +124,6 @@ class PatchForces:
             parts += [(horizontal - begun)[:, :, k] for k in (0, 1)]
         weights = self.setup.patch.weights if self.setup else None
         return parts if weights is None else [(weights.T @ part.T).T for part in parts]
-
-
-P = TypeVar("P")
 
 
 @dataclass(frozen=True, kw_only=True)

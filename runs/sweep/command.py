@@ -36,6 +36,35 @@ from tireroad.runs.sweep.page import gather, write, write_page
 
 _LOOK = 0.5  # s between two checks of the running members
 _OUTCOME = {0: "done", 2: "its input is wrong", 3: "a solver gave up", 4: "stopped"}
+MOST = 1000  # tasks of an array job: Slurm's own limit unless a cluster sets another (MaxArraySize)
+WARNING = 120  # s before the time limit at which a job is signalled to write a checkpoint
+_DIRECTIVE = re.compile(r"[A-Za-z][A-Za-z0-9-]*")
+SLURM = """\
+#!/bin/bash
+#SBATCH --job-name=$name
+#SBATCH --output=$logs/$name-%j.txt
+#SBATCH --open-mode=append
+#SBATCH --ntasks=$processes
+#SBATCH --signal=B:USR1@$warning
+#SBATCH --requeue
+$directives
+# A warning before the time limit: the run writes a checkpoint, and the job is queued again.
+export TIREROAD_CACHE=$cache OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
+child=
+again() { [ -n "$$child" ] && kill -USR1 "$$child"; }
+trap again USR1 TERM
+$body
+wait "$$child"
+status=$$?
+while kill -0 "$$child" 2>/dev/null; do wait "$$child"; status=$$?; done
+if [ "$$status" = 4 ]; then
+    scontrol requeue "$${SLURM_ARRAY_JOB_ID:+$${SLURM_ARRAY_JOB_ID}_}$${SLURM_ARRAY_TASK_ID:-$$SLURM_JOB_ID}"
+fi
+exit "$$status"
+"""
+_OWN = {"array", "dependency", "job-name", "ntasks", "open-mode", "output", "requeue", "signal"}
+_TABLE = {"template", "task", "submit", "array", "after"}
+_MORE = {"number", "join"}
 
 
 @dataclass
@@ -203,37 +232,6 @@ def _arguments(sweep: Sweep, member: Member, folder: Path) -> list[str]:
     settings: Sequence[str] = [part for one in member.overrides() for part in ("--set", one)]
     out = str(folder / "members" / member.name)
     return ["run", str(sweep.scene.resolve()), "--out", out, *settings]
-
-
-MOST = 1000  # tasks of an array job: Slurm's own limit unless a cluster sets another (MaxArraySize)
-WARNING = 120  # s before the time limit at which a job is signalled to write a checkpoint
-_DIRECTIVE = re.compile(r"[A-Za-z][A-Za-z0-9-]*")
-SLURM = """\
-#!/bin/bash
-#SBATCH --job-name=$name
-#SBATCH --output=$logs/$name-%j.txt
-#SBATCH --open-mode=append
-#SBATCH --ntasks=$processes
-#SBATCH --signal=B:USR1@$warning
-#SBATCH --requeue
-$directives
-# A warning before the time limit: the run writes a checkpoint, and the job is queued again.
-export TIREROAD_CACHE=$cache OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
-child=
-again() { [ -n "$$child" ] && kill -USR1 "$$child"; }
-trap again USR1 TERM
-$body
-wait "$$child"
-status=$$?
-while kill -0 "$$child" 2>/dev/null; do wait "$$child"; status=$$?; done
-if [ "$$status" = 4 ]; then
-    scontrol requeue "$${SLURM_ARRAY_JOB_ID:+$${SLURM_ARRAY_JOB_ID}_}$${SLURM_ARRAY_TASK_ID:-$$SLURM_JOB_ID}"
-fi
-exit "$$status"
-"""
-_OWN = {"array", "dependency", "job-name", "ntasks", "open-mode", "output", "requeue", "signal"}
-_TABLE = {"template", "task", "submit", "array", "after"}
-_MORE = {"number", "join"}
 
 
 @dataclass(frozen=True, kw_only=True)

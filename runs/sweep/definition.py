@@ -50,6 +50,7 @@ PLANS = {
 PLAN_KEYS = {"plan"}.union(*PLANS.values())
 _AXIS = {"grid": {"key", "values", "range", "count"}, "latin-hypercube": {"key", "range"}}
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,79}")
+_KEYS = {"name", "scene", "processes", "slurm", "queue"} | PLAN_KEYS
 
 
 @dataclass(frozen=True)
@@ -263,9 +264,6 @@ def _short(value: Any) -> str:
         else str(value)
     )
     return re.sub(r"[^A-Za-z0-9._-]", "", text)[:24]
-
-
-_KEYS = {"name", "scene", "processes", "slurm", "queue"} | PLAN_KEYS
 
 
 @dataclass(frozen=True, kw_only=True)

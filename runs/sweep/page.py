@@ -45,6 +45,21 @@ from tireroad.runs.version import PROGRAM, VERSION
 
 Array = NDArray[np.float64]
 ERROR = "error of the "
+_SURE = 0.95
+TOTAL = "spectra: level of the vertical force on the axle"  # over all lines, whatever the bands
+SHOWN = (
+    TOTAL,
+    "static: deflection",
+    "static: load",
+    "contact: mean load",
+    "sound: A-weighted CPX level",
+    "sound: A-weighted sound power level",
+    "rotating: lowest",
+    "modes: lowest",
+)
+_VARIES = 1e-6  # relative
+WIDE = 9.5  # inches
+CURVES = 12  # third-octave spectra that can be distinguished in one figure
 
 
 @dataclass(frozen=True)
@@ -200,9 +215,6 @@ def _numbers(values: Sequence[Any]) -> bool:
     return bool(given) and all(isinstance(v, int | float) for v in given)
 
 
-_SURE = 0.95
-
-
 @dataclass(frozen=True)
 class Levels:
     """Levels of a `quantity` of groups of members that differ in seeds only.
@@ -283,22 +295,6 @@ def _mean(level: Array, error: Array) -> tuple[Array, Array]:
     unknown = ~np.isfinite(error).any(axis=0)
     total = np.sqrt(spread**2 + own**2)
     return 10 * np.log10(mean), np.where(unknown & (count < 2), np.nan, total)
-
-
-TOTAL = "spectra: level of the vertical force on the axle"  # over all lines, whatever the bands
-SHOWN = (
-    TOTAL,
-    "static: deflection",
-    "static: load",
-    "contact: mean load",
-    "sound: A-weighted CPX level",
-    "sound: A-weighted sound power level",
-    "rotating: lowest",
-    "modes: lowest",
-)
-_VARIES = 1e-6  # relative
-WIDE = 9.5  # inches
-CURVES = 12  # third-octave spectra that can be distinguished in one figure
 
 
 def write_page(table: Gathered, folder: Path, title: str, failed: Sequence[str]) -> Path:

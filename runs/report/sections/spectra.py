@@ -23,6 +23,12 @@ from tireroad.runs.scene.tables.scene import AccuracyTable
 from tireroad.runs.search.journal import CAUSES, NAME, Trial, read_trials, worst
 from tireroad.runs.search.settings import MARGIN, aim
 
+_FILE = "spectra.h5"
+_MORE = (  # third octaves, their quantity, reference
+    ("contact_level", "contact force", "dB re 1 N"),
+    ("hub_moment_level", "moment on the hub", "dB re 1 N m"),
+)
+
 
 def add(results: Results, section: Section) -> None:
     """Add the trials of search.json, if the run began with a search and the file is readable."""
@@ -81,13 +87,6 @@ def trade(cost: NDArray, error: NDArray, parts: NDArray) -> str:
     here.set(xlabel="cost of a run in s", ylabel="error over that asked for")
     here.legend(ncols=5, loc="lower right", bbox_to_anchor=(1.0, 0.98), borderaxespad=0.0)
     return figures.encode(figure)
-
-
-_FILE = "spectra.h5"
-_MORE = (  # third octaves, their quantity, reference
-    ("contact_level", "contact force", "dB re 1 N"),
-    ("hub_moment_level", "moment on the hub", "dB re 1 N m"),
-)
 
 
 def spectra(results: Results) -> Section:

@@ -15,6 +15,37 @@ from tireroad.runs.report.realism import mean_pressure
 
 _MOSTLY = 0.3  # of a state's kinetic energy
 _LISTED = 6
+LISTED = 16  # rows of a table of modes; the files hold all modes
+PICTURED = 6
+_LABELS = {"footprint shoulder": "pressure of shoulders over middle"}
+NAMES = (
+    "R: in the plane of the wheel, symmetric in y; L: out of it, antisymmetric; T: torsional, about the axle; C: air "
+    "in the cavity; then the number of waves around the tire. R0 breathes, R1 moves the belt up or forward, L0 moves "
+    "it sideways, L1 tilts it (yaw, camber). [n,a] is not the lowest of its kind: n waves around, a nodal lines along "
+    "the tread. R7/6: no number of waves holds half of it, 7 and 6 the most."
+)
+_ALONG = (
+    *(("kg in ", axis) for axis in "xyz"),
+    *(("kg m² about ", axis) for axis in "xyz"),
+)
+_WORTH = 0.01  # of the largest effective mass
+_FILE = "stiffness.h5"
+_FACTS = (
+    ("vertical", "vertical stiffness, slope of the curve", "N/m"),
+    ("longitudinal", "longitudinal stiffness", "N/m"),
+    ("lateral", "lateral stiffness", "N/m"),
+    ("torsional", "torsional stiffness about the vertical", "N m/rad"),
+)
+_COLUMNS = (
+    ("deflection", 1e3, "deflection, mm"),
+    ("load", 1.0, "load, N"),
+    ("stiffness", 1e-3, "slope, N/mm"),
+    ("footprint_length", 1e3, "length, mm"),
+    ("footprint_width", 1e3, "width, mm"),
+    ("footprint_area", 1e4, "area, cm²"),
+    ("pressure", 1e-3, "mean pressure, kPa"),
+    ("rolling_radius", 1e3, "rolling radius, mm"),
+)
 
 
 def duct(results: Results, section: Section) -> None:
@@ -44,13 +75,6 @@ def resonances(
 def _listed(frequency: NDArray) -> str:
     more = ", …" if len(frequency) > _LISTED else ""
     return ", ".join(quantity(float(f), "Hz") for f in frequency[:_LISTED]) + more
-
-
-LISTED = 16  # rows of a table of modes; the files hold all modes
-PICTURED = 6
-
-
-_LABELS = {"footprint shoulder": "pressure of shoulders over middle"}
 
 
 def static(results: Results) -> Section:
@@ -172,14 +196,6 @@ def pressure(force: NDArray, area: NDArray | None) -> tuple[NDArray, str]:
     ), "pressure in kPa"
 
 
-NAMES = (
-    "R: in the plane of the wheel, symmetric in y; L: out of it, antisymmetric; T: torsional, about the axle; C: air "
-    "in the cavity; then the number of waves around the tire. R0 breathes, R1 moves the belt up or forward, L0 moves "
-    "it sideways, L1 tilts it (yaw, camber). [n,a] is not the lowest of its kind: n waves around, a nodal lines along "
-    "the tread. R7/6: no number of waves holds half of it, 7 and 6 the most."
-)
-
-
 def modes(results: Results) -> Section:
     """The section on the modes of the loaded, non-rotating tire (modes.h5)."""
     name = "modes.h5"
@@ -251,32 +267,6 @@ def _carried(row: NDArray, every: NDArray) -> str:
         if row[k] >= _WORTH * largest[k // 3] > 0
     ]
     return ", ".join(found) or "–"
-
-
-_ALONG = (
-    *(("kg in ", axis) for axis in "xyz"),
-    *(("kg m² about ", axis) for axis in "xyz"),
-)
-_WORTH = 0.01  # of the largest effective mass
-
-
-_FILE = "stiffness.h5"
-_FACTS = (
-    ("vertical", "vertical stiffness, slope of the curve", "N/m"),
-    ("longitudinal", "longitudinal stiffness", "N/m"),
-    ("lateral", "lateral stiffness", "N/m"),
-    ("torsional", "torsional stiffness about the vertical", "N m/rad"),
-)
-_COLUMNS = (
-    ("deflection", 1e3, "deflection, mm"),
-    ("load", 1.0, "load, N"),
-    ("stiffness", 1e-3, "slope, N/mm"),
-    ("footprint_length", 1e3, "length, mm"),
-    ("footprint_width", 1e3, "width, mm"),
-    ("footprint_area", 1e4, "area, cm²"),
-    ("pressure", 1e-3, "mean pressure, kPa"),
-    ("rolling_radius", 1e3, "rolling radius, mm"),
-)
 
 
 def stiffness(results: Results) -> Section:

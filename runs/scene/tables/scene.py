@@ -33,6 +33,15 @@ from tireroad.runs.scene.tables.contact import ContactTable, PatternTable, TimeT
 from tireroad.runs.scene.tables.sound import HEARD, SoundTable
 from tireroad.runs.scene.tables.tire import CavityTable, TireTable
 
+Where = Callable[[tuple[str, ...], str], InputError]
+Springs = tuple[float, ...] | tuple[tuple[float, ...], ...]
+_SPRINGS = Limits(least=-1e15, most=1e15)  # N/m, N m/rad and per unit of velocity
+_HELD = tuple(name for name in DIRECTIONS if name != "z")
+_MOVING: OnlyFor = ("kind", ("corner", "free"))
+_SPRUNG: OnlyFor = ("kind", ("corner",))
+_MOST = 200
+_BEYOND = 1.5  # times the scene's own deflection, by default
+
 
 @dataclass(frozen=True)
 class StaticTable:
@@ -142,14 +151,6 @@ class RoadTable(Variants, Placement):
     def file(self) -> str | None:
         """The file of a measured road, or None."""
         return getattr(self.surface, "file", None)
-
-
-Where = Callable[[tuple[str, ...], str], InputError]
-Springs = tuple[float, ...] | tuple[tuple[float, ...], ...]
-_SPRINGS = Limits(least=-1e15, most=1e15)  # N/m, N m/rad and per unit of velocity
-_HELD = tuple(name for name in DIRECTIONS if name != "z")
-_MOVING: OnlyFor = ("kind", ("corner", "free"))
-_SPRUNG: OnlyFor = ("kind", ("corner",))
 
 
 def _entry(value: Any) -> float:
@@ -408,10 +409,6 @@ def _check_points(scene: Scene, error: Where) -> None:
             f'= "{scene.contact.tread}" has no compliance of its own, so it works on the nodes of the mesh only, and a '
             'search for accuracy chooses grids of points: take another, e.g. "half-space", or accuracy.search = false',
         )
-
-
-_MOST = 200
-_BEYOND = 1.5  # times the scene's own deflection, by default
 
 
 def _ascending(doc: str, unit: str, limits: Limits) -> Any:

@@ -40,6 +40,13 @@ if TYPE_CHECKING:
 
 # Elements around in the meshes of a search, unless a kind has its own.
 AROUND = (16, 20, 24, 30, 36, 44, 52, 64, 78, 96, 120)
+Raw = dict[str, Any]
+Where = Callable[[tuple[str, ...], str], InputError]
+NEAR_ROAD = 0.2  # footprint_size with a road
+# Of a torus: arc (deg) and depth of a region that has none, and place of a line of cords.
+AROUND_CROWN, WHOLE_WALL = (0.0, 45.0), (0.0, 1.0)
+CORDS_DEPTH, CORDS_ARC = 0.006, (-45.0, 45.0)  # m, deg
+_SMALL_MOTIONS = "dynamic", "loss_factor", "spectrum"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,9 +64,6 @@ class Proportions:
     half_angle: float
     along: int
     through: int
-
-
-Raw = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -198,9 +202,6 @@ SECTIONS: Registry[SectionKind] = Registry("section", "tireroad.runs.scene.secti
 section_kind = SECTIONS.register
 
 
-Where = Callable[[tuple[str, ...], str], InputError]
-
-
 @dataclass(frozen=True)
 class CavityTable:
     gas: str = choice(
@@ -223,12 +224,6 @@ class CavityTable:
         least=1,
         most=5000,
     )
-
-
-NEAR_ROAD = 0.2  # footprint_size with a road
-# Of a torus: arc (deg) and depth of a region that has none, and place of a line of cords.
-AROUND_CROWN, WHOLE_WALL = (0.0, 45.0), (0.0, 1.0)
-CORDS_DEPTH, CORDS_ARC = 0.006, (-45.0, 45.0)  # m, deg
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -465,9 +460,6 @@ def losses_of(part: TireTable | RegionTable | None) -> dict[str, Any]:
     law = None if part.exponent is None else power_law(part.exponent)
     given = dict(zip(_SMALL_MOTIONS, (part.dynamic, part.loss_factor, law), strict=True))
     return {key: value for key, value in given.items() if value is not None}
-
-
-_SMALL_MOTIONS = "dynamic", "loss_factor", "spectrum"
 
 
 def changed(compound: Material, region: RegionTable | None) -> Material:
