@@ -1,13 +1,12 @@
-"""Collective operations: sums, gathering and broadcast of arrays, release of PETSc objects, sparse matrices from rows.
+"""Collective operations on arrays and PETSc objects: sums, gathering, broadcast, release.
 
 Arrays are sent as buffers. Pickling would make two further copies and is limited to 2 GB, the
 largest byte count of an MPI message. Messages counted in numbers or rows may hold 16 GB and more;
 of an object only the small remainder without its arrays is pickled.
 
-Release of PETSc objects that Python no longer references.
-
-petsc4py does not destroy them: an object may be distributed, and the garbage collectors of its
-processes run at different times. PETSc keeps such objects until all processes of their communicator
+PETSc objects that Python no longer references are released by `collect`. petsc4py does not destroy
+them: an object may be distributed, and the garbage collectors of its processes run at different
+times. PETSc keeps such objects until all processes of their communicator
 call its cleanup. dolfinx gives each mesh a communicator of its own, which is freed with the mesh; a
 small vector keeps it alive until the cleanup. Without this, a process that loads one tire after
 another, as in a search or a notebook, kept all matrices and factors: 50 MB for each tire of 7,000

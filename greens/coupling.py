@@ -1,6 +1,6 @@
-"""The wheel's full matrices, and the responses between probes that come from them and the modes.
+"""Responses between probes from the wheel's full matrices and its modes, with attachment modes.
 
-Attachment modes: the static shapes under the probes' loads join the basis, with their inertia.
+The static shapes under the probes' loads join the basis, with their inertia:
 
     R = K_Omega^-1 B,  joined to the modes as in modal.basis
 

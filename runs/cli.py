@@ -1,7 +1,4 @@
-"""The command line's commands, options and help texts.
-
-The command line. Heavy imports are deferred to the command that needs them.
-"""
+"""The command line: commands, options, help texts. Heavy imports are deferred to the command that needs them."""
 
 import argparse
 import logging

@@ -5,7 +5,7 @@
   static = press(tire, inflation=2e5, load=500.0, turning=turning)
   standing = modes(tire, static, count=60)
   rolling = roll(standing, turning)
-  run = drive(rolling, make_road(kind="sine", amplitude=1e-3), duration=0.1)     # runs.drive
+  run = drive(rolling, make_road(kind="sine", amplitude=1e-3), duration=0.1)
 
 SI units, angles in radians. Every function is collective: all processes of the tire's communicator
 call it with the same arguments and get the same arrays.
@@ -62,6 +62,7 @@ from tireroad.modal.standing import named, standing_modes
 from tireroad.modal.states import StateModes
 from tireroad.modal.waves import FaceWaves, ModeNames
 from tireroad.runs.scene.parts import scaled
+from tireroad.runs.scene.physics import make_tire, rolling_shape
 from tireroad.runs.scene.rules import barred_from_contact
 from tireroad.runs.scene.sections.radial import RadialSection
 from tireroad.runs.scene.sections.torus import TorusSection
@@ -69,7 +70,6 @@ from tireroad.runs.scene.tables.contact import DRY_ASPHALT
 from tireroad.runs.scene.tables.tire import NEAR_ROAD, TireTable
 from tireroad.runs.stages.corner import BESIDE, MOMENTS, widened
 from tireroad.runs.stages.rolling import grown
-from tireroad.runs.stages.stage import make_tire, rolling_shape
 
 # Arguments that are one number.
 _NUMBERS = {"inflation", "load", "deflection", "road_height", "count", "up_to", "duration", "step"}

@@ -1,4 +1,4 @@
-"""Architecture rules: layered imports without circles, modules of one subject, short functions."""
+"""Architecture rules: layered imports without circles, constants first, short functions."""
 
 from __future__ import annotations
 
@@ -12,8 +12,6 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 ROOMS = ("fem", "modal", "greens", "contact", "runs")  # each may use those before it
-SMALLEST = 60  # lines of a module that only one other imports: less is a page of its reader
-PLUGINS = {"kinds", "laws", "outputs"}  # folders of one variant a file
 FUNCTION = 30  # lines that 95 % of all functions stay within
 
 
@@ -95,23 +93,6 @@ def test_files_of_tests_differ_in_name() -> None:
     """Two of one name in different folders are collected one by one, and not together."""
     count = Counter(file.name for file in (ROOT / "tests").rglob("test_*.py"))
     assert {name for name, number in count.items() if number > 1} == set()
-
-
-def _lines(file: Path) -> int:
-    return len(file.read_text().splitlines())
-
-
-def test_no_module_is_a_page_of_its_only_reader() -> None:
-    readers = Counter(one for imported in EVERY_IMPORT.values() for one in imported)
-    pages = {
-        str(file.relative_to(ROOT))
-        for name, file in MODULES.items()
-        if file.name != "__init__.py"
-        and file.parent.name not in PLUGINS
-        and _lines(file) < SMALLEST
-        and readers[name] == 1
-    }
-    assert pages == set(), "merge these with the one module that imports them"
 
 
 def test_functions_stay_short() -> None:

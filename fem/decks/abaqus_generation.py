@@ -1,8 +1,6 @@
-"""Nodes, elements, sets and surfaces of an Abaqus deck, given or generated.
+"""Nodes, elements, sets and surfaces of an Abaqus deck, listed or generated.
 
-Nodes and elements that an Abaqus deck generates: *NGEN, *NFILL, *NCOPY, *ELGEN, *ELCOPY.
-
-As in Abaqus a keyword sees the nodes, elements and sets defined before it. Source: the Keywords
+*NGEN, *NFILL, *NCOPY, *ELGEN and *ELCOPY generate nodes and elements. As in Abaqus a keyword sees the nodes, elements and sets defined before it. Source: the Keywords
 Reference, and "Node definition" and "Element definition" in the Analysis User's Guide.
 """
 

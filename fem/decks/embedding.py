@@ -1,8 +1,6 @@
-"""Membranes with cords in a section: where they lie, and the cells split along them.
+"""Membranes with cords are embedded in a section: its cells are split along them, and each becomes a ply.
 
-The cords of a deck on the sides of a section's cells: course, angle and data of each ply.
-
-In an axisymmetric membrane Abaqus measures the cord angle a from the meridian, the direction t from
+A ply has a course along sides of cells, the angle of its cords, and their data. In an axisymmetric membrane Abaqus measures the cord angle a from the meridian, the direction t from
 the element's first node to its second, positive about the normal, which is t rotated by 90 degrees
 in the (r, z) plane: the cord lies along cos a t + sin a e_theta, e_theta right-handed about z. At
 the lowest point e_theta is -x, so relative to a chain that runs along s t (s = 1 or -1) the cord

@@ -1,16 +1,15 @@
-"""Reduction of three-dimensional decks that are bodies of revolution to their section.
-
-Cord angles in three-dimensional membranes, converted to angles from the section's meridian.
-
-In a membrane the angle is measured from the local first direction 1 about the normal n: the cord
-lies along cos a e_1 + sin a (n x e_1). Two systems are the same at every angle around: the default
-one if x is the axle, where e_1 is the projection of global x (the meridian m towards larger x), and
-a cylindrical one about the axle with its first axis as normal, where e_1 is e_theta. With n x m = s
-e_theta, s = 1 or -1, the angle from m towards e_theta is s a in the first; in the second, as n x
-e_theta = -s m, it is atan2(cos a, -s sin a).
+"""Three-dimensional decks of bodies of revolution are reduced to their section.
 
 The program's rolling states require a body whose undeformed shape is the same at every angle; any
 other body is refused, with the reason.
+
+Cord angles become angles from the section's meridian. In a membrane the angle is measured from the
+local first direction 1 about the normal n: the cord lies along cos a e_1 + sin a (n x e_1). Two
+systems are the same at every angle around: the default one if x is the axle, where e_1 is the
+projection of global x (the meridian m towards larger x), and a cylindrical one about the axle with
+its first axis as normal, where e_1 is e_theta. With n x m = s e_theta, s = 1 or -1, the angle from m
+towards e_theta is s a in the first; in the second, as n x e_theta = -s m, it is
+atan2(cos a, -s sin a).
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Sizes of passenger tires like 205/60 R15.
-
-The built-in radial passenger tire, e.g. 205/60 R15; sources: docs/radial-tire.md.
-"""
+"""The built-in radial passenger tire, of a size like 205/60 R15; sources: docs/radial-tire.md."""
 
 from __future__ import annotations
 

@@ -68,7 +68,7 @@ def balance_near(
     long elements stretches a belt that it bends. On another mesh this appears as stress (radial
     tire, 16 x 12 elements, 4000 N, elements half as long: 9 kN per node at the shoulder, all
     around), which makes the first tangent useless: its step moves a sidewall by 35 mm, and Newton's
-    method does not recover. Springs to the current position (as in path.snap) hold the body while
+    method does not recover. Springs to the current position hold the body while
     the cords relax by some 0.1 mm,
 
         k (u - u_0) + F(u) = f,  k in proportion to the nodes' mass,

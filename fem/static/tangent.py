@@ -1,8 +1,6 @@
-"""The tangent with dofs held by the road, and its linear contact problem.
+"""The tangent with nodes held by the road, and the contact of a linearised step.
 
-Contact within a linearised step: a linear complementarity problem on the tread nodes.
-
-K du = right is solved with the nodes held that were held when K was factorised. Each node held
+That contact is a linear complementarity problem on the tread nodes. K du = right is solved with the nodes held that were held when K was factorised. Each node held
 since then adds a force, each node released since then a motion, both times a column of K's inverse:
 
     gap = gap_0 + C z + gap_l rise,    force = force_0 + D z + force_l rise,

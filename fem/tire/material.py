@@ -1,10 +1,8 @@
-"""Interface of a material law: its parameters and strain energy.
+"""A rubber: strain energy, density, and dynamic properties for small motions.
 
-A new law is one file in fem.tire.laws, or a class in a user's script, with its parameters (unit and
+A `MaterialLaw` gives the strain energy. A new law is one file in fem.tire.laws, or a class in a user's script, with its parameters (unit and
 range), the energy, and the two moduli at zero strain. The scene's keys, `check`, the key reference
 and the range tests follow from it.
-
-A rubber: strain energy, density, and dynamic properties for small motions.
 
 The storage modulus of a filled rubber grows by a third to two thirds from 10 Hz to 1 kHz, its loss
 factor by less. A `Spectrum` gives both relative to those at DYNAMIC_FREQUENCY: a power law (a

@@ -1,6 +1,6 @@
-"""The plies of a body: the cell faces that they lie on, and their forms.
+"""The plies of a body: the cell faces that they lie on, and the integrals over these.
 
-Integrals over one face of each cell as cell integrals whose quadrature points lie on the face.
+An integral over one face of each cell is a cell integral whose quadrature points lie on the face:
 
     int_face f dA = int_cell-rule f |J^-T n| |det J|,   n the reference normal (Nanson's formula)
 

@@ -1,6 +1,4 @@
-"""Fields over all unknowns, distributed by rows: sums, products, and one order, sign and basis of the modes.
-
-One order, one sign and one basis of each repeated frequency for the modes, by rule.
+"""Fields over all unknowns, distributed by rows: products, and the order, sign and basis of the modes.
 
 An eigensolver leaves the sign undetermined, and for a repeated eigenvalue the whole basis V (n, k).
 Here

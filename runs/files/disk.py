@@ -1,6 +1,4 @@
-"""Atomic file writes, and messages for a disk that is full or read-only.
-
-Checksums in result files, verified before their content is read.
+"""Files written whole or not at all, with a checksum; messages for a disk that is full or read-only.
 
 HDF5 files may begin with a user block. Ours holds the SHA-256 of all bytes after it, so that data,
 shapes, attributes and HDF5's own structures are covered, the checksum moves with a copied file, and

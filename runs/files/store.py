@@ -1,12 +1,10 @@
-"""Result files, written under a temporary name and renamed, so that an existing file is complete.
+"""Result files: provenance, hash of the inputs, and the datasets that a product declares.
 
-What a result depends on besides its inputs: the program's sources and the libraries.
-
-Part of every stage's hash, so that no result is reused after the code or a library has changed.
-
-Only the root process writes; callers gather the arrays. Every HDF5 file carries the resolved scene,
-the hash of its inputs, program and library versions, the number of processes, and a checksum that
-`opened` verifies before the file is read.
+A file is written under a temporary name and renamed, so that an existing one is complete. Only the
+root process writes; callers gather the arrays. Every HDF5 file carries the resolved scene, the hash
+of its inputs, program and library versions, the number of processes, and a checksum that `opened`
+verifies before the file is read. The program's sources and the libraries are part of every stage's
+hash, so that no result is reused after one of them has changed.
 """
 
 import functools
@@ -36,10 +34,10 @@ ROOT = Path(__file__).resolve().parents[2]
 # includes all packages of an earlier one: whatever changes an earlier result changes its hash too.
 # Damping affects the static state of a rolling tire; with a moving axle, the modes depend on the
 # time loop.
-_TIRE = ("fem", "runs/stages", "modal")
+_TIRE = ("fem", "runs/scene/physics.py", "runs/stages", "modal")
 _ALL = (*_TIRE, "greens", "contact")
 PACKAGES: Mapping[str, tuple[str, ...]] = {"static": _TIRE}
-"""Source folders that a stage depends on; all five packages if it is not listed here."""
+"""Sources that a stage depends on; all that compute if it is not listed here."""
 
 WHEEL = "dolfinx-solver-real"  # dolfinx, PETSc and SLEPc without distributions of their own
 LIBRARIES = {
@@ -88,7 +86,8 @@ def identity(stage: str) -> Identity:
 def _code(folders: tuple[str, ...]) -> str:
     digest = hashlib.sha256()
     for folder in folders:
-        for path in sorted((ROOT / folder).rglob("*.py")):
+        place = ROOT / folder
+        for path in [place] if place.is_file() else sorted(place.rglob("*.py")):
             digest.update(f"{path.relative_to(ROOT)}\0".encode())
             digest.update(path.read_bytes() + b"\0")
     return digest.hexdigest()

@@ -1,6 +1,4 @@
-"""Standard streams that may be closed, or get closed, while the program runs.
-
-The supervisor process of a run, which ensures that the computing process ends properly.
+"""The supervisor process of a run ensures that the computing process ends properly.
 
 Python handles a signal only between two of its own instructions, so a process inside a library's
 eigensolver or factorisation does not react for minutes, and one that is killed cannot report it.

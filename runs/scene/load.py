@@ -1,12 +1,11 @@
 """Reads a scene from TOML, checks it completely and fills in every default.
 
-Drops keys of the file that are of no use to a variant chosen by --set.
-
-A scene with `kind = "sine"` has the sine's keys. With `--set road.kind=flat` these would be errors,
-and every one of them would have to be removed on the command line too.
-
 `load` returns a `Scene` whose values have their types, lie in their ranges and do not contradict
 each other, or raises one InputError that lists all problems: the key, its place and the remedy.
+
+Keys of the file that are of no use to a variant chosen by --set are dropped: with
+`--set road.kind=flat` the keys of a sine would be errors, and every one of them would have to be
+removed on the command line too.
 """
 
 import difflib

@@ -1,9 +1,8 @@
-"""search.json: the trials of a search with their estimated errors, so that it can be resumed, and is not repeated.
+"""The journal of a search: its trials with their estimated errors, in search.json.
 
-What a search keeps in its result folder until it has found settings.
-
-`search/scene.toml` is the scene as given, with which `resume` goes on; `scene.toml` is always that
-of the results beside it. `search/cache` holds the stages of the trials.
+From it a search is resumed, and not repeated. `search/scene.toml` is the scene as given, with which
+`resume` goes on; `scene.toml` is always that of the results beside it. `search/cache` holds the
+stages of the trials.
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
 """The search for settings: trials from coarse to fine until the estimated error meets the target.
 
-Chooses the next settings: those predicted to meet the target at the lowest cost.
-
-Starts from a trial's errors by cause, each with a known order in its size
+The next settings are those predicted to meet the target at the lowest cost. The prediction starts from a trial's errors by cause, each with a known order in its size
 (contact.results.error_bars.orders), and its measured seconds by stage, scaled with the sizes of the
 stages (scene.estimate). Rungs are climbed one at a time, each time the one that removes most
 squared error per cost, until the target is predicted to be met; then those that it is clearly met

@@ -1,11 +1,8 @@
 """contact.h5, written during the time loop, and the checkpoint from which a loop continues.
 
-Compressed datasets whose rows a thread packs while the loop continues.
-
 HDF5's own filters hold Python's lock while they deflate; zlib does not. Whole chunks are therefore
-packed by zlib and written directly. HDF5 itself is only called from the caller's thread.
-
-How much of the road's relief the contact points of a run see.
+packed by zlib in a thread while the loop continues, and written directly. HDF5 itself is only
+called from the caller's thread.
 """
 
 from __future__ import annotations

@@ -18,11 +18,12 @@ from tireroad.greens.responses import Made, Wanted, band, judged, make_response,
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
+from tireroad.runs.scene.physics import turning_of
 from tireroad.runs.scene.tables.scene import PointForceTable, has_air
 from tireroad.runs.stages import cavity, corner, rotating
 from tireroad.runs.stages.modes import fill_projection, read_projection
 from tireroad.runs.stages.setup import components, leaning, leaning_loads, points_of, probes
-from tireroad.runs.stages.stage import MUMPS, Computed, Record, Result, turning_of
+from tireroad.runs.stages.stage import MUMPS, Computed, Record, Result
 
 _UNITS = {
     "eigenvalue": "1/s",
@@ -120,7 +121,7 @@ class GreensStage(Computed[Responses]):
             "modes": self.rotating.key,
             "axle": corner.inputs(self.job),
             "readings": corner.readings(self.job),
-            "damping": repr(turning_of(self.job).damping),
+            "damping": repr(turning_of(self.job.scene, self.job.speed).damping),
             "greens": asdict(scene.greens),
             "forces": [_place(force) for force in scene.force],
             "points": setup.patch.index.tolist() if setup else [],
@@ -270,7 +271,7 @@ class GreensStage(Computed[Responses]):
         attached = RollingModes(
             basis=ModalBasis(frequency=frequency, shape=shape, projection=projection),
             states=rotating.read(group["states"]),
-            turning=turning_of(self.job),
+            turning=turning_of(self.job.scene, self.job.speed),
         )
         leaning = group["leaning"][:] if "leaning" in group else None
         return replace(responses, attached=attached, leaning=leaning)

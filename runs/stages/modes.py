@@ -1,9 +1,8 @@
 """Stage modes: the lowest modes about the static state, and rotation matrices projected on them.
 
-The modes on all unknowns, in the shared cache beside modes.h5.
-
-A family with attachment modes thus solves them once. Not in the result folder: 38 MB for 157 modes
-of 30,240 unknowns. Those above LARGEST are solved again by each member.
+Their fields on all unknowns are kept in the shared cache beside modes.h5, so that a family with
+attachment modes solves them once. They are not in the result folder: 38 MB for 157 modes of 30,240
+unknowns. Those above LARGEST are solved again by each member.
 """
 
 from __future__ import annotations
@@ -30,20 +29,11 @@ from tireroad.runs.process import console
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.process.surroundings import available_memory
 from tireroad.runs.scene.estimate import estimate
+from tireroad.runs.scene.physics import damping_of, shapes_of
 from tireroad.runs.stages import cavity, corner
-from tireroad.runs.stages.stage import (
-    MUMPS,
-    Computed,
-    Job,
-    Record,
-    Result,
-    Shared,
-    checkpointed,
-    damping_of,
-    forget_checkpoint,
-    memoize,
-    shapes_of,
-)
+from tireroad.runs.stages.checkpoint import checkpointed, forget_checkpoint
+from tireroad.runs.stages.matrices import memoize
+from tireroad.runs.stages.stage import MUMPS, Computed, Job, Record, Result, Shared
 
 _UNITS = {
     "squares": "1/s2",
@@ -232,7 +222,7 @@ class ModesStage(Computed[ModalBasis]):
 
     def inputs(self) -> dict:
         """The static state, the modal table, viscous damping; rotation matrices if the wheel turns."""
-        damping = damping_of(self.job)
+        damping = damping_of(self.job.scene)
         return {
             "static": self.static.key,
             "modal": asdict(self.job.scene.modes),
@@ -245,7 +235,7 @@ class ModesStage(Computed[ModalBasis]):
     @property
     def _shapes(self) -> tuple[float, str, float] | None:
         """The speed (rad/s) up to which rotation shapes join the modes, their inertia and tolerance."""
-        turning = shapes_of(self.job)
+        turning = shapes_of(self.job.scene, self.job.speed)
         return (up_to(turning.speed), turning.inertia, turning.shape_tolerance) if turning else None
 
     def compute(self, record: Record) -> ModalBasis:
@@ -262,13 +252,13 @@ class ModesStage(Computed[ModalBasis]):
         with record.timing("air"):
             air = cavity.make_air(self.job, motions)
         with record.timing("projection and rotation shapes"):
-            given = air, self.job.axle, shapes_of(self.job)
+            given = air, self.job.axle, shapes_of(self.job.scene, self.job.speed)
             basis = projected(motions, modes, self.job.speed != 0, *given)
             basis = named(basis, motions.lattice)
         _describe(record, modes, basis)
         if self._shapes:
             record.headline["rotation shapes that join them"] = (basis.projection.shapes, "-")
-        record.headline["damping"] = (_damping(damping_of(self.job), basis.projection), "-")
+        record.headline["damping"] = (_damping(damping_of(self.job.scene), basis.projection), "-")
         if air is not None:
             cavity.describe_air(record, basis.projection.air)
         _say_names(basis)
@@ -298,7 +288,7 @@ class ModesStage(Computed[ModalBasis]):
 
     def write(self, file, product: ModalBasis) -> None:
         """Frequencies, traces and the small matrices; not the fields on all unknowns."""
-        damping = ratios(damping_of(self.job), product.projection)
+        damping = ratios(damping_of(self.job.scene), product.projection)
         fill(file, product, self.static.product.points, damping)
 
     def read(self, file) -> ModalBasis:
@@ -330,7 +320,7 @@ class Fields(Shared[ModalBasis]):
             **wanted.asked,
             air=air,
             axle=self.job.axle,
-            turning=shapes_of(self.job),
+            turning=shapes_of(self.job.scene, self.job.speed),
         )
         assert again.modes is not None, "they were solved just now"
         keep(*given, again.modes)

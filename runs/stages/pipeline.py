@@ -42,19 +42,13 @@ from tireroad.runs.scene.rules import check_road, keep, made
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.stages.accuracy import STATIC_TO_GREENS, AccuracyStage
 from tireroad.runs.stages.contact import ContactStage
+from tireroad.runs.stages.failures import failure_recorded
 from tireroad.runs.stages.greens import Responses
 from tireroad.runs.stages.response import ResponseStage
 from tireroad.runs.stages.setup import Setup
 from tireroad.runs.stages.sound import RadiationStage, SoundStage
 from tireroad.runs.stages.spectra import SpectraStage
-from tireroad.runs.stages.stage import (
-    Job,
-    PipelinePart,
-    Result,
-    Stage,
-    failure_recorded,
-    largest_memory,
-)
+from tireroad.runs.stages.stage import Job, PipelinePart, Result, Stage, largest_memory
 from tireroad.runs.stages.static import StaticStage
 from tireroad.runs.stages.stiffness import StiffnessStage
 from tireroad.runs.stages.vibration import MotionStage, VibrationStage

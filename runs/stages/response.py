@@ -18,6 +18,7 @@ from tireroad.modal.standing import standing_modes
 from tireroad.runs.files.store import put
 from tireroad.runs.process import console
 from tireroad.runs.scene.outputs import Curves
+from tireroad.runs.scene.physics import turning_of
 from tireroad.runs.stages.contact_file import ContactHistory
 from tireroad.runs.stages.greens import Responses
 from tireroad.runs.stages.rolling import (
@@ -30,7 +31,7 @@ from tireroad.runs.stages.rolling import (
     shortest_period,
 )
 from tireroad.runs.stages.setup import driven_points
-from tireroad.runs.stages.stage import Computed, Job, Record, Result, turning_of
+from tireroad.runs.stages.stage import Computed, Job, Record, Result
 
 Array = np.ndarray
 
@@ -81,7 +82,7 @@ class Driven:
         From `count` modes of the same static state with its rim released; also returns the highest
         of them, Hz. Collective.
         """
-        turning = turning_of(self.job)
+        turning = turning_of(self.job.scene, self.job.speed)
         motions = SmallMotions(
             self.job.tire, self.static, rim="free", road=self.job.scene.modes.road
         )

@@ -1,9 +1,8 @@
 """Stage rotating: eigenproblem of the rotating tire, on the modal basis or the finite elements.
 
-The states in rotating.h5: those of the modes and, apart, those of the shapes that joined them.
-
-A state dominated by rotation shapes (modal.rotation_shapes) is not an eigenfrequency of the tire:
-it represents the coupling of its modes to faster ones. There are as many as shapes; `turning/place`
+In rotating.h5 the states of the modes stand apart from those of the shapes that joined them. A
+state dominated by rotation shapes (modal.rotation_shapes) is not an eigenfrequency of the tire: it
+represents the coupling of its modes to faster ones. There are as many as shapes; `turning/place`
 holds their indices among all states.
 """
 
@@ -34,9 +33,10 @@ from tireroad.modal.rolling import RollingModes, full_states, named_states, roll
 from tireroad.modal.states import StateModes
 from tireroad.modal.waves import FaceWaves, ModeNames
 from tireroad.runs.files.store import put
+from tireroad.runs.scene.physics import turning_of
 from tireroad.runs.stages import cavity, corner
 from tireroad.runs.stages.modes import fill_names
-from tireroad.runs.stages.stage import MUMPS, Computed, Job, Record, Result, Shared, turning_of
+from tireroad.runs.stages.stage import MUMPS, Computed, Job, Record, Result, Shared
 
 _STATES = {"eigenvalue": "1/s", "right": "-", "left": "s", "residual": "-", "left_residual": "-"}
 _BLOCK = {"block": "1/s", "block_right": "-", "block_left": "s"}
@@ -105,7 +105,10 @@ class FullMatrices(Shared[Wheel]):
 
     def make(self) -> Wheel:
         """Assemble them. Collective."""
-        turning, projection = turning_of(self.job), self.modes.product.projection
+        turning, projection = (
+            turning_of(self.job.scene, self.job.speed),
+            self.modes.product.projection,
+        )
         given = self.motions.product, turning, self.air.product, projection
         return wheel_of(*given, self.job.axle)
 
@@ -139,11 +142,14 @@ class RotatingStage(Computed[RollingModes]):
         if "modes" not in done or job.speed:
             return None
         modes = done["modes"]
-        return Result(modes.key, lambda: rolling_modes(modes.product, turning_of(job), job.comm))
+        return Result(
+            modes.key,
+            lambda: rolling_modes(modes.product, turning_of(job.scene, job.speed), job.comm),
+        )
 
     def inputs(self) -> dict:
         """The modes, damping, speed and inertia; the number of states only for the full method."""
-        wanted, turning = self.job.scene.rotation, turning_of(self.job)
+        wanted, turning = self.job.scene.rotation, turning_of(self.job.scene, self.job.speed)
         return {
             "modes": self.modes.key,
             "axle": corner.inputs(self.job),
@@ -158,7 +164,7 @@ class RotatingStage(Computed[RollingModes]):
         """Solve on the root process, share with all, check. Collective."""
         job, basis = self.job, self.modes.product
         with record.timing("eigensolver"):
-            rolling = rolling_modes(basis, turning_of(job), job.comm)
+            rolling = rolling_modes(basis, turning_of(job.scene, job.speed), job.comm)
         projected = {
             f"projected: {name}": (figure, "-") for name, figure in rolling.figures.items()
         }
@@ -213,7 +219,10 @@ class RotatingStage(Computed[RollingModes]):
 
     def _campbell(self, record: Record, waves: FaceWaves) -> Campbell | None:
         """Eigenvalue branches over speed, if the scene asks for them. Collective."""
-        wanted, turning = self.job.scene.rotation.campbell, turning_of(self.job)
+        wanted, turning = (
+            self.job.scene.rotation.campbell,
+            turning_of(self.job.scene, self.job.speed),
+        )
         if wanted is None:
             return None
         speeds = np.arange(0.0, wanted.to + wanted.step / 2, wanted.step)
@@ -254,7 +263,7 @@ class RotatingStage(Computed[RollingModes]):
             kept = {name: own[name] for name in ("momentum", "corner")}
             projection = replace(basis.projection, **kept)
             basis = replace(basis, shape=own["shape"], projection=projection, modes=None)
-        turning = turning_of(self.job)
+        turning = turning_of(self.job.scene, self.job.speed)
         return RollingModes(basis=basis, states=states, turning=turning, full=bool(own))
 
 

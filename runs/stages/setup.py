@@ -29,13 +29,15 @@ from tireroad.fem.matrices import probe
 from tireroad.fem.static.state import StaticState
 from tireroad.runs.files import store
 from tireroad.runs.files.store import put
+from tireroad.runs.scene.physics import wheel_slip
 from tireroad.runs.scene.rules import made
 from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.scene.tables.contact import PatternTable
 from tireroad.runs.scene.tables.scene import rolls_freely
 from tireroad.runs.stages import corner
+from tireroad.runs.stages.matrices import memoize
 from tireroad.runs.stages.rolling import run_time
-from tireroad.runs.stages.stage import Job, Record, Result, Shared, memoize, wheel_slip
+from tireroad.runs.stages.stage import Job, Record, Result, Shared
 
 if TYPE_CHECKING:
     from tireroad.fem.static.footprint import TreadSurface

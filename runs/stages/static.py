@@ -23,20 +23,16 @@ from tireroad.fem.timing import Timing
 from tireroad.runs.files.store import put
 from tireroad.runs.process import console
 from tireroad.runs.process.mpi import on_root
-from tireroad.runs.stages.stage import (
-    MUMPS,
-    Computed,
-    Job,
-    Record,
-    checkpointed,
-    forget_checkpoint,
-    forget_matrices,
+from tireroad.runs.scene.physics import (
     friction_of,
     road_shape,
     rolling_shape,
     turning_of,
     wheel_slip,
 )
+from tireroad.runs.stages.checkpoint import checkpointed, forget_checkpoint
+from tireroad.runs.stages.matrices import forget_matrices
+from tireroad.runs.stages.stage import MUMPS, Computed, Job, Record
 
 _UNITS = {"points": "m", "force": "N", "area": "m2"}
 _SMALL = 1e-6  # of mu f: tolerance for a node that slips
@@ -165,7 +161,7 @@ def steady_rolling(job: Job, speed: float | None = None) -> Rolling:
     speed = job.speed if speed is None else speed
     if not scene.static.steady_rolling or speed == 0:
         return AT_REST
-    return rolling_shape(replace(turning_of(job), speed=speed))
+    return rolling_shape(replace(turning_of(job.scene, job.speed), speed=speed))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -18,8 +18,9 @@ from tireroad.fem.static.press import CurvePoint, load_curve, slopes
 from tireroad.fem.static.state import StaticState
 from tireroad.runs.files.store import put
 from tireroad.runs.process import console
+from tireroad.runs.scene.physics import wheel_slip
 from tireroad.runs.scene.tables.scene import deflections
-from tireroad.runs.stages.stage import Computed, Job, Record, Result, wheel_slip
+from tireroad.runs.stages.stage import Computed, Job, Record, Result
 from tireroad.runs.stages.static import steady_rolling
 
 AXES = ("longitudinal", "lateral")

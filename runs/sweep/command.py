@@ -30,7 +30,7 @@ from tireroad.runs.process import console
 from tireroad.runs.process.surroundings import available_memory
 from tireroad.runs.scene.estimate import memory
 from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.stages.stage import FAILURES
+from tireroad.runs.stages.failures import FAILURES
 from tireroad.runs.sweep.definition import Member, Sweep, read
 from tireroad.runs.sweep.page import gather, write, write_page
 

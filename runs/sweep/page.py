@@ -1,8 +1,6 @@
-"""sweep.html: the members of a sweep side by side, with their third octaves.
+"""sweep.html: the members of a sweep side by side, with their third octaves and the errors of these.
 
-Third octaves of a sweep's members in dB relative to the first with any, with their uncertainty.
-
-Members that differ only in a seed are samples of one road: their powers are averaged, and the mean
+Levels are also given in dB relative to the first member that has any. Members that differ only in a seed are samples of one road: their powers are averaged, and the mean
 power lies within t s / sqrt(n) of that of all roads in 95 of 100 cases (Student's t with n - 1
 degrees of freedom, s the standard deviation over the n seeds). The error bars of the runs
 (contact.results.error_bars) are added as squares; both are independent of each other and of those

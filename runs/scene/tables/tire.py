@@ -1,9 +1,8 @@
 """The table [tire], key by key, and the base of the kinds of section.
 
-Base of the kinds of section: own keys, and the resulting ring of elements, compounds and cords.
-
-A new kind is one file in runs.scene.sections, or a class in a user's script. The scene's
-keys, `check`, the key reference and the range tests derive from it.
+A kind of section has own keys, and makes the ring of elements, compounds and cords of them. A new
+one is one file in runs.scene.sections, or a class in a user's script. The scene's keys, `check`, the
+key reference and the range tests derive from it.
 """
 
 from __future__ import annotations

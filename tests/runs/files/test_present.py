@@ -20,7 +20,7 @@ from tireroad.runs.files.export import export
 from tireroad.runs.files.folder import Summary, left_out, remarks
 from tireroad.runs.report.compare import compare
 from tireroad.runs.report.page import render
-from tireroad.runs.stages.stage import failure_recorded
+from tireroad.runs.stages.failures import failure_recorded
 
 NAME = "synthetic-torus"
 OTHER = SCENE + "# another scene\n"
