@@ -31,7 +31,9 @@ from tireroad.fem.wheel import DIRECTIONS, Axle
 BODY = 6  # index of the body's height, after the six motions of the rim
 # Motions that probes can read or load after the outer face: the rim's six and the body's height.
 SEEN = 7
-MOMENTS = slice(3, 6)  # of the six; after the motions probes can read the hub moments, N m
+MOMENTS = slice(3, 6)  # of the six
+HUB_MOMENTS = 3  # N m: after the motions, the last readings of every wheel
+READINGS = SEEN + HUB_MOMENTS  # that probes can have after those of the outer face
 _PER_MODE = ("mass", "stiffness", "gyroscopic", "convective")
 
 
@@ -204,3 +206,12 @@ def meeting(
     }
     own = {f"own_{name}": rim.whole.get(name, np.zeros((6, 6))) for name in _PER_MODE}
     return Corner(axle=axle, places=places, **per_mode, **own)
+
+
+def widened(probes: sparse.csr_matrix, count: int) -> sparse.csr_matrix:
+    """Probes (k, 3 s) of the outer face, plus the last `count` readings of wheel, body, hub.
+
+    Returns (k + count, 3 s + 10).
+    """
+    every = sparse.identity(READINGS, format="csr")
+    return sparse.block_diag([probes, every[READINGS - count :]], format="csr")

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.runs.files.names import STAGES
 from tireroad.runs.process import console, mpi, signals
 from tireroad.runs.process.signals import DONE, INPUT, handed_over, processes_here, rank_before_mpi
 from tireroad.runs.process.surroundings import check_surroundings, crowded
-from tireroad.runs.scene.plan import STAGES
 from tireroad.runs.version import PROGRAM, VERSION
 
 EXIT = """\
@@ -344,6 +344,7 @@ def _world() -> Any:
     comm = MPI.COMM_WORLD
     console.set_root(comm.rank == 0)
     console.show_log("tireroad.fem")
+    console.show_log("tireroad.runs.files")
     _only_warnings()
     signals.stop_on_signals()
     return comm
@@ -366,9 +367,9 @@ def _run(args: argparse.Namespace, petsc_options: list[str]) -> int:
         mpi.start_petsc(petsc_options)
         from tireroad.runs.files.cache import Cache
         from tireroad.runs.files.folder import claimed
+        from tireroad.runs.pipeline import run_scene
         from tireroad.runs.search import journal
         from tireroad.runs.search.search import search, searches, tell_error
-        from tireroad.runs.stages.pipeline import run_scene
 
         mpi.on_root(comm, lambda: stack.enter_context(claimed(directory, scene.name)))
         stack.enter_context(console.log_to(directory / "log.txt"))
@@ -435,8 +436,8 @@ def _check(args: argparse.Namespace) -> None:
     if args.scene.suffix.lower() not in ("", ".toml"):
         _check_file(args.scene)
         return
+    from tireroad.runs.check import explain
     from tireroad.runs.report.section_figure import write_section
-    from tireroad.runs.scene.check import explain
     from tireroad.runs.scene.load import load
 
     scene = load(args.scene, args.set, lambda remark: print(f"note: {remark}"), args.until)
@@ -484,7 +485,7 @@ def _fit(args: argparse.Namespace) -> None:
 
 def _export(args: argparse.Namespace) -> None:
     directory = _results(args.directory)
-    from tireroad.runs.files.export import export
+    from tireroad.runs.results.export import export
 
     told: list[tuple[str, str]] = []
     paths = export(
@@ -507,7 +508,7 @@ def _info(args: argparse.Namespace) -> None:
 
         mpi.start_petsc([])
         return print(described(args.json))
-    from tireroad.runs.files.info import describe
+    from tireroad.runs.results.info import describe
 
     return print(describe(args.file, args.json))
 
@@ -536,7 +537,7 @@ def _validate(args: argparse.Namespace) -> None:
 def _results(directory: Path) -> Path:
     """The folder, if it is one of results; says which of its files are left out."""
     from tireroad.runs.files.folder import remarks
-    from tireroad.runs.files.reader import check_results
+    from tireroad.runs.results.reader import check_results
 
     check_results(directory)
     for text in remarks(directory):

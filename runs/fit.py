@@ -46,8 +46,8 @@ from tireroad.fem.sections.construction import INFLATION
 from tireroad.fem.sections.inflated import InflatedRing
 from tireroad.fem.sections.radial import radial, size
 from tireroad.runs.factors import PARAMETERS, PLAUSIBLE, SCALED, construction
+from tireroad.runs.files.names import scene_name
 from tireroad.runs.process import console
-from tireroad.runs.scene.resolved import scene_name
 
 LOADS, PRINTS = 0.03, 0.05  # relative tolerance of the load at a deflection, of a footprint's sizes
 ALIKE = 4  # points of a curve from which on their errors are one another's
@@ -610,9 +610,9 @@ def _run(folder: Path) -> Path:
     from mpi4py import MPI
 
     from tireroad.runs.files.cache import Cache
+    from tireroad.runs.pipeline import run_scene
     from tireroad.runs.process import mpi
     from tireroad.runs.scene.load import load
-    from tireroad.runs.stages.pipeline import run_scene
 
     mpi.start_petsc([])
     scene = load(folder / "scene.toml", [], lambda remark: None, "stiffness")

@@ -56,20 +56,19 @@ from tireroad.greens.response import Response
 from tireroad.greens.responses import make_response
 from tireroad.modal.basis import ModalBasis, same_fields
 from tireroad.modal.campbell import Campbell, sweep
+from tireroad.modal.corner import HUB_MOMENTS, READINGS, widened
 from tireroad.modal.damping import ratios
 from tireroad.modal.rolling import RollingModes, named_states, rolling_modes
 from tireroad.modal.standing import named, standing_modes
 from tireroad.modal.states import StateModes
 from tireroad.modal.waves import FaceWaves, ModeNames
 from tireroad.runs.scene.parts import scaled
-from tireroad.runs.scene.physics import make_tire, rolling_shape
+from tireroad.runs.scene.physics import make_tire, rolling_shape, run_in_time
 from tireroad.runs.scene.rules import barred_from_contact
 from tireroad.runs.scene.sections.radial import RadialSection
 from tireroad.runs.scene.sections.torus import TorusSection
 from tireroad.runs.scene.tables.contact import DRY_ASPHALT
 from tireroad.runs.scene.tables.tire import NEAR_ROAD, TireTable
-from tireroad.runs.stages.corner import BESIDE, MOMENTS, widened
-from tireroad.runs.stages.rolling import grown
 
 # Arguments that are one number.
 _NUMBERS = {"inflation", "load", "deflection", "road_height", "count", "up_to", "duration", "step"}
@@ -490,8 +489,8 @@ class RollingTire:
                 'road = "forces"'
             )
         count = probes.shape[0]
-        loads = sparse.hstack([probes, sparse.csr_matrix((count, BESIDE))], format="csr")
-        response = self.respond(widened(probes, MOMENTS), loads, residual)
+        loads = sparse.hstack([probes, sparse.csr_matrix((count, READINGS))], format="csr")
+        response = self.respond(widened(probes, HUB_MOMENTS), loads, residual)
         force = by_momentum(response, np.tile(np.eye(3), len(spots)), at)
         moment = response.between(slice(count, None), slice(None)).receptance(at)
         return np.concatenate([force, moment], axis=1)
@@ -667,7 +666,7 @@ def drive(
     blocks = _blocks(spec, setup, response, chosen, motions.body.comm)
     highest = tire.states.highest / (2 * np.pi)
     bounds = limits(step=chosen.size, highest=highest, pitch=pitch(setup.patch), speed=rolled.speed)
-    return _history(setup.patch, blocks, lowest(bounds), grown(setup, road.run_in))
+    return _history(setup.patch, blocks, lowest(bounds), run_in_time(setup, road.run_in))
 
 
 def _check_motions(motions: SmallMotions) -> None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import fcntl
 import json
+import logging
 import os
 import shutil
 import time
@@ -25,7 +26,6 @@ import h5py
 from tireroad.fem.form_cache import user_folder
 from tireroad.runs.files import store
 from tireroad.runs.files.disk import Refused, replacing, write_text
-from tireroad.runs.process import console
 
 VARIABLE, OFF = "TIREROAD_CACHE", "off"
 SHARED = (
@@ -36,6 +36,7 @@ SHARED = (
     "greens",
     "stiffness",
 )  # stages kept in the user's own cache
+_LOG = logging.getLogger(__name__)
 LARGEST = 10e9  # bytes: largest size of the user's own cache
 
 
@@ -163,7 +164,7 @@ class Cache:
             _link(path, self.place(stage, key))
             self._prune()
         except (OSError, Refused) as error:
-            console.say(f"  not kept for other runs, {VARIABLE} = {self.folder}: {error}")
+            _LOG.warning(f"  not kept for other runs, {VARIABLE} = {self.folder}: {error}")
 
     def _figures(self, stage: str, key: str) -> Path:
         return self.place(stage, key).with_suffix(".json")
@@ -184,7 +185,7 @@ class Cache:
                 try:
                     fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 except BlockingIOError:
-                    console.say(f"{stage:9s} waits for another run that computes the same stage")
+                    _LOG.warning(f"{stage:9s} waits for another run that computes the same stage")
                     fcntl.flock(lock, fcntl.LOCK_EX)
             yield
 

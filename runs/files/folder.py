@@ -23,9 +23,8 @@ from tireroad.runs.files.disk import (
     text_digest,
     write_text,
 )
+from tireroad.runs.files.names import MARK, STAGES, scene_name
 from tireroad.runs.files.store import opened, plain
-from tireroad.runs.scene.plan import STAGES
-from tireroad.runs.scene.resolved import MARK, scene_name
 from tireroad.runs.version import PROGRAM, RESULT_FORMAT, VERSION
 
 OTHER = "choose another folder with --out, or remove this one; nothing was written"

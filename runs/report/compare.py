@@ -23,7 +23,6 @@ from tireroad.contact.results.spectra import in_band
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.disk import write_text
 from tireroad.runs.files.folder import UNFINISHED
-from tireroad.runs.files.reader import RunResults
 from tireroad.runs.report.figures import (
     CYCLE,
     FEWEST_BANDS,
@@ -39,6 +38,7 @@ from tireroad.runs.report.levels import BandLevels, band_levels, is_drawn
 from tireroad.runs.report.read import quantity, shown_unit
 from tireroad.runs.report.scene_keys import scene_keys
 from tireroad.runs.report.surface_figures import PRESSURE, frame
+from tireroad.runs.results.reader import RunResults
 from tireroad.runs.version import PROGRAM, VERSION
 
 Array = NDArray[np.float64]

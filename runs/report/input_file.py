@@ -23,9 +23,10 @@ from tireroad.fem.decks.history import DeckHistory, history
 from tireroad.fem.decks.own import MESHES, Wishes, no_solids, section_of
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections.construction import INFLATION, RADII
+from tireroad.runs.files.names import scene_name
 from tireroad.runs.report.figures import COLOURS, WIDE, canvas, styled
 from tireroad.runs.report.section_figure import NAME, save_section
-from tireroad.runs.scene.resolved import literal, scene_name
+from tireroad.runs.scene.resolved import literal
 from tireroad.runs.scene.sections.file import FileSection, own_section
 from tireroad.runs.scene.tables.tire import TireTable
 

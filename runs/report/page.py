@@ -20,6 +20,7 @@ from tireroad.contact.results.spectra import SILENT, deviation
 from tireroad.fem.errors import InputError
 from tireroad.runs.files import folder
 from tireroad.runs.files.disk import is_as_signed, is_table_as_signed, write_text
+from tireroad.runs.files.names import STAGES
 from tireroad.runs.report import live
 from tireroad.runs.report.read import (
     Absent,
@@ -36,7 +37,6 @@ from tireroad.runs.report.scene_keys import scene_keys
 from tireroad.runs.report.sections import forces, modes, sound, spectra, tire
 from tireroad.runs.report.sections.speeds import speeds
 from tireroad.runs.scene.parts import Listing, listed
-from tireroad.runs.scene.plan import STAGES
 from tireroad.runs.version import PROGRAM
 
 Fact = tuple[str, str]

@@ -21,10 +21,11 @@ from tireroad.contact.choices import USABLE
 from tireroad.contact.tread.laws.elastic import ElasticTread
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Key, ParameterError, described, second_digit
+from tireroad.runs.files.names import scene_name
 from tireroad.runs.scene import rules
 from tireroad.runs.scene.parts import with_parts
 from tireroad.runs.scene.plan import meets_road, skipped
-from tireroad.runs.scene.resolved import literal, scene_name
+from tireroad.runs.scene.resolved import literal
 from tireroad.runs.scene.schema import (
     Path_,
     Pitch,

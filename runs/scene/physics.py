@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 from mpi4py import MPI
 
+from tireroad.contact.roads.under_tire import is_level
+from tireroad.contact.setup import ContactSetup
 from tireroad.fem.model import TireModel
 from tireroad.fem.static.friction_press import Friction
 from tireroad.fem.static.road import RoadShape
@@ -93,3 +95,13 @@ def turning_of(scene: Scene, speed: float) -> Turning:
 def shapes_of(scene: Scene, speed: float) -> Turning | None:
     """The wheel's rotation if rotation shapes join its modes (modal.rotation_shapes), else None."""
     return turning_of(scene, speed) if speed and scene.joins_shapes else None
+
+
+def run_in_time(setup: ContactSetup, length: float) -> float:
+    """Time (s) until the whole patch is past a run-in of this `length` (m); 0 of a standing wheel, or if the
+    road is level up to its end."""
+    speed, whole = setup.rolled.speed, setup.road.grown
+    x0, x1, y0, y1 = setup.patch.extent
+    if speed == 0 or is_level(setup.road, min(x0, whole), whole, y0, y1):
+        return 0.0
+    return (length + x1 - x0) / speed

@@ -24,25 +24,19 @@ from tireroad.fem.errors import ConvergenceError, InputError, UnsuitedSettings
 from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.files.disk import signed, write_text
 from tireroad.runs.files.folder import CHOSEN
+from tireroad.runs.files.names import STAGES
+from tireroad.runs.files.trials import MARGIN, Settings, Trial, worst
+from tireroad.runs.pipeline import Finished, run_scene
 from tireroad.runs.process import console
+from tireroad.runs.process.demand import DOUBTFUL
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.process.surroundings import available_memory
-from tireroad.runs.scene.estimate import DOUBTFUL, estimate
-from tireroad.runs.scene.plan import STAGES
+from tireroad.runs.scene.estimate import estimate
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.search import journal
-from tireroad.runs.search.journal import ErrorsByCause, SearchJournal, Trial, shown, worst
-from tireroad.runs.search.settings import (
-    MARGIN,
-    MARGINAL,
-    Ladders,
-    Settings,
-    aim,
-    applied,
-    size_ratio,
-)
-from tireroad.runs.stages.pipeline import Finished, run_scene
+from tireroad.runs.search.journal import SearchJournal, errors_of, shown
+from tireroad.runs.search.settings import MARGINAL, Ladders, applied, size_ratio
 
 AIM = 0.9 / MARGIN  # of the target; 0.9: the orders hold only asymptotically
 AT_ONCE = {"mesh": 2, "modes": 2, "points": 1, "step": 1}  # most rungs per plan: same reason
@@ -213,7 +207,7 @@ class Search:
         ConvergenceError if not; the results are then those of that trial. Collective.
         """
         on_root(self.comm, lambda: self._begin())
-        console.say(f"search    for {aim(self.scene.accuracy)}, {MARGINAL}")
+        console.say(f"search    for {self.scene.accuracy.aim()}, {MARGINAL}")
         tried: list[Trial] = []
         why = ""
         settings: Settings | None = self._ladders.first()
@@ -301,7 +295,7 @@ class Search:
             raise
         cost = on_root(self.comm, lambda: seconds(folder))
         spent = self.comm.bcast(time.perf_counter() - began)
-        return Trial(settings, cost, spent, ErrorsByCause.of(product, self.scene.accuracy), scheme)
+        return Trial(settings, cost, spent, errors_of(product, self.scene.accuracy), scheme)
 
     def _over(self, trial: Trial) -> float:
         """The estimated error over the target; infinite for a failed trial."""
@@ -393,7 +387,7 @@ def tell_error(scene: Scene, done: Finished) -> None:
     """Report whether the target error is met, if it was estimated. Collective."""
     if not scene.accuracy.aimed or "accuracy" not in done.done:
         return
-    over = ErrorsByCause.of(done.done["accuracy"].product, scene.accuracy).over(scene.accuracy)
+    over = errors_of(done.done["accuracy"].product, scene.accuracy).over(scene.accuracy)
     text = f"estimated error of the {scene.accuracy.of.replace('_', ' ')}: {shown(over, scene.accuracy)}"
     if worst(over)[0] <= 1:
         console.say(f"{text}, within the target")

@@ -14,12 +14,12 @@ from tireroad.contact.choices import LEAST_STEPS, TURN
 from tireroad.contact.loop import DrivenTire, LinearTire, equal_steps, steps_of
 from tireroad.contact.patch import Patch
 from tireroad.contact.results.chatter import Chosen, choose, oscillation
-from tireroad.contact.roads.under_tire import is_level
 from tireroad.contact.rolling import bristles, make_loop, rolling_steadily
 from tireroad.contact.setup import ContactSetup
 from tireroad.greens.recursion import Convolution, Recursion, sharers
 from tireroad.greens.response import Response
 from tireroad.runs.process import console
+from tireroad.runs.scene.physics import run_in_time
 from tireroad.runs.scene.tables.contact import TimeTable
 from tireroad.runs.scene.tables.scene import PointForceTable, RoadTable, Scene
 from tireroad.runs.stages import corner
@@ -62,16 +62,7 @@ def run_in(setup: ContactSetup, road: RoadTable) -> float:
     There is none either where the road is level up to its end, as before a cleat: nothing grows,
     and the impact would be left out with it.
     """
-    return 0.0 if road.kind == "flat" else grown(setup, road.run_in)
-
-
-def grown(setup: ContactSetup, length: float) -> float:
-    """The same for a run-in of this length (m) on a road of any kind."""
-    speed, whole = setup.rolled.speed, setup.road.grown
-    x0, x1, y0, y1 = setup.patch.extent
-    if speed == 0 or is_level(setup.road, min(x0, whole), whole, y0, y1):
-        return 0.0
-    return (length + x1 - x0) / speed
+    return 0.0 if road.kind == "flat" else run_in_time(setup, road.run_in)
 
 
 def first_step(setup: ContactSetup, road: RoadTable, time: np.ndarray) -> int:

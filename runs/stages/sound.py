@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
-from functools import cached_property, partial
-from pathlib import Path
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar
 
 import h5py
 import numpy as np
-from mpi4py import MPI
 from scipy import sparse
 
 from tireroad.contact.results.spectra import a_weighting, band_sums
-from tireroad.fem.errors import InputError
-from tireroad.fem.parameters import key_of
 from tireroad.fem.static.state import StaticState
 from tireroad.greens.basis import Basis
 from tireroad.greens.tire_sound import (
@@ -32,10 +27,9 @@ from tireroad.greens.tire_sound import (
 )
 from tireroad.modal.corner import BODY, SEEN
 from tireroad.runs.files.store import dataset, put, read_fields, write_fields
-from tireroad.runs.scene.plan import skipped
 from tireroad.runs.scene.tables.sound import SoundTable
 from tireroad.runs.stages.spectra import Spectra
-from tireroad.runs.stages.stage import Computed, Job, Record, Result, Shared, Stage
+from tireroad.runs.stages.stage import Computed, Record, Result
 from tireroad.runs.stages.vibration import HANN, POWER, decibels
 from tireroad.runs.stages.whole_tire import Lines, WholeTire
 
@@ -584,62 +578,3 @@ def _describe(record: Record, found: SoundPressure) -> None:
     record.headline["sound power level"] = (float(found.total_power[0]), "dB re 1 pW")
     record.headline["A-weighted sound power level"] = (float(found.total_power[1]), "dB(A) re 1 pW")
     record.headline["band"] = (f"{found.frequency[0]:.3g} to {found.frequency[-1]:.4g} Hz", "-")
-
-
-def listen(
-    run: str | Path | Mapping[str, Any],
-    microphones: Any = ("cpx",),
-    *,
-    temperature: float = 293.15,
-    up_to: float | None = None,
-) -> SoundPressure:
-    """What microphones hear of a finished run: its folder, or tireroad.load of it. Not collective.
-
-    `microphones`: as sound.microphones in a scene, names or places (x, y, z) in m; `temperature` K of the
-    air; `up_to` Hz. Nothing is written. Raises InputError for a folder without the results of a
-    rolling contact, for places inside the tire or under the road, and values out of range.
-    """
-    from tireroad.runs.files.reader import RunResults
-    from tireroad.runs.scene.load import load
-    from tireroad.runs.stages.pipeline import PARTS
-
-    results = run if isinstance(run, RunResults) else RunResults(run)  # type: ignore[arg-type]
-    scene = load(results.directory / "scene.toml")
-    given = {"microphones": microphones, "temperature": temperature, "up_to": up_to}
-    table = SoundTable(
-        **{
-            item.name: _read(item, given[item.name])
-            for item in fields(SoundTable)
-            if item.name in given
-        }
-    )
-    job = Job(replace(scene, sound=table), results.directory, MPI.COMM_SELF)
-    done: dict[str, Result] = {}
-    for kind in PARTS:
-        part = kind.with_inputs(job, done)
-        if isinstance(part, RadiationStage | SoundStage):
-            done[kind.name] = Result("", partial(part.compute, Record()))
-        elif isinstance(part, Shared):
-            done[kind.name] = Result("", part.make)
-        elif isinstance(part, Stage) and kind.name not in skipped(scene):
-            if f"{kind.name}.h5" in results.left_out or not job.path(kind.name).is_file():
-                continue
-            done[kind.name] = Result("", part.stored)
-        job.settle(done)
-    if "sound" not in done:
-        raise InputError(
-            f"{results.directory}: listen needs the results of a tire that rolls or is driven over time: run "
-            "the scene with [time] and [contact] to its end"
-        )
-    return done["sound"].product
-
-
-def _read(item: Any, value: Any) -> Any:
-    key = key_of(item)
-    assert key is not None
-    if value is None and key.optional:
-        return None
-    try:
-        return key.read(value)
-    except ValueError as error:
-        raise InputError(f"listen: {item.name} {error}") from None

@@ -27,16 +27,16 @@ from scipy import stats
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.disk import replacing, write_text
-from tireroad.runs.files.reader import RunResults
 from tireroad.runs.files.store import sealed
+from tireroad.runs.files.trials import NAME, read_trials
 from tireroad.runs.report.compare import legend_above, pen
 from tireroad.runs.report.figures import Drawing, canvas, drawing, encode, styled
 from tireroad.runs.report.levels import band_levels, is_drawn, rank
 from tireroad.runs.report.read import quantity, shown_unit
+from tireroad.runs.results.reader import RunResults
 from tireroad.runs.scene.load import with_modal
 from tireroad.runs.scene.resolved import dumps, literal
 from tireroad.runs.scene.schema import parts
-from tireroad.runs.search.journal import NAME, read_trials
 from tireroad.runs.search.settings import applied
 from tireroad.runs.sweep.definition import Member, Sweep
 from tireroad.runs.version import PROGRAM, VERSION

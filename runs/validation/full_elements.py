@@ -25,10 +25,10 @@ from tireroad.greens.responses import make_response
 from tireroad.modal.damping import StrainEnergy, beyond, rates
 from tireroad.modal.rolling import RollingModes, rolling_modes
 from tireroad.modal.standing import fewer
+from tireroad.runs.pipeline import Finished, run_scene
 from tireroad.runs.process import console
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.physics import turning_of
-from tireroad.runs.stages.pipeline import Finished, run_scene
 from tireroad.runs.stages.setup import leaning, leaning_loads, probes, scene_setup
 from tireroad.runs.validation.tables import Table
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.contact.results.spectra import FEW, SILENT, heard, nominal
+from tireroad.runs.files.trials import CAUSES, MARGIN, NAME, Trial, read_trials, worst
 from tireroad.runs.report import figures, live
 from tireroad.runs.report.read import (
     Results,
@@ -20,8 +21,6 @@ from tireroad.runs.report.read import (
     without_friction,
 )
 from tireroad.runs.scene.tables.scene import AccuracyTable
-from tireroad.runs.search.journal import CAUSES, NAME, Trial, read_trials, worst
-from tireroad.runs.search.settings import MARGIN, aim
 
 _FILE = "spectra.h5"
 _MORE = (  # third octaves, their quantity, reference
@@ -48,7 +47,7 @@ def _show(section: Section, wanted: AccuracyTable, trials: list[Trial]) -> None:
     over = [_errors(trial, wanted) for trial in trials]
     cost = np.array([sum(trial.seconds.values()) for trial in trials])
     section.facts += [
-        ("searched for", aim(wanted)),
+        ("searched for", wanted.aim()),
         ("trials of the search", str(len(trials))),
         ("they took", quantity(float(sum(trial.spent for trial in trials)), "s")),
     ]

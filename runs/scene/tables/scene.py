@@ -357,6 +357,12 @@ class AccuracyTable:
         most=1e8,
     )
 
+    def aim(self) -> str:
+        """The target in words."""
+        asked = [f"{100 * self.target:.3g} %"] if self.target is not None else []
+        asked += [f"{self.target_db:.3g} dB"] if self.target_db is not None else []
+        return f"settings with {' and '.join(asked)} of the {self.of.replace('_', ' ')} up to {self.up_to:g} Hz"
+
     @property
     def aimed(self) -> bool:
         """Whether a target error is given."""

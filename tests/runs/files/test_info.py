@@ -8,7 +8,7 @@ import pytest
 from synthetic_results import write_results
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.files.info import describe
+from tireroad.runs.results.info import describe
 
 
 @pytest.fixture(scope="module")

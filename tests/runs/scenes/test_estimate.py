@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from tireroad.fem.errors import InputError
+from tireroad.runs.check import explain
 from tireroad.runs.scene import estimate as scene_estimate
-from tireroad.runs.scene.check import explain
 from tireroad.runs.scene.estimate import estimate, memory
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.sizes import highest_frequency, sizes

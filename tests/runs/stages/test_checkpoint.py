@@ -17,10 +17,10 @@ from mpi4py import MPI
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.timing import Timing
 from tireroad.modal.solver.slicing import SOLVERS, SymmetricProblem
+from tireroad.runs.pipeline import run_scene
 from tireroad.runs.process.signals import Stopped
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages import checkpoint
-from tireroad.runs.stages.pipeline import run_scene
 
 ROUNDING = 0.0 if MPI.COMM_WORLD.size == 1 else 1e-9  # of factors on several processes, run by run
 pytestmark = [pytest.mark.slow, pytest.mark.mpi]

@@ -13,8 +13,8 @@ from tires import soft_torus
 import tireroad
 from tireroad.fem.errors import InputError
 from tireroad.greens.outputs import Surface
+from tireroad.runs.pipeline import run_scene
 from tireroad.runs.scene.load import load
-from tireroad.runs.stages.pipeline import run_scene
 
 pytestmark = pytest.mark.slow
 

@@ -24,17 +24,11 @@ from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.files.disk import FACTORS, remove_factors
 from tireroad.runs.files.folder import Summary, make_folder
 from tireroad.runs.process import console
+from tireroad.runs.process.demand import check_demand, out_of_core
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.process.surroundings import factors_on_disk, forget_peak
 from tireroad.runs.scene import files
-from tireroad.runs.scene.estimate import (
-    Estimate,
-    check_demand,
-    duration,
-    estimate,
-    memory_of,
-    out_of_core,
-)
+from tireroad.runs.scene.estimate import Estimate, duration, estimate, memory_of
 from tireroad.runs.scene.load import with_modal
 from tireroad.runs.scene.plan import meets_road, skipped
 from tireroad.runs.scene.resolved import dumps

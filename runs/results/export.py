@@ -30,7 +30,7 @@ from tireroad.fem.errors import InputError
 from tireroad.runs.files.disk import replacing
 from tireroad.runs.files.folder import left_out
 from tireroad.runs.files.store import opened
-from tireroad.runs.files.wave import wave_file
+from tireroad.runs.results.wave import wave_file
 from tireroad.runs.version import PROGRAM
 
 FRF = 4  # function type: frequency response
@@ -318,7 +318,7 @@ def export(
     if uff:
         files |= _asked("response.uff", remark, lambda: _universal(directory, others))
     if tir:
-        from tireroad.runs.files.tir import written  # needs the tire, which no other export does
+        from tireroad.runs.results.tir import written  # needs the tire, which no other export does
 
         files |= _asked(
             "tire.tir", remark, lambda: written(directory, others, partial(remark, "tire.tir"))
