@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
@@ -34,12 +33,12 @@ from tireroad.runs.report.figures import (
     envelope,
     styled,
 )
+from tireroad.runs.report.kit import page_of
 from tireroad.runs.report.levels import BandLevels, band_levels, is_drawn
-from tireroad.runs.report.read import quantity, shown_unit
+from tireroad.runs.report.read import shown_unit
 from tireroad.runs.report.scene_keys import scene_keys
 from tireroad.runs.report.surface_figures import PRESSURE, frame
 from tireroad.runs.results.reader import RunResults
-from tireroad.runs.version import PROGRAM, VERSION
 
 Array = NDArray[np.float64]
 _ROUNDING = 1e-9  # relative: a load that is given comes out so near
@@ -294,15 +293,10 @@ def _table(names: Sequence[str], groups: dict[str, list[Row]]) -> str:
 
 
 def _page(runs: Sequence[RunResults], names: Sequence[str], groups: dict[str, list[Row]]) -> str:
-    pages = Environment(
-        loader=FileSystemLoader(Path(__file__).parent / "pages"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-    )
-    pages.filters |= {"quantity": quantity, "change": _change}
-    return pages.get_template("compare.html.j2").render(
-        program=f"{PROGRAM} {VERSION}",
+    return page_of(
+        "compare",
+        f"{len(names)} runs compared",
+        filters={"change": _change},
         names=names,
         tables=_tables(groups),
         scene=groups["scene"],

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from tireroad.contact.results.spectra import SILENT, deviation
 from tireroad.fem.errors import InputError
@@ -22,6 +21,7 @@ from tireroad.runs.files import folder
 from tireroad.runs.files.disk import is_as_signed, is_table_as_signed, write_text
 from tireroad.runs.files.names import STAGES
 from tireroad.runs.report import live
+from tireroad.runs.report.kit import page_of
 from tireroad.runs.report.read import (
     Absent,
     Results,
@@ -284,18 +284,18 @@ def render(directory: Path) -> str:
         if warning != short
     ]
     remarked += [(section.title, warning) for section in sections for warning in section.warnings]
-    loader = FileSystemLoader(Path(__file__).parent / "pages")
-    pages = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
-    pages.filters |= {"quantity": quantity, "in_script": in_script}
-    return pages.get_template("report.html.j2").render(
-        name=summary.get("scene") or scene.get("name") or directory.resolve().name,
-        program={"name": PROGRAM, "version": ""} | summary.get("program", {}),
+    program = {"name": PROGRAM, "version": ""} | summary.get("program", {})
+    return page_of(
+        "report",
+        summary.get("scene") or scene.get("name") or directory.resolve().name,
+        filters={"in_script": in_script},
+        program=f"{program['name']} {program['version']}",
         processes=summary.get("processes"),
         computed=computed(directory),
         too_short=short,
         answer=facts,
         script=live.script(),
-        style=live.style(),
+        uplot=live.style(),
         warnings=ended + [("report", problem) for problem in problems] + remarked,
         stages=stages,
         judged=judged,

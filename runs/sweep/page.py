@@ -20,7 +20,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 from scipy import stats
@@ -31,15 +30,15 @@ from tireroad.runs.files.store import sealed
 from tireroad.runs.files.trials import NAME, read_trials
 from tireroad.runs.report.compare import legend_above, pen
 from tireroad.runs.report.figures import Drawing, canvas, drawing, encode, styled
+from tireroad.runs.report.kit import page_of
 from tireroad.runs.report.levels import band_levels, is_drawn, rank
-from tireroad.runs.report.read import quantity, shown_unit
+from tireroad.runs.report.read import shown_unit
 from tireroad.runs.results.reader import RunResults
 from tireroad.runs.scene.load import with_modal
 from tireroad.runs.scene.resolved import dumps, literal
 from tireroad.runs.scene.schema import parts
 from tireroad.runs.search.settings import applied
 from tireroad.runs.sweep.definition import Member, Sweep
-from tireroad.runs.version import PROGRAM, VERSION
 
 Array = NDArray[np.float64]
 ERROR = "error of the "
@@ -297,14 +296,11 @@ def _mean(level: Array, error: Array) -> tuple[Array, Array]:
 
 def write_page(table: Gathered, folder: Path, title: str, failed: Sequence[str]) -> Path:
     """Write folder/sweep.html; returns its path."""
-    loader = FileSystemLoader(Path(__file__).parent)
-    pages = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
-    pages.filters["quantity"] = quantity
-    pages.filters["setting"] = _setting
     path = folder / "sweep.html"
-    text = pages.get_template("sweep.html.j2").render(
-        title=title,
-        program=f"{PROGRAM} {VERSION}",
+    text = page_of(
+        "sweep",
+        title,
+        filters={"setting": _setting},
         table=table,
         columns=[column for column in table.columns if _banded(column.name)[1] is None],
         figures=_page_figures(table),
