@@ -99,6 +99,7 @@ class GreensStage(Computed[Responses]):
     """The Green's functions with their residual flexibility, and the choice of dynamic states."""
 
     name: ClassVar[str] = "greens"
+    reads: ClassVar[tuple[str, ...]] = ("greens",)
     static: Result[StaticState]
     wheel: Result[Wheel]
     fields: Result[ModalBasis]
@@ -115,14 +116,12 @@ class GreensStage(Computed[Responses]):
         return f"static shapes by {MUMPS}; residual at most {RESIDUAL_TOLERANCE:g}"
 
     def inputs(self) -> dict:
-        """The states and what is driven; the road enters only through the reach of the patch."""
+        """Also what is driven; the road enters only through the reach of the patch."""
         scene, setup = self.job.scene, self.setup.product
-        return {
-            "modes": self.rotating.key,
+        return super().inputs() | {
             "axle": corner.inputs(self.job),
             "readings": corner.readings(self.job),
             "damping": repr(turning_of(self.job.scene, self.job.speed).damping),
-            "greens": asdict(scene.greens),
             "forces": [_place(force) for force in scene.force],
             "points": setup.patch.index.tolist() if setup else [],
             "pitch": points_of(self.job, self.static.product) if setup else None,

@@ -8,7 +8,7 @@ unknowns. Those above LARGEST are solved again by each member.
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -198,6 +198,7 @@ class ModesStage(Computed[ModalBasis]):
     """The modes of the non-rotating tire."""
 
     name: ClassVar[str] = "modes"
+    reads: ClassVar[tuple[str, ...]] = ("modes",)
     static: Result[StaticState]
     motions: Result[SmallMotions]
 
@@ -221,11 +222,9 @@ class ModesStage(Computed[ModalBasis]):
         )
 
     def inputs(self) -> dict:
-        """The static state, the modal table, viscous damping; rotation matrices if the wheel turns."""
+        """Also viscous damping; whether the wheel turns, and the rotation shapes that join."""
         damping = damping_of(self.job.scene)
-        return {
-            "static": self.static.key,
-            "modal": asdict(self.job.scene.modes),
+        return super().inputs() | {
             "rotating": self.job.speed != 0,
             "shapes": self._shapes,
             "cavity": cavity.inputs(self.job),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -121,23 +121,12 @@ class ResponseStage(Computed[PointResponse]):
     """The response to the prescribed forces, alone or together with contact."""
 
     name: ClassVar[str] = "response"
+    reads: ClassVar[tuple[str, ...]] = ("force", "time", "output.kinds", "output.axle_force")
     static: Result[StaticState]
     modes: Result[ModalBasis]
     wheel: Result[Wheel]
     greens: Result[Responses]
     contact: Result[ContactHistory] | None = None
-
-    def inputs(self) -> dict:
-        """The Green's functions, the forces, the time and the frequency outputs."""
-        scene, output = self.job.scene, self.job.scene.output
-        return {
-            "greens": self.greens.key,
-            "forces": [asdict(force) for force in scene.force],
-            "time": asdict(scene.time) if scene.time else None,
-            "outputs": {name: asdict(kind) for name, kind in output.kinds},
-            "contact": self.contact.key if self.contact else None,
-            "axle_force": output.axle_force,
-        }
 
     def compute(self, record: Record) -> PointResponse:
         """Integrate in time, then add the scene's outputs. Collective."""

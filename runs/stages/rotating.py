@@ -9,7 +9,7 @@ holds their indices among all states.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -118,6 +118,7 @@ class RotatingStage(Computed[RollingModes]):
     """The states of the rolling tire; for a wheel at rest, those of the modes."""
 
     name: ClassVar[str] = "rotating"
+    reads: ClassVar[tuple[str, ...]] = ("rotation.campbell",)
     static: Result[StaticState]
     modes: Result[ModalBasis]
     wheel: Result[Wheel]
@@ -148,15 +149,13 @@ class RotatingStage(Computed[RollingModes]):
         )
 
     def inputs(self) -> dict:
-        """The modes, damping, speed and inertia; the number of states only for the full method."""
+        """Also damping, speed and inertia; the number of states only for the full method."""
         wanted, turning = self.job.scene.rotation, turning_of(self.job.scene, self.job.speed)
-        return {
-            "modes": self.modes.key,
+        return super().inputs() | {
             "axle": corner.inputs(self.job),
             "damping": repr(turning.damping),
             "speed": turning.speed,
             "inertia": turning.inertia,
-            "campbell": asdict(wanted.campbell) if wanted.campbell else None,
             "full": (wanted.count, wanted.window) if wanted.method == "full" else None,
         }
 

@@ -94,6 +94,7 @@ class RadiationStage(Computed[Paths]):
     """Once for a tire, load and speed: the same on every road."""
 
     name: ClassVar[str] = "radiation"
+    reads: ClassVar[tuple[str, ...]] = ("sound", "heard_up_to")
     static: Result[StaticState]
 
     @property
@@ -102,14 +103,6 @@ class RadiationStage(Computed[Paths]):
         found = self.job.scene.sound
         assert found is not None, "the stage runs with [sound] only"
         return found
-
-    def inputs(self) -> dict:
-        """The shape of the tire on the road, the air, and the microphones."""
-        return {
-            "static": self.static.key,
-            "sound": vars(self.table),
-            "up_to": self.job.scene.heard_up_to,
-        }
 
     def compute(self, record: Record) -> Paths:
         """Two meshes, all microphones and directions at each frequency. Collective."""
@@ -247,13 +240,6 @@ class SoundStage(WholeTire[SoundPressure]):
     radiation: Result[Paths]
     lines: Result[Lines | None]
     spectra: Result[Spectra] | None = None
-
-    def inputs(self) -> dict[str, Any]:
-        """The forces and states, their limit and error bars, and the air."""
-        return super().inputs() | {
-            "spectra": self.spectra.key if self.spectra else None,
-            "radiation": self.radiation.key,
-        }
 
     def compute(self, record: Record) -> SoundPressure | None:
         """None but on the root process. Collective."""

@@ -224,10 +224,6 @@ class SpectraStage(Computed[Spectra]):
     rotating: Result[RollingModes]
     accuracy: Result[Accuracy] | None = None
 
-    def inputs(self) -> dict:
-        """The contact forces, whose key covers modes and run-in length, and the error bars."""
-        return {"contact": self.contact.key, "bars": self.accuracy.key if self.accuracy else None}
-
     def compute(self, record: Record) -> Spectra:
         """The spectra. Not collective."""
         history = self.contact.product

@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import MISSING, dataclass, field, fields
-from functools import cached_property
+from functools import cached_property, reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
@@ -127,6 +127,12 @@ class Job:
         """The scene's tire, unloaded."""
         return make_tire(self.comm, self.scene.tire)
 
+    def value(self, name: str) -> Any:
+        """A table or key of the scene by its dotted name; None where a table on the way is absent."""
+        return reduce(
+            lambda holder, part: holder and getattr(holder, part), name.split("."), self.scene
+        )
+
     def path(self, stage: str) -> Path:
         """The file of a stage."""
         return self.directory / f"{stage}.h5"
@@ -210,9 +216,19 @@ class Shared(PipelinePart[P]):
 class Stage(PipelinePart[P]):
     """A part whose product is stored in `<name>.h5` and reused while its inputs are unchanged."""
 
-    @abstractmethod
-    def inputs(self) -> Mapping[str, Any]:
-        """Everything the product depends on, including the keys of other products. Collective."""
+    reads: ClassVar[tuple[str, ...]] = ()
+    """Tables and keys of the scene, dotted, that enter the hash whole."""
+
+    def inputs(self) -> dict[str, Any]:
+        """Everything the product depends on: the keys of the parts it takes, and what it `reads`. Collective.
+
+        A stage that depends on less of a table, or on what is made of it, adds that.
+        """
+        parts = {item.name: getattr(self, item.name) for item in fields(self)}
+        keys = {
+            name: part.key for name, part in parts.items() if isinstance(part, Result) and part.key
+        }
+        return keys | {name: self.job.value(name) for name in self.reads}
 
     @abstractmethod
     def produce(self, key: str, record: Record) -> P:

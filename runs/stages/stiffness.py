@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import h5py
@@ -160,11 +160,8 @@ class StiffnessStage(Computed[Stiffness]):
     """The load curve from the undeformed tire, and the stiffness about the scene's own state."""
 
     name: ClassVar[str] = "stiffness"
+    reads: ClassVar[tuple[str, ...]] = ("stiffness",)
     static: Result[StaticState]
-
-    def inputs(self) -> dict:
-        """The static state, which includes the wheel's slip, and the table [stiffness]."""
-        return {"static": self.static.key, "stiffness": asdict(self.job.scene.stiffness)}
 
     def compute(self, record: Record) -> Stiffness:
         """Compute; the body is put back to the static state afterwards. Collective."""

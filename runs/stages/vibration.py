@@ -62,10 +62,6 @@ class VibrationStage(WholeTire[Vibration]):
     lines: Result[Lines | None]
     spectra: Result[Spectra] | None = None
 
-    def inputs(self) -> dict:
-        """Also the spectra, which set the run-in and the model's frequency limit."""
-        return super().inputs() | {"spectra": self.spectra.key if self.spectra else None}
-
     def compute(self, record: Record) -> Vibration | None:
         """The vibration of the outer face, line by line; None but on the root process. Collective."""
         lines, state = self.lines.product, self.static.product

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
-from typing import Any, ClassVar, TypeVar
+from typing import ClassVar, TypeVar
 
 import h5py
 import numpy as np
@@ -208,16 +208,7 @@ def _lines(basis: Basis, forces: PatchForces, left_out: float, top: float) -> Li
 class WholeTire(OfRun[P], Computed[P]):
     """A stage that shows the whole tire under the forces of the run. Its product is the root's alone."""
 
-    def inputs(self) -> dict[str, Any]:
-        """The forces over time, the states, and the band."""
-        scene = self.job.scene
-        return {
-            "modes": self.rotating.key,
-            "contact": self.contact.key if self.contact else None,
-            "forces": [vars(force) for force in scene.force],
-            "time": vars(scene.time),
-            "band": scene.greens.band,
-        }
+    reads: ClassVar[tuple[str, ...]] = ("force", "time", "greens.band")
 
 
 def replayed(basis: Basis, forces: PatchForces, wanted: Collection[int]) -> np.ndarray:

@@ -125,7 +125,7 @@ def test_a_cache_that_cannot_be_written_is_none(home: Path) -> None:
 
 
 def test_a_cache_that_takes_no_more_is_told_and_the_run_goes_on(
-    home: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    home: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, capsys
 ) -> None:
     """A folder that exists but cannot be written, or is full: it ended the run with status 3."""
     source = home / "stage.h5"
@@ -136,7 +136,7 @@ def test_a_cache_that_takes_no_more_is_told_and_the_run_goes_on(
 
     monkeypatch.setattr(shared, "write_text", refuses)
     Cache.of_user().keep("static", "a", source, {})
-    said = capsys.readouterr().out
+    said = caplog.text + capsys.readouterr().out  # shown by a command of an earlier test, if any
     assert "not kept for other runs, TIREROAD_CACHE = " in said and "cannot be written" in said
     assert Cache.of_user().entries() == []
 
