@@ -59,7 +59,7 @@ _DECLARED = "tireroad_declarations"  # the C declarations of a plain library, ke
 
 
 def misfit(version: str, scalar: type, maps: str) -> str:
-    """What does not fit together in an environment, and what to do; "" if all does.
+    """Name the libraries of an environment that do not fit together, and a remedy; "" if all fit.
 
     `version` of dolfinx, `scalar` type of PETSc, `maps` the text of /proc/self/maps.
     """

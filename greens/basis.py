@@ -135,7 +135,7 @@ class Basis:
         return self.projection.carried.shape[1]
 
     def seen(self, probes: sparse.csr_matrix) -> np.ndarray:
-        """What the probes read of all coordinates, (k, m + a + c) (modal.basis.Projection.seen)."""
+        """Readings of the probes per coordinate, (k, m + a + c) (modal.basis.Projection.seen)."""
         return self.projection.seen(self._of_modes(probes), probes)
 
     def face(self, nodes: int) -> np.ndarray:
@@ -146,7 +146,7 @@ class Basis:
         return self.seen(sparse.identity(3 * nodes, format="csr"))
 
     def _of_modes(self, probes: sparse.csr_matrix) -> np.ndarray:
-        """What the probes read of the modes (k, m); columns of a corner's motions are skipped."""
+        """Readings of the probes per mode (k, m); columns of a corner's motions are skipped."""
         width = min(probes.shape[1], len(self.shape))
         return probes[:, :width] @ self.shape[:width]
 

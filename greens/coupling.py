@@ -281,7 +281,7 @@ class Wheel:
     def _completed(
         self, basis: Basis, outputs: Probes, loads: Probes, flexibility: Array, beside: Array
     ) -> Response:
-        """The states completed by what they lack."""
+        """The states with the static correction for truncated modes."""
         made = with_static_correction(basis, self.turning, outputs, loads, flexibility, beside)
         return made if self.air is None else replace(made, left_out=None)
 

@@ -184,7 +184,7 @@ class Response:
         """Followed by the forces of `more`, a response of the same states and outputs."""
 
         def beside(mine: np.ndarray | None, theirs: np.ndarray | None) -> np.ndarray | None:
-            """What is not known of the others' is zero."""
+            """Place this response beside others: terms between them are zero."""
             if mine is None:
                 return None
             wide = np.zeros((len(mine), more.input.shape[1])) if theirs is None else theirs
@@ -270,7 +270,8 @@ def _horner(rows: np.ndarray, rate: Callable[[np.ndarray], np.ndarray]) -> list[
 
 
 def at_once(response: Response) -> np.ndarray:
-    """Rate of momentum (3, k) due to each force at the same instant, A_0 u of what follows it too."""
+    """Rate of momentum (3, k) due to each force at the same instant, including the part of the residual that
+    follows the force."""
     poles, block = rates(response)[0]
     direct = (poles @ response.input).real + block @ response.block_input
     follows = response.left_out

@@ -180,7 +180,7 @@ def _attached(basis: Basis, rolling: RollingModes) -> RollingModes:
 
 
 def _singular_named(wheel: Wheel, respond: Callable[[], Answer]) -> Answer:
-    """What `respond` returns; the speed is named if K_Omega is singular. Collective."""
+    """The value of `respond`; the speed is named if K_Omega is singular. Collective."""
     try:
         return respond()
     except NearlySingular as error:

@@ -100,7 +100,7 @@ class SoundingTire:
         wheel_depth: float = 0.0,
         leak: float = 0.0,
     ) -> SoundingTire:
-        """Of a static state on a plane, with elements of at most `coarser` times `size` m.
+        """The sounding body of a static state on a plane, with elements of at most `coarser` times `size` m.
 
         `wheel`: "disc", closed on both sides, `wheel_depth` m behind the beads, or "open", a barrel
         between them; `leak` m: height of the contact over the road.

@@ -224,7 +224,7 @@ class Projection:
         return turn.T @ whole[0] @ turn, turn.T @ whole[1] @ turn
 
     def hub_damping(self) -> tuple[np.ndarray, np.ndarray]:
-        """Of a wheel that moves: tire and air relative to it (m + a, all), and its dampers (all, all) 1/s.
+        """Damping of a wheel that moves: tire and air relative to it (m + a, all), and its dampers (all, all) 1/s.
 
         Both act on all coordinates, of unit mass.
         """
@@ -236,7 +236,7 @@ class Projection:
         return turn[:n], turn[n:].T @ dampers @ turn[n:]
 
     def seen(self, shapes: np.ndarray, probes: sparse.csr_matrix) -> np.ndarray:
-        """What `probes` read of all coordinates (k, m + a + c), from `shapes` (k, m) of the modes.
+        """Readings of `probes` per coordinate (k, m + a + c), from `shapes` (k, m) of the modes.
 
         The coordinates of the air are not visible to probes.
         """

@@ -140,11 +140,11 @@ class Corner:
         return linalg.qr(np.vstack([p.T @ drifts, lower.T @ drifts]), mode="economic")[0]
 
     def seen(self, tire: np.ndarray, probes: sparse.csr_matrix) -> np.ndarray:
-        """What probes (k, 3 s) or wider read of (eta, xi), (k, n + c); `tire` (k, n) of eta."""
+        """Readings of probes (k, 3 s) or wider per coordinate (eta, xi), (k, n + c); `tire` (k, n) of eta."""
         return np.hstack([tire, self.rigid(probes)[:, self.taking_part]])
 
     def rigid(self, probes: sparse.csr_matrix) -> np.ndarray:
-        """What probes read of the motions of rim and body, (k, 7), m per m and per rad.
+        """Readings of probes per motion of rim and body, (k, 7), m per m and per rad.
 
         The transpose gives the forces N and the moments N m about the axle's centre of unit loads
         at the probes.

@@ -79,7 +79,7 @@ class AirWaves:
 
 @dataclass(frozen=True, kw_only=True)
 class _Series:
-    """What a mode's series says, (m,) each; `second`: the wave number with the second largest share,
+    """Figures of each mode's series, (m,) each; `second`: the wave number with the second largest share,
     `parity`: from 1, symmetric in y, to -1; `turns`: whether the tread moves around the axle alone.
     """
 

@@ -51,7 +51,7 @@ def _aligned(rows: list[Row], widths: list[int]) -> list[str]:
 
 
 def explain(scene: Scene, processes: int = 1, until: str | None = None) -> str:
-    """What `check` prints for so many processes, and a run that ends with stage `until`.
+    """The text of `check` for so many processes, and a run that ends with stage `until`.
 
     Raises InputError for an unusable road, if the run meets it."""
     on_road = meets_road(until)

@@ -514,7 +514,7 @@ def _info(args: argparse.Namespace) -> None:
 
 
 def _check_checkout(folder: str, command: str) -> None:
-    """Refuse what an installation leaves out: evidence that stands beside the tests."""
+    """Raise InputError for commands whose code is part of a checkout only."""
     if not (Path(__file__).resolve().parents[1] / "tests" / folder).is_dir():
         raise InputError(
             f"{command} is part of a checkout, not of an installation: clone the repository and run ./tireroad {command} there"

@@ -155,7 +155,7 @@ def typed(function: Callable[P, T]) -> Callable[P, T]:
 
 
 def _maker(hint: Any) -> str | None:
-    """What makes the class of an annotation, which may also allow None."""
+    """The function that makes the class of an annotation, which may also allow None."""
     names = [getattr(one, "__name__", "") for one in (hint, *get_args(hint))]
     return next((_MADE_BY[name] for name in names if name in _MADE_BY), None)
 
@@ -735,7 +735,7 @@ def _history(patch: Patch, blocks: list[Block], limit: Limit, run_in: float) -> 
     }
     if (kept["force"][:, patch.edge] > 0).any():
         raise ConvergenceError(
-            "drive: the road touches the edge of the patch of contact points: it rises above the highest "
-            "point that it states; take a smoother road or smaller steps"
+            "drive: contact at the edge of the patch of contact points: the road is higher than its declared "
+            "maximum; take a smoother road or smaller steps"
         )
     return History(**kept, patch=patch, limit=limit, run_in=run_in)

@@ -28,7 +28,7 @@ def listen(
     temperature: float = 293.15,
     up_to: float | None = None,
 ) -> SoundPressure:
-    """What microphones hear of a finished run: its folder, or tireroad.load of it. Not collective.
+    """Sound pressure of a finished run at other microphones: its folder, or tireroad.load of it. Not collective.
 
     `microphones`: as sound.microphones in a scene, names or places (x, y, z) in m; `temperature` K of the
     air; `up_to` Hz. Nothing is written. Raises InputError for a folder without the results of a

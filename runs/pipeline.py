@@ -106,7 +106,7 @@ def _sent(road: Road | None, node: MPI.Comm) -> Road | None:
 
 @dataclass(frozen=True)
 class Finished:
-    """What a run leaves in memory: its `job`, and the parts that are `done`, by name."""
+    """The products of a run in memory: its `job`, and the parts that are `done`, by name."""
 
     job: Job
     done: Mapping[str, Result]
@@ -216,7 +216,7 @@ def _begun(job: Job, until: str | None) -> tuple[Summary, float, bool]:
 
 
 def _skipped(kind: type[Stage], job: Job, done, reason: str, summary: Summary) -> Result | None:
-    """What later parts receive instead of a stage that is skipped for a `reason`. Collective."""
+    """The result that later parts receive instead of a stage that is skipped for a `reason`. Collective."""
     console.say(f"{kind.name:9s} skipped: {reason}")
     on_root(job.comm, lambda: summary.record(kind.name, "skipped", reason=reason))
     return kind.if_skipped(job, done)

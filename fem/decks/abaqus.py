@@ -119,7 +119,8 @@ class _Skin:
 
     @property
     def middle(self) -> float:
-        """Of a shell, along the normal from its nodes: OFFSET= is a share of the thickness, towards them."""
+        """The middle surface of a shell lies so far along the normal from its nodes: OFFSET= is a share of the
+        thickness, towards them."""
         offset = self.card.options.get("OFFSET", "").upper() if self.shell else ""
         share = _OFFSETS[offset] if offset in _OFFSETS else number(offset, self.card.place)
         return -share * self._thickness
@@ -251,7 +252,8 @@ class SectionReader:
         return name, line
 
     def complete(self, elements: np.ndarray) -> None:
-        """Once all elements (labels, ascending) are known: those of *REBAR, and what carries its sections."""
+        """Called when all element labels (ascending) are known: resolves references of *REBAR and the elements that
+        carry them."""
         scopes: dict[str, list[int]] = {}
         for scope, part in self._sets.parts.items():
             scopes.setdefault(part, []).append(scope)
@@ -379,7 +381,7 @@ def read(path: Path) -> Deck:
 
 @dataclass
 class _Part:
-    """What a *PART holds, read once for each of its instances, and their scopes."""
+    """The content of a *PART, read once for each of its instances, and their scopes."""
 
     name: str
     place: Place

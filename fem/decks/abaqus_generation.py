@@ -45,7 +45,7 @@ Line = tuple[Place, list[str]]
 
 
 def _among(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Which rows (k, 2) of `first` are rows of `second`."""
+    """Mask of the rows (k, 2) of `first` that are rows of `second`."""
     one, other = (rows[:, 0] * _FACES + rows[:, 1] for rows in (first, second))
     return np.isin(one, other)
 
@@ -87,7 +87,7 @@ class _Combination:
 
 @dataclass(frozen=True)
 class _Within:
-    """What of a surface belongs to the scope of an instance."""
+    """The part of a surface that belongs to the scope of an instance."""
 
     surface: str
     scope: int
@@ -199,7 +199,7 @@ class SetReader:
             members.labels.append(found + offset)
 
     def _asked(self, card: Card, name: str, scope: int) -> str:
-        """What a data line names; INSTANCE= looks for it in that instance."""
+        """The set or label that a data line names; INSTANCE= looks for it in that instance."""
         instance = card.options.get("INSTANCE", "").upper()
         plain = name.strip("\"'")
         return self.name(f"{instance}.{plain}" if instance in self.scopes else plain, scope)
@@ -349,7 +349,7 @@ class InstancePlacement:
 
     @classmethod
     def read(cls, lines: list[Data]) -> InstancePlacement | None:
-        """Of the data lines of *INSTANCE: a shift, then two points of a line and degrees."""
+        """Read the data lines of *INSTANCE: a shift, then two points of a line and degrees."""
         table = [
             (place, [number(part, place) for part in parts]) for place, parts in data_lines(lines)
         ]

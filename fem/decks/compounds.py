@@ -70,7 +70,7 @@ class Series:
 
 
 def _series(parts: dict, notes: list[str]) -> Series:
-    """Of a *VISCOELASTIC, TIME=PRONY; without one nothing is lost."""
+    """The Prony series of a *VISCOELASTIC, TIME=PRONY; without one no energy is lost."""
     if "VISCOELASTIC" not in parts:
         return Series()
     given, table, place = parts["VISCOELASTIC"]
@@ -217,7 +217,7 @@ def rubber(compound: DeckCompound, units: Units) -> Rubber:
 
 
 def _by_fit(law: _Law) -> str:
-    """What is added to an error of constants that the deck does not state."""
+    """The addition to an error whose constants the deck does not state: they were fitted."""
     if law.fit is None:
         return ""
     tests = " and ".join(f"*{curve.test}" for curve in law.fit.curves)

@@ -689,7 +689,7 @@ def _embed(
 
 
 def _turned(ends: np.ndarray) -> np.ndarray:
-    """Which elements of an ordered chain run against it."""
+    """Mask of the elements of an ordered chain that run against it."""
     if len(ends) == 1:
         return np.zeros(1, bool)
     turned = np.empty(len(ends), bool)

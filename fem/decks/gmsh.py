@@ -398,7 +398,7 @@ def _deck(
         raise InputError(f"{path.name}: a section must lie in z = 0, x from the axle, y along it")
     if names and not any(group for _, group, *_ in elements):
         raise part.place.error(
-            "the file names physical groups and none of its elements is in one: it was saved with Mesh.SaveAll = 1, "
+            "the file defines physical groups, but no element belongs to one: it was saved with Mesh.SaveAll = 1, "
             "which in format 2.2 loses them. Save with Mesh.SaveAll = 0, or in format 4.1 (gmsh -format msh41)"
         )
     blocks, sets, surfaces = _groups(elements, dimension, names, part)

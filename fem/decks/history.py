@@ -1,4 +1,4 @@
-"""What the steps of a deck do with the tire: revolve, inflate, load and roll it, as far as a scene has keys for it."""
+"""The steps of a deck revolve, inflate, load and roll its tire: they are read as far as a scene has keys for it."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class DeckHistory:
 
 
 def history(path: Path) -> DeckHistory:
-    """What the keywords of a deck say; unreadable numbers among them are left out. InputError for no deck."""
+    """Read the history of a deck from its keywords; unreadable numbers among them are left out. InputError for no deck."""
     found = DeckHistory()
     card: Card | None = None
     lines: list[Data] = []

@@ -511,7 +511,7 @@ def one_body(quads: Quads, name: Callable[[int], str]) -> None:
 
 
 def on_centre(quads: Quads) -> np.ndarray:
-    """Which points lie on the plane z = 0."""
+    """Mask of the points that lie on the plane z = 0."""
     return np.abs(quads.points[:, 1]) < _CLOSE * np.ptp(quads.points, axis=0).max()
 
 

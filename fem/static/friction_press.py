@@ -169,16 +169,16 @@ class RubbingEquilibrium(Equilibrium):
         The stick and slip sets are kept, and the state is restored. Raises ConvergenceError for a
         singular tangent. Collective."""
         field = self.body.u.x
-        kept, self._before.x.array[:] = (field.array.copy(), self.road.kept()), field.array
-        self._out()
+        kept, self._before.x.array[:] = (field.array.copy(), self.road.snapshot()), field.array
+        self._residual()
         if not self._take_tangent() or self._move(self._system.gap_closure, load):
             raise ConvergenceError("static: the tangent of a state with friction is singular")
-        for _ in range(1, self.rounds):  # what an incomplete tangent left
-            self._out()
+        for _ in range(1, self.correction_steps):  # what an incomplete tangent left
+            self._residual()
             self._move(None, load)
         pulled = self.body.comm.allreduce(self.road.pull.sum(axis=0))
         field.array[:] = kept[0]
-        self.road.put_back(kept[1])
+        self.road.restore(kept[1])
         return pulled
 
 

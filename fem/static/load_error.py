@@ -365,8 +365,7 @@ class Balance:
         return half if _has_all_of(half, field_lattice(ring), displacement) else None
 
     def _touching(self, lattice: NodeGrid) -> np.ndarray:
-        """A positive force (n,) N on those nodes of another lattice that lie between loaded nodes
-        of this one."""
+        """Initial contact forces (n,) N on a finer mesh: positive at nodes between loaded nodes of the coarse one."""
         pressed = self.face_force > 0
         around = _between(np.append(self.lattice.ring, 2 * np.pi), lattice.ring) % len(pressed)
         along = _between(self.lattice.arc, lattice.arc)
@@ -474,8 +473,8 @@ def _bulk(given: Balance) -> float | None:
     near = given.near(other)
     if cords_strained(near, load):
         return None
-    sinks, compliance = given.near(ring).sinking(weights, load)
-    further = near.sinking(others, load)[0]
+    sinks, compliance = given.near(ring).uniform_traction_step(weights, load)
+    further = near.uniform_traction_step(others, load)[0]
     share = REMAINS * (further - sinks) / compliance / load
     return share if order > ring.order else -CUBIC * share
 

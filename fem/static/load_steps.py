@@ -86,7 +86,7 @@ def _balance_with_springs(
     equilibrium: Equilibrium, road_height: float, load: float, allowed: float
 ) -> SolveOutcome:
     body, road, field = equilibrium.body, equilibrium.road, equilibrium.body.u.x
-    kept = field.array.copy(), road.kept(), equilibrium.road_height
+    kept = field.array.copy(), road.snapshot(), equilibrium.road_height
     typical = equilibrium.force_scale / body.ring.thickness
     springs, tangents = RestoringSprings(body, _FIRST * typical), 0
     share = _FIRST
@@ -107,7 +107,7 @@ def _balance_with_springs(
         share *= factor
         springs.stiffness *= factor
     field.array[:], equilibrium.road_height = kept[0], kept[2]
-    road.put_back(kept[1])
+    road.restore(kept[1])
     return replace(step, iterations=tangents)
 
 
@@ -130,7 +130,7 @@ def pseudo_transient(
     solved for without it.
     """
     field, road = equilibrium.body.u.x, equilibrium.road
-    kept = field.array.copy(), road.kept(), equilibrium.road_height
+    kept = field.array.copy(), road.snapshot(), equilibrium.road_height
     typical = equilibrium.force_scale / equilibrium.body.ring.thickness
     equilibrium.springs = springs = RestoringSprings(equilibrium.body, _FIRST_DRAG * typical)
     share, tangents = 1.0, 0
@@ -146,7 +146,7 @@ def pseudo_transient(
         equilibrium.springs = springs if share > _LAST else None
     equilibrium.springs = None
     field.array[:], equilibrium.road_height = kept[0], kept[2]
-    road.put_back(kept[1])
+    road.restore(kept[1])
     return SolveOutcome(
         False, tangents, step.residual, "pseudo-transient continuation does not converge either"
     )
@@ -154,7 +154,7 @@ def pseudo_transient(
 
 @dataclass(frozen=True)
 class Show:
-    """What is stepped, for display: its name, and its value `scale` at 1 in `unit`."""
+    """The quantity that is stepped, for display: its name, and its value `scale` at 1 in `unit`."""
 
     what: str
     scale: float
@@ -369,12 +369,12 @@ class LoadPath:
 
         def attempt(deflection: float) -> SolveOutcome:
             height = self._loader.touch + deflection
-            kept = field.array.copy(), road.kept()
+            kept = field.array.copy(), road.snapshot()
             self._equilibrium.predict(height)
             step = self._equilibrium.solve(height, allowed=allowed)
             if not step.converged:  # restore the state before the prediction
                 field.array[:] = kept[0]
-                road.put_back(kept[1])
+                road.restore(kept[1])
             return self._learnt(step, deflection)
 
         def let_go(deflection: float) -> SolveOutcome:
@@ -647,8 +647,8 @@ def with_cause(
     except ConvergenceError:
         return error
     return ConvergenceError(
-        f"static: rotation.speed = {rolling.speed:g} rad/s lies beyond the critical speed, up to which the tire has "
-        f"a steady rolling shape: at rest it converges, at this speed it does not ({error.fact.removeprefix('static: ')}). "
+        f"static: no steady rolling shape at rotation.speed = {rolling.speed:g} rad/s: it is probably "
+        f"above the critical speed, since the tire at rest converges ({error.fact.removeprefix('static: ')}). "
         "The rolling shape has the moduli at rest and no losses, which carry a real tire further. Lower the speed, raise the inflation or stiffen the material; static.steady_rolling = false takes the "
         "shape at rest, whose rotating stage reports the critical speed."
     )

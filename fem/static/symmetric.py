@@ -378,13 +378,13 @@ class HalfModelEquilibrium(Equilibrium):
         self.road.active[:], self.road.force[:] = False, 0.0
         self.pressure.value = float(whole.pressure.value)
 
-    def sinking(self, weights: np.ndarray, load: float) -> tuple[float, float]:
+    def uniform_traction_step(self, weights: np.ndarray, load: float) -> tuple[float, float]:
         """As for the whole tire, for a traction that the half turn preserves. Leaders take the
         weights of their followers, and each half takes half of those on the axis."""
         face, own = self.body.surface, weights.copy()
         own[face.place[np.isin(face.local, self._cut.follower)]] = 0.0
         own[face.place[np.isin(face.local, self._cut.axis)]] /= 2
-        further, compliance = super().sinking(own, load)
+        further, compliance = super().uniform_traction_step(own, load)
         return 2 * further, 2 * compliance
 
     def on(self, lattice: NodeGrid) -> tuple[np.ndarray, np.ndarray]:

@@ -276,7 +276,7 @@ def held_step(
     if load is None:
         return change, force
     further, more = system.solve(np.zeros_like(out), system.road_rise)
-    sums = np.array([road.upward(part) for part in (force, more)])
+    sums = np.array([road.vertical_force(part) for part in (force, more)])
     total, rate = comm.allreduce(sums)
     if not rate > 0:
         return None

@@ -230,7 +230,7 @@ def kinds(compounds: Sequence[tuple[Spectrum, float, float]]) -> dict[Kind, list
 def own_moduli(
     squares: np.ndarray, stored: np.ndarray, kinds: Sequence[Kind], at: float | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """What moduli at their own frequencies add to the `squares` (m,) 1/s2 of modes, and their loss factors.
+    """The addition of moduli at their own frequencies to the `squares` (m,) 1/s2 of modes, and their loss factors.
 
     `stored` (c, m) 1/s2: phi_k . K_c phi_k of the kinds' part of the stiffness, for unit modal mass.
 

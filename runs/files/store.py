@@ -66,7 +66,7 @@ class Identity:
     libraries: Mapping[str, str]
 
     def differs(self, code: str, libraries: Mapping[str, str]) -> str:
-        """What has changed since a result was computed by `code` with `libraries`; "" if none."""
+        """Changes since a result was computed by `code` with `libraries`; "" if none."""
         if code != self.code:
             return "the program's code has changed since"
         changed = [
@@ -329,7 +329,7 @@ def why_not(path: Path, wanted: str, stage: str) -> str:
 
 
 def _changed(found: Mapping[str, Any], now: Identity) -> str:
-    """What has changed since a file with these attributes was written."""
+    """Changes since a file with these attributes was written."""
     if "code" not in found:
         return "it is of an earlier version"
     libraries = json.loads(found["libraries"])

@@ -1,4 +1,4 @@
-"""What a run demands of this machine beside what the machine has: memory, disk and time."""
+"""Demand of a run beside what the machine has: memory, disk and time."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from tireroad.contact.roads.under_tire import REFERENCE, Texture, texture_of
 from tireroad.fem.decks.compounds import SYSTEMS, Rubber
 from tireroad.fem.decks.deck import Deck
 from tireroad.fem.decks.history import DeckHistory, history
-from tireroad.fem.decks.own import MESHES, Wishes, no_solids, section_of
+from tireroad.fem.decks.user_section import MESHES, Wishes, no_solids, section_of
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections.construction import INFLATION, RADII
 from tireroad.runs.files.names import scene_name
@@ -54,7 +54,7 @@ def is_tire_file(path: Path) -> bool:
 
 
 def describe_tire(path: Path, out: Path) -> str:
-    """What a deck or mesh holds, with a scene to start from, which is out/scene.toml, too.
+    """Describe the content of a deck or mesh, with a scene to start from, which is out/scene.toml, too.
 
     Draws out/section.png and, of rubbers fitted to test data, out/test_data.png. Raises InputError
     where no section can be made of the file, after writing the scene as far as it is known.
@@ -277,7 +277,7 @@ def is_road_file(path: Path) -> bool:
 
 
 def describe_road(path: Path, out: Path) -> str:
-    """What a road file holds, and a [road] to paste; draws out/road.png. InputError where it is none."""
+    """Describe the content of a road file, and a [road] to paste; draws out/road.png. InputError where it is none."""
     if not path.is_file():
         raise InputError(f"{path}: no such file")
     kind, road, more = _read(path)
@@ -313,7 +313,7 @@ def describe_road(path: Path, out: Path) -> str:
 
 
 def _reading(one: ReadAs) -> str:
-    """What was read of the file as what."""
+    """Lines on the quantities that were read of the file, with places and units."""
     return f"{one.quantity}: {one.place}, {one.unit}" + (f", {one.remark}" if one.remark else "")
 
 

@@ -272,7 +272,7 @@ def render(directory: Path) -> str:
 
 
 def too_short(results: Results) -> str:
-    """What the spectra say of a run without its low third octaves, for the head of the page."""
+    """The remark of the spectra on a run without its low third octaves, for the head of the page."""
     try:
         return str(results.attribute("spectra.h5", "too_short") or "")
     except (Absent, InputError):

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 GOOD, FAIR, POOR = "good", "fair", "poor"
+PULL = "least contact force"  # of the static state: no point may pull
 
 
 class Limits(NamedTuple):
@@ -46,7 +47,6 @@ LIMITS: Mapping[str, Mapping[str, Limits]] = {
         "largest penetration": Limits(1e-9, 1e-6),
     },
 }
-PULL = "least contact force"  # of the static state: no point may pull
 
 
 def verdict(stage: str, name: str, value: Any) -> str:

@@ -58,7 +58,7 @@ def describe(file: Path, as_json: bool = False) -> str:
 
 
 def _candidates(folder: Path) -> str:
-    """What to give instead of a folder."""
+    """Files of a folder that can be given instead of it."""
     found = [str(one) for one in sorted(folder.glob("*.h5"))]
     if not found:
         return "it holds no .h5 file; give a result file of a run, such as static.h5"

@@ -242,7 +242,7 @@ def _patch(
 
 
 class _AsRun:
-    """What the ring of a scene is made of; laws of rubber by their moduli at zero strain."""
+    """Section, compounds and cords of the ring of a scene; laws of rubber by their moduli at zero strain."""
 
     def __init__(self, scene: Scene) -> None:
         shape = scene.tire.shape

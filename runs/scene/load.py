@@ -472,7 +472,7 @@ def _table(of: type, raw: Any, path: tuple[str, ...], source: Source) -> Any:
 
 
 def _no_table(path: tuple[str, ...], raw: Any) -> str:
-    """What a value that is not a table must be."""
+    """Description of a value that must not be a table."""
     if isinstance(raw, list) and raw and all(isinstance(one, dict) for one in raw):
         header = ".".join(part for part in path if not part.isdigit())
         return f"must be written [{header}] in the scene, and once"

@@ -1,4 +1,4 @@
-"""Which stages a scene needs, and why the others are skipped."""
+"""The stages that a scene needs, and reasons why the others are skipped."""
 
 from dataclasses import fields
 

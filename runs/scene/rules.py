@@ -69,7 +69,7 @@ def check_road(scene: Scene) -> None:
 
 
 def remarks(scene: Scene) -> list[str]:
-    """What `check` says of a road that can be driven on."""
+    """Remarks of `check` on a road that can be driven on."""
     if scene.road is None or scene.contact is None:
         return []
     road = made(scene.road.surface)

@@ -143,7 +143,7 @@ def describe(record: Record, setup: ContactSetup, road: RoadTable) -> None:
 def _describe_smoothing(record: Record, setup: ContactSetup, relief: Relief) -> None:
     """Record the road's relief and what the points see of it; warn if that is less than half."""
     record.indicators["standard deviation of the road"] = (relief.road, "m")
-    record.indicators["of the road as the points see it"] = (relief.points, "m")
+    record.indicators["standard deviation of the road as the points see it"] = (relief.points, "m")
     if relief.points < _SEEN * relief.road:
         along, across = 1e3 * setup.patch.spacing
         record.warnings.append(

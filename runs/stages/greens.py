@@ -194,7 +194,7 @@ class GreensStage(Computed[Responses]):
         return made
 
     def _of_attached(self, attached: RollingModes) -> dict[str, Any]:
-        """What the contact needs of the modes with attachment modes: not their fields, which on
+        """The part that the contact needs of the modes with attachment modes: not their fields, which on
         fine meshes take gigabytes."""
         leaning = None
         if self._leaning:

@@ -256,7 +256,7 @@ class ModesStage(Computed[ModalBasis]):
             basis = named(basis, motions.lattice)
         _describe(record, modes, basis)
         if self._shapes:
-            record.headline["rotation shapes that join them"] = (basis.projection.shapes, "-")
+            record.headline["rotation shapes"] = (basis.projection.shapes, "-")
         record.headline["damping"] = (_damping(damping_of(self.job.scene), basis.projection), "-")
         if air is not None:
             cavity.describe_air(record, basis.projection.air)
@@ -329,8 +329,8 @@ class Fields(Shared[ModalBasis]):
 def _describe(record: Record, modes: Modes, basis: ModalBasis) -> None:
     record.headline |= {
         "modes": (modes.count, "-"),
-        "lowest": (float(basis.frequency[0]), "Hz"),
-        "highest": (float(basis.frequency[-1]), "Hz"),
+        "lowest mode": (float(basis.frequency[0]), "Hz"),
+        "highest mode": (float(basis.frequency[-1]), "Hz"),
     }
     if modes.segments > 1:
         record.headline["equal segments, solved by wave number"] = (modes.segments, "-")
@@ -341,7 +341,7 @@ def _describe(record: Record, modes: Modes, basis: ModalBasis) -> None:
         "worst residual": (float(modes.residual.max()), "-"),
         "orthonormality": (modes.orthonormality, "-"),
         "modes by inertia count": (modes.inertia_count, "-"),
-        "counted below": (float(np.sqrt(modes.counted_below) / (2 * np.pi)), "Hz"),
+        "modes are counted below": (float(np.sqrt(modes.counted_below) / (2 * np.pi)), "Hz"),
         "slices": (modes.slices, "-"),
         "rigid modes": (modes.rigid, "-"),
     }

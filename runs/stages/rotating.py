@@ -289,9 +289,12 @@ def _describe_wave(
 ) -> None:
     """The wave that stands at the critical speed, and whether modes enough are there to say so."""
     waves, y = where
-    record.headline["its standing wave"] = (f"{waves} around, largest at y = {1e3 * y:.0f} mm", "-")
+    record.headline["standing wave at the critical speed"] = (
+        f"{waves} around, largest at y = {1e3 * y:.0f} mm",
+        "-",
+    )
     if not before < (1 + CONVERGED) * critical:
-        record.headline["the critical speed is"] = (
+        record.headline["bound on the critical speed"] = (
             f"an upper bound, of the stiffness at the present speed: with modes to {LOWER:g} of the highest it was "
             f"{before:.4g} rad/s, and more modes lower it further",
             "-",
@@ -312,7 +315,7 @@ def _describe(record: Record, rolling: RollingModes, critical: float) -> None:
     if rolling.basis.projection.moves:
         corner.describe(record, rolling)
     if len(oscillating):
-        record.headline["lowest"] = (float(oscillating.imag.min() / (2 * np.pi)), "Hz")
+        record.headline["lowest frequency"] = (float(oscillating.imag.min() / (2 * np.pi)), "Hz")
     record.indicators |= {
         "worst residual": (float(states.residual.max(initial=0.0)), "-"),
         "worst left residual": (float(states.left_residual.max(initial=0.0)), "-"),

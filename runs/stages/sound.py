@@ -129,7 +129,7 @@ class RadiationStage(Computed[Paths]):
         record.headline |= {
             "elements": (len(tire.body.area), "-"),
             "frequencies": (len(frequency), "-"),
-            "up to": (float(frequency[-1]), "Hz"),
+            "highest frequency": (float(frequency[-1]), "Hz"),
             "error of sources inside": (float(error.max()), "dB"),
         }
         record.indicators["largest element"] = (tire.body.edge, "m")
@@ -190,7 +190,7 @@ def sounding(
 
 @dataclass(frozen=True, kw_only=True)
 class SoundPressure:
-    """What k microphones hear of the vibrations of a run, up to the limit of the model.
+    """Sound pressure of the vibrations of a run at k microphones, up to the limit of the model.
 
     `names` and `places` (k, 3) m; `frequency` (f,) Hz, `pressure` (k, f) Pa: complex amplitudes
     for e^{+iwt}, from a Hann window; `centre` (b,) Hz with the third-octave `level` (k, b) dB re

@@ -164,7 +164,7 @@ def _warn_of_window(record: Record, force: np.ndarray, what: str) -> None:
     if not _LOWER < off < _HIGHER and force.std() > _SLIGHT * np.abs(force).max():
         where, change = ("near an end", "lower") if off < 0 else ("in the middle", "higher")
         record.warnings.append(
-            f"most of what the {what} varies lies {where} of the record, where the Hann window of spectra and "
+            f"most of the variance of the {what} is {where} of the record, where the Hann window of spectra and "
             f"levels makes them {abs(off):.2g} dB {change} than its mean square: such levels depend on when an "
             "impact happens (road.position, time.duration); compare runs with equal ones only"
         )
@@ -274,8 +274,8 @@ class SpectraStage(Computed[Spectra]):
         """The lowest frequency limit of the model, with its cause."""
         found = all_limits(self.setup.product, self.rotating.product, step)
         limit = lowest(found)
-        record.headline["an answer up to"] = (limit.frequency, "Hz")
-        record.headline["which is"] = (limit.cause, "-")
+        record.headline["valid up to"] = (limit.frequency, "Hz")
+        record.headline["limited by"] = (limit.cause, "-")
         others = ", ".join(
             f"{other.cause} would allow {other.frequency:.4g} Hz"
             for other in found
@@ -324,7 +324,7 @@ class SpectraStage(Computed[Spectra]):
 
 
 def too_short(centre: np.ndarray, up_to: float, grows: float) -> str:
-    """What a run without its low third octaves is told; empty if it has them.
+    """The remark on a run without its low third octaves; empty if it has them.
 
     `centre` (b,) Hz: the bands it has; `up_to` Hz: where the model ends; `grows` s: the run-in,
     which is left out of a run of more than twice its length only.
@@ -349,4 +349,4 @@ def _largest(record: Record, frequency: np.ndarray, axle: np.ndarray) -> None:
             float(np.abs(axle[peak, 2])),
             "N",
         )
-        record.headline["at"] = (float(frequency[peak]), "Hz")
+        record.headline["frequency of the largest line"] = (float(frequency[peak]), "Hz")

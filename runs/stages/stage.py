@@ -279,7 +279,7 @@ class Stage(PipelinePart[P]):
 
     @classmethod
     def if_skipped(cls, job: Job, done: Mapping[str, Result]) -> Result[P] | None:
-        """What later parts receive if this stage is skipped; None: nothing."""
+        """The result that later parts receive if this stage is skipped; None: nothing."""
         return None
 
 
@@ -314,10 +314,10 @@ class Computed(Stage[P]):
         return product
 
     def begin(self) -> None:
-        """What has to happen before the product is computed. Collective."""
+        """Prepare the computation of the product. Collective."""
 
     def end(self, key: str, product: P) -> None:
-        """What has to happen once the product is written. Collective."""
+        """Clean up once the product is written. Collective."""
 
 
 def _tell_reused(

@@ -302,7 +302,8 @@ class StaticStage(Computed[StaticState]):
             file.attrs["from_file"] = "\n".join(taken)
 
     def _from_file(self) -> list[str]:
-        """What the tire is made of, of a file what of it is used and what not, as `check` prints it."""
+        """The construction of the tire, of a file also the parts that are used and those that are not, as `check`
+        prints it."""
         tire = self.job.scene.tire
         return tire.shape.described(tire)
 

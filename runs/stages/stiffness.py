@@ -285,8 +285,8 @@ def _describe(record: Record, found: Stiffness, stuck: RoadStiffness | None) -> 
     curve, figures = found.curve, found.figures
     record.headline |= {
         "deflections": (len(curve["load"]), "-"),
-        "up to": (float(curve["deflection"][-1]), "m"),
-        "load there": (float(curve["load"][-1]), "N"),
+        "largest deflection": (float(curve["deflection"][-1]), "m"),
+        "load at the largest deflection": (float(curve["load"][-1]), "N"),
         f"vertical stiffness at {figures['load']:.4g} N": (figures["vertical"], "N/m"),
     }
     if stuck is None:

@@ -120,7 +120,7 @@ def _headline(found: Vibration, surface: Surface) -> dict[str, tuple[float, str]
         "area of the outer face": (surface.area, "m2"),
         "velocity level": (found.total_velocity, "dB re 1 nm/s"),
         "equivalent radiated power": (found.total_power, "dB re 1 pW"),
-        "A-weighted": (found.total_weighted, "dB(A) re 1 pW"),
+        "A-weighted equivalent radiated power": (found.total_weighted, "dB(A) re 1 pW"),
         "strongest line": (float(found.frequency[found.velocity.argmax()]), "Hz"),
     }
 

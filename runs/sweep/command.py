@@ -360,7 +360,7 @@ def submit(sweep: Sweep, scripts: Mapping[str, Script]) -> dict[str, str]:
 
 
 def _submitted(jobs: Mapping[str, str]) -> str:
-    """What to do about the jobs before one that was refused."""
+    """Advice on the jobs before one that was refused."""
     if not jobs:
         return ""
     told = ", ".join(f"{name} as job {job}" for name, job in jobs.items())

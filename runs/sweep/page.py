@@ -51,8 +51,8 @@ SHOWN = (
     "contact: mean load",
     "sound: A-weighted CPX level",
     "sound: A-weighted sound power level",
-    "rotating: lowest",
-    "modes: lowest",
+    "rotating: lowest frequency",
+    "modes: lowest mode",
 )
 _VARIES = 1e-6  # relative
 WIDE = 9.5  # inches

@@ -235,7 +235,7 @@ def contact(results: Results) -> Section:
 
 
 def run_in(results: Results) -> float:
-    """What the spectra leave out as run-in, s; 0 where nothing is known of it."""
+    """Run-in (s) that the spectra leave out; 0 where it is unknown."""
     try:
         return float(results.attribute("spectra.h5", "left_out") or 0.0)
     except (Absent, InputError):  # a file that is damaged is told of by its own section

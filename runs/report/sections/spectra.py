@@ -105,7 +105,7 @@ def spectra(results: Results) -> Section:
     section.facts.append(("spacing of lines", spacing))
     for name, key, unit in (
         ("valid up to", "limit", "Hz"),
-        ("which is", "limit_cause", ""),
+        ("limited by", "limit_cause", ""),
         ("the axle force is the", "axle_force_is", ""),
         ("left out as run-in", "left_out", "s"),
     ):

@@ -22,7 +22,7 @@ _WAVE = (
 
 
 def speeds(results: Results, stages: Mapping) -> Section | None:
-    """What ends at which speed, of a run with a rolling tire; None for others. `stages` as in summary.json."""
+    """Speeds at which model, tire or symbol end, of a run with a rolling tire; None for others. `stages` as in summary.json."""
     headline = stages.get("rotating", {}).get("headline") or {}
     critical = headline.get("critical speed", {}).get("value")
     radius = None
@@ -40,7 +40,7 @@ def speeds(results: Results, stages: Mapping) -> Section | None:
         made.facts.append(("this run", told(own)))
     if critical < float("inf"):
         made.facts.append(("critical speed of the undamped tire", told(critical)))
-        for key in ("its standing wave", "the critical speed is"):
+        for key in ("standing wave at the critical speed", "bound on the critical speed"):
             if key in headline:
                 made.facts.append((key, str(headline[key]["value"])))
     else:

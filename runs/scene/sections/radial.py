@@ -81,7 +81,7 @@ class RadialSection(SectionKind):
 
     @property
     def construction(self) -> Construction:
-        """What the tire is built of by its size. Raises InputError for a size or a rim that is none."""
+        """The construction of the tire of this size. Raises InputError for a size or a rim that is none."""
         return built(self.size, self.grooves, self.rim_width)
 
     def elements(self, tire: TireTable) -> tuple[RadialSection, int, int]:

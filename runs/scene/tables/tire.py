@@ -67,7 +67,7 @@ class Proportions:
 
 @dataclass(frozen=True)
 class Parts:
-    """What a section is built of, as tables of a scene: `compounds` by name, of [[tire.region]], and lines
+    """The compounds and cords of a section, as tables of a scene: `compounds` by name, of [[tire.region]], and lines
     of `cords` by name, of [[tire.cords]].
 
     `elsewhere`: the table of a region or line of any other name, a key each. `whole`: written back in
@@ -114,7 +114,7 @@ class SectionKind(Parameters):
         raise NotImplementedError
 
     def parts(self, tire: TireTable) -> Parts:
-        """What the section is built of, over which the scene's [[tire.region]] and [[tire.cords]] are merged."""
+        """The compounds and cords of the section, over which the scene's [[tire.region]] and [[tire.cords]] are merged."""
         return Parts({}, {}, {}, {})
 
     def as_scaled(self) -> Self:
@@ -451,7 +451,7 @@ def region_of(tire: TireTable, name: str) -> RegionTable | None:
 
 
 def losses_of(part: TireTable | RegionTable | None) -> dict[str, Any]:
-    """What [tire] or a region states of small motions. A Prony series gives all of it."""
+    """Keys of [tire] or a region for small motions. A Prony series gives all of it."""
     if part is None:
         return {}
     if part.prony_shares or part.prony_times:
