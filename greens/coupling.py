@@ -46,6 +46,7 @@ from tireroad.greens.basis import (
     modal_statics,
     regained,
 )
+from tireroad.greens.residuals import residual_of
 from tireroad.greens.response import Response
 from tireroad.modal.basis import Projection, extended, project, same_fields, with_air, with_corner
 from tireroad.modal.damping import Damping, StrainEnergy, beyond, tail_growth
@@ -234,14 +235,15 @@ class Wheel:
 
         The forces of `light` follow those of the `loads`; they act on the states alone, without what
         these lack.
-        `modes` on all unknowns, for "attachment" only, must be the solution that `basis` projects:
+        `modes` on all unknowns, for attachment modes only, must be the solution that `basis` projects:
         another one has other signs and vectors of repeated frequencies. InputError otherwise."""
-        if option in ("static", "dirac"):
+        kind = residual_of(option)
+        if kind.static:
             whole = self._with_statics(basis, outputs, loads)
             if light is not None:
                 whole = whole.with_forces(basis.couple(outputs, light))
             moved = outputs.shape[0] - np.count_nonzero(basis.of_hub(outputs).getnnz(axis=1))
-            return replace(whole, pulse=moved if option == "dirac" else 0)
+            return replace(whole, pulse=moved if kind.pulse else 0)
         assert modes is not None, "attachment modes need the modes on all unknowns"
         return self.respond_attached(basis, modes, outputs, loads, light)[0]
 

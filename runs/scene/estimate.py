@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 from tireroad.contact.choices import DENSE_POINTS, MOST_TOUCHING, USABLE
+from tireroad.greens.residuals import residual_of
 from tireroad.runs.scene.plan import meets_road, skipped
 from tireroad.runs.scene.sizes import (
     Sizes,
@@ -259,7 +260,9 @@ def operations(
     if "contact" not in left_out:
         loads = size.nodes * (3 if scene.contact.has_friction else 1)
         parts["greens"] = 3.0 * mesh * loads / 277
-        if scene.greens.residual == "attachment":  # solved for both sides, and joined to the modes
+        if residual_of(
+            scene.greens.residual
+        ).joins:  # solved for both sides, and joined to the modes
             parts["greens"] *= 1.6
         # Conjugate gradients: 12 ms for 3,041 points.
         points = size.points**2 if dense else 4000 * size.points
@@ -419,7 +422,7 @@ def _each_step(scene: Scene, points: int) -> int:
 def _contact_memory(scene: Scene, size: Sizes) -> dict[str, float]:
     directions = 3 if scene.contact.has_friction else 1
     loads = directions * size.nodes
-    shapes = SHAPES if scene.greens.residual == "attachment" else 0
+    shapes = SHAPES if residual_of(scene.greens.residual).joins else 0
     parts = {
         "flexibility of the patch": 8.0 * size.free * (ANSWERS + shapes * loads),
         "contact": 16.0 * 4 * loads * 2 * size.coordinates

@@ -11,6 +11,7 @@ from tireroad.contact.roads.kinds.shapes import Edges
 from tireroad.contact.roads.road import RoadKind, placed
 from tireroad.contact.roads.under_tire import Road, begun_at, is_level, moved_start, shown
 from tireroad.fem.errors import InputError
+from tireroad.greens.residuals import names, residual_of
 from tireroad.runs.scene.outputs import Output, check_steps
 from tireroad.runs.scene.schema import Source
 from tireroad.runs.scene.tables.contact import check_tread
@@ -324,11 +325,11 @@ def _modal(scene: Scene, raw: dict[str, Any], error: Where) -> None:
             f"= {scene.damping.mass:g} 1/s acts against a wheel that turns about a fixed axle; a free one"
             " would be driven round by it: take 0, and damping.stiffness (s) instead",
         )
-    if scene.greens.residual not in ("none", "attachment"):
+    if not residual_of(scene.greens.residual).of_free_rim:
         raise error(
             ("greens", "residual"),
             f'= "{scene.greens.residual}" needs the static answer of the turning tire, which with a'
-            ' free rim does not exist: take "attachment" or "none"',
+            f" free rim does not exist: take {names(static=False)}",
         )
 
 
@@ -364,10 +365,10 @@ def _force(scene: Scene, raw: dict[str, Any], error: Where) -> Iterator[InputErr
 def _greens(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     rotation, residual = scene.rotation, scene.greens.residual
     full = rotation is not None and rotation.speed > 0 and rotation.method == "full"
-    if full and residual == "attachment":
+    if full and residual_of(residual).joins:
         raise error(
             ("greens", "residual"),
-            '= "attachment" completes the modes: it needs rotation.method = "projected"',
+            f'= "{residual}" completes the modes: it needs rotation.method = "projected"',
         )
 
 
@@ -447,10 +448,10 @@ def check_cavity(scene: Scene, raw: dict[str, Any], error: Where) -> None:
             '= "full" knows no air: take "projected", or tire.cavity.gas = "none"',
         )
     used = bool(scene.force) or scene.contact is not None
-    if used and scene.modes.rim == "free" and residual not in ("none", "attachment"):
+    if used and scene.modes.rim == "free" and not residual_of(residual).of_free_rim:
         raise error(
             ("greens", "residual"),
-            f'= "{residual}" of a free rim knows no air: take "attachment" or "none", or '
+            f'= "{residual}" of a free rim knows no air: take {names(static=False)}, or '
             'tire.cavity.gas = "none"',
         )
 

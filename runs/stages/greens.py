@@ -13,6 +13,7 @@ from tireroad.contact.setup import ContactSetup
 from tireroad.fem.static.state import StaticState
 from tireroad.greens.basis import Basis
 from tireroad.greens.coupling import Wheel
+from tireroad.greens.residuals import residual_of
 from tireroad.greens.response import Response
 from tireroad.greens.responses import Made, Wanted, band, judged, make_response, selected
 from tireroad.modal.basis import ModalBasis
@@ -109,7 +110,7 @@ class GreensStage(Computed[Responses]):
     def solver(self) -> str:
         """The solvers' settings, for the log."""
         scene = self.job.scene
-        if scene.greens.residual == "none":
+        if not residual_of(scene.greens.residual).solves:
             return "none: states alone"
         from tireroad.fem.matrices.compliance import RESIDUAL_TOLERANCE
 
@@ -176,7 +177,7 @@ class GreensStage(Computed[Responses]):
 
     def _whole(self, record: Record, rolling: RollingModes, points, residual: str) -> Made:
         """The response with all states. Collective."""
-        if residual == "attachment":
+        if residual_of(residual).joins:
             with record.timing("modes once more"):
                 _ = self.fields.product
         with record.timing("residual flexibility"):

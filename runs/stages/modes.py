@@ -18,6 +18,7 @@ from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.static.state import StaticState
 from tireroad.fem.wheel import Axle
+from tireroad.greens.residuals import residual_of
 from tireroad.modal.basis import ModalBasis, Projection, same_fields
 from tireroad.modal.damping import Damping, StrainEnergy, ratios
 from tireroad.modal.rotation_shapes import up_to
@@ -265,7 +266,7 @@ class ModesStage(Computed[ModalBasis]):
 
     def end(self, key: str, product: ModalBasis) -> None:
         """Cache the fields for other members of a family. Collective."""
-        if self.job.scene.greens.residual == "attachment" and product.modes is not None:
+        if residual_of(self.job.scene.greens.residual).joins and product.modes is not None:
             keep(self.job, key, self.motions.product.operators, product.modes)
         forget_checkpoint(self.job, self.name)
 

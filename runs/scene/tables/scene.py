@@ -14,6 +14,7 @@ from tireroad.contact.roads.under_tire import Motion, Placement
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Key, Limits, OnlyFor, described, finite, parameter, text
 from tireroad.fem.wheel import DIRECTIONS, SHAPE_TOLERANCE, Axle
+from tireroad.greens.residuals import RESIDUALS, names
 from tireroad.runs.scene.outputs import OUTPUTS, Output
 from tireroad.runs.scene.schema import (
     Collects,
@@ -590,9 +591,11 @@ class RotationTable:
 class GreensTable:
     residual: str = choice(
         "static",
-        ("none", "dirac", "static", "attachment"),
+        tuple(RESIDUALS),
         "residual flexibility, which represents the truncated modes",
-        dropped={"second-order": 'take "attachment", as accurate standing and more so rolling'},
+        dropped={
+            "second-order": f"take {names(joins=True)}, as accurate standing and more so rolling"
+        },
     )
     dynamic: int | None = integer(
         None,
