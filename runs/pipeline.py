@@ -28,8 +28,8 @@ from tireroad.runs.process.demand import check_demand, out_of_core
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.process.surroundings import factors_on_disk, forget_peak
 from tireroad.runs.scene import files
+from tireroad.runs.scene.choices import with_modal
 from tireroad.runs.scene.estimate import Estimate, duration, estimate, memory_of
-from tireroad.runs.scene.load import with_modal
 from tireroad.runs.scene.plan import meets_road, skipped
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.rules import check_road, keep, made

@@ -34,7 +34,7 @@ from tireroad.runs.report.kit import page_of
 from tireroad.runs.report.levels import band_levels, is_drawn, rank
 from tireroad.runs.report.read import shown_unit
 from tireroad.runs.results.reader import RunResults
-from tireroad.runs.scene.load import with_modal
+from tireroad.runs.scene.choices import with_modal
 from tireroad.runs.scene.resolved import dumps, literal
 from tireroad.runs.scene.schema import parts
 from tireroad.runs.search.settings import applied
