@@ -102,7 +102,7 @@ def _by_band(scene: Scene, given: Given) -> bool:
 
 
 def mesh(scene: Scene, given: Given) -> Scene:
-    """Elements by default: as many as a tire on a road needs, or fewer without one."""
+    """Set the mesh keys that are open; on a road, elements are smaller at the footprint."""
     return replace(scene, tire=scene.tire.with_elements(scene.static.on_road))
 
 
