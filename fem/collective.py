@@ -45,13 +45,13 @@ def allgather_rows(comm: MPI.Comm, values: np.ndarray) -> np.ndarray:
     rows = np.array(comm.allgather(len(values)))
     each = int(np.prod(values.shape[1:], dtype=int))
     every = np.empty((rows.sum(), *values.shape[1:]), values.dtype)
-    one = dtlib.from_numpy_dtype(values.dtype).Create_contiguous(max(each, 1)).Commit()
+    row = dtlib.from_numpy_dtype(values.dtype).Create_contiguous(max(each, 1)).Commit()
     try:  # counts are rows: below 2^31 where the number of values is not
         comm.Allgatherv(
-            [np.ascontiguousarray(values), one], [every, rows if each else 0 * rows, one]
+            [np.ascontiguousarray(values), row], [every, rows if each else 0 * rows, row]
         )
     finally:
-        one.Free()
+        row.Free()
     return every
 
 
@@ -85,10 +85,10 @@ def collect(comm: MPI.Comm) -> None:
         PETSc.garbage_cleanup(keeper.comm)
     alive = np.array([owner() is not None for _, owner, _ in ours], dtype=np.int8)
     comm.Allreduce(MPI.IN_PLACE, alive, MPI.MAX)
-    for one, lives in zip(ours, alive, strict=True):
+    for owned, lives in zip(ours, alive, strict=True):
         if not lives:
-            _kept.remove(one)
-            one[2].destroy()
+            _kept.remove(owned)
+            owned[2].destroy()
 
 
 def from_local_rows(local: sparse.csr_matrix, sizes: Any, comm: PETSc.Comm | MPI.Comm) -> PETSc.Mat:

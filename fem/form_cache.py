@@ -290,14 +290,14 @@ def _borrow(kept: Path, folder: Path, names: list[str]) -> None:
 
 def _keep(folder: Path) -> None:
     """Copy new complete forms of the folder to the cache."""
-    kept = folder.parent
-    if kept != kept_in():
+    parent = folder.parent
+    if parent != kept_in():
         return  # a temporary folder: there is no cache
     for form, names in _forms(folder).items():
-        if not (kept / f"{form}{DONE}").exists():
+        if not (parent / f"{form}{DONE}").exists():
             with suppress(OSError):  # disk full: this process has its own copy
                 for name in names:
-                    _put(folder / name, kept / name)
+                    _put(folder / name, parent / name)
 
 
 def _put(source: Path, target: Path) -> None:

@@ -401,11 +401,11 @@ class Wheel:
         stiffness = self.operators.stiffness.copy()
         uniform = (0.0, 0.0) if self.beyond is not None else self._uniform
         lost = rotating_damping(self.operators, None, 0.0, uniform)
-        for one in self._compounds:
-            modulus = one.kind.modulus(frequency)
-            add_part(stiffness, modulus.real - 1, one.stiffness)
+        for compound in self._compounds:
+            modulus = compound.kind.modulus(frequency)
+            add_part(stiffness, modulus.real - 1, compound.stiffness)
             if self.beyond is not None:
-                add_part(lost, modulus.imag / (2 * np.pi * frequency), one.stiffness)
+                add_part(lost, modulus.imag / (2 * np.pi * frequency), compound.stiffness)
         return stiffness, lost
 
 

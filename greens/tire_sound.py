@@ -384,8 +384,8 @@ def _slopes(
         weight = np.linalg.pinv(ahead, rcond=0.1)
         entries += [(n, m, w) for m, w in zip(beside, weight.T, strict=True)]
         entries.append((n, n, -weight.sum(axis=1)))
-    row, column = ([one[k] for one in entries] for k in (0, 1))
-    value = np.array([one[2] for one in entries]).reshape(-1, 2)
+    row, column = ([entry[k] for entry in entries] for k in (0, 1))
+    value = np.array([entry[2] for entry in entries]).reshape(-1, 2)
     return tangent, [sparse.csr_matrix((value[:, t], (row, column)), (e, e)) for t in range(2)]
 
 

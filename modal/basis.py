@@ -422,7 +422,7 @@ def _of_compounds(
     squares, m = modes.squares, modes.count
     done = 0 if known is None else known.own
     stored = strain_energies(modes.vectors[:, done:], compounds, comm)
-    kinds = [one.kind for one in compounds]
+    kinds = [compound.kind for compound in compounds]
 
     def before(name: str) -> np.ndarray:
         values = None if known is None else getattr(known, name)

@@ -166,7 +166,7 @@ class FaceWaves:
     def _series(self, fields: np.ndarray) -> _Series:
         starts = range(0, max(fields.shape[-1], 1), _AT_ONCE)
         parts = [vars(self._of_some(fields[..., k : k + _AT_ONCE])) for k in starts]
-        return _Series(**{key: np.concatenate([one[key] for one in parts]) for key in parts[0]})
+        return _Series(**{key: np.concatenate([part[key] for part in parts]) for key in parts[0]})
 
     def coefficients(self, fields: np.ndarray) -> np.ndarray:
         """c_n (k, p, 3, m) of fields (a, p, 3, m): n = 0, 1, ... to `highest`, then -1, -2, ...

@@ -389,7 +389,7 @@ def _curve(tir: Tir, nominal: float | None, notes: list[str]) -> list[list[float
             raise InputError(f"{tir.path}, line {line}: [{_CURVE}] must ascend, not {text[:40]!r}")
         points.append(pair)
     middle = nominal or 4000.0
-    near = [one for one in points if one[0] > 0 and 0.3 * middle <= one[1] <= 1.7 * middle]
+    near = [point for point in points if point[0] > 0 and 0.3 * middle <= point[1] <= 1.7 * middle]
     chosen = (
         [near[k] for k in sorted({round(k) for k in np.linspace(0, len(near) - 1, _MOST_LOADS)})]
         if near

@@ -132,16 +132,16 @@ def typed(function: Callable[P, T]) -> Callable[P, T]:
     @wraps(function)
     def checked(*args: P.args, **keys: P.kwargs) -> T:
         bound = signature.bind(*args, **keys)
-        given = bound.arguments
-        for name, value in given.items():
-            given[name] = plain(value)
-            if isinstance(given[name], np.ndarray) and name in _NUMBERS:
+        arguments = bound.arguments
+        for name, value in arguments.items():
+            arguments[name] = plain(value)
+            if isinstance(arguments[name], np.ndarray) and name in _NUMBERS:
                 raise InputError(
                     f"{function.__name__}: {name} is an array of shape {value.shape}: it must be one number"
                 )
         for name, kind in kinds().items():
-            if name in given and not isinstance(given[name], kind):
-                found = type(given[name]).__name__
+            if name in arguments and not isinstance(arguments[name], kind):
+                found = type(arguments[name]).__name__
                 raise InputError(
                     f"{function.__name__}: {name} is of the type {found}: take what {_maker(kind)} returns"
                 )

@@ -182,7 +182,7 @@ def run_scene(
                 if found is not None and kind is Setup and "contact" not in reasons:
                     _ = found.product  # a road narrower than the footprint is refused before modes
     stages = on_root(comm, lambda: summary.data["stages"])
-    _check_options(petsc_options, [k for k, one in stages.items() if one["status"] == "reused"])
+    _check_options(petsc_options, [k for k, stage in stages.items() if stage["status"] == "reused"])
     peak = largest_memory(comm)
     console.say(f"memory: {peak:.2g} GB of a process at most, {needed:.2g} GB estimated")
     if "report" in reasons:

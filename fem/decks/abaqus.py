@@ -510,7 +510,9 @@ class _Reader:
                 self.handlers[card.keyword](card, lines, self.scope)
         part.instances.append(self.scope)
         part.orientations |= {
-            name: one for name, one in self.sections.orientations.items() if name not in before
+            name: orientation
+            for name, orientation in self.sections.orientations.items()
+            if name not in before
         }
         self.system = None
 

@@ -708,7 +708,7 @@ class Deck:
         """Pairs (k, 2) of rows that are nearer to each other than `tolerance`, among `nodes`."""
         from scipy.spatial import cKDTree
 
-        used = np.unique(np.concatenate([np.empty(0, np.int64), *(one.ravel() for one in nodes)]))
+        used = np.unique(np.concatenate([np.empty(0, np.int64), *(node.ravel() for node in nodes)]))
         tree = cKDTree(self.points[used])
         return used[tree.query_pairs(tolerance, p=np.inf, output_type="ndarray")].reshape(-1, 2)
 

@@ -193,15 +193,15 @@ def _closed(
 
 def _cut_sides(quads: Quads, marks: Marks, points: list) -> dict[int, tuple]:
     """New points of each cut side from its lower end: first middle, cut, second middle."""
-    found = {}
+    cut_sides = {}
     sides = {int(side[1]): side for side in quads.sides().reshape(-1, 3)}
     for middle, t in marks.items():
         side = sides[middle]
         low_first = side if side[0] < side[2] else side[::-1]
         new = shape(np.array([t / 2, t, (1 + t) / 2])) @ quads.points[low_first]
-        found[middle] = tuple(range(len(points), len(points) + 3))
+        cut_sides[middle] = tuple(range(len(points), len(points) + 3))
         points.extend(new)
-    return found
+    return cut_sides
 
 
 def _halves(
@@ -345,7 +345,7 @@ def _stations(quads: Quads, line: HostedLine, reach: tuple[float, float]) -> lis
     _, first = np.unique(sides[:, 1], return_index=True)
     sides = sides[first]
     low = np.where((sides[:, 0] < sides[:, 2])[:, None], sides, sides[:, ::-1])
-    found: dict[tuple, _Station] = {}
+    stations: dict[tuple, _Station] = {}
     for number, s in _candidates(quads.points[low], line):
         hit = _meet(quads.points[low[number]], line, s)
         if hit is None or not reach[0] <= hit[1] <= reach[1]:
@@ -353,8 +353,8 @@ def _stations(quads: Quads, line: HostedLine, reach: tuple[float, float]) -> lis
         t, s = hit
         node = low[number, 0] if t < SNAP else low[number, 2] if t > 1 - SNAP else -1
         station = _Station(s, int(node), int(low[number, 1]), t)
-        found.setdefault(("node", node) if node >= 0 else ("side", station.side), station)
-    return sorted(found.values(), key=lambda one: one.s)
+        stations.setdefault(("node", node) if node >= 0 else ("side", station.side), station)
+    return sorted(stations.values(), key=lambda one: one.s)
 
 
 def _candidates(sides: np.ndarray, line: HostedLine) -> Iterator[tuple[int, float]]:

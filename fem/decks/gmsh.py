@@ -419,11 +419,11 @@ def _deck(
 
 def _renumbered(labels: np.ndarray, elements: Elements, part: Part) -> tuple[np.ndarray, Elements]:
     """Nodes and elements numbered from 1, where labels are larger than this program's."""
-    nodes = np.concatenate([one[3] for one in elements])
+    nodes = np.concatenate([element[3] for element in elements])
     at = np.minimum(np.searchsorted(labels, nodes), len(labels) - 1)
     if (labels[at] != nodes).any():
         raise part.place.error(f"node {nodes[labels[at] != nodes][0]} of an element is not there")
-    split = np.split(at + 1, np.cumsum([len(one[3]) for one in elements])[:-1])
+    split = np.split(at + 1, np.cumsum([len(element[3]) for element in elements])[:-1])
     renumbered = [
         (sort, groups, k, own)
         for k, ((sort, groups, *_), own) in enumerate(zip(elements, split, strict=True), 1)

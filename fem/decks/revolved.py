@@ -252,11 +252,13 @@ def _sections(deck: Deck, block: CardBlock, rows: np.ndarray, section: _Section)
             section.corners[label] = nodes[: len(shape.faces[face])]
         section.owner[label] = seen[key]
         section.faces[label] = [frozenset(ring[list(f)].tolist()) for f in shape.faces]
-    made = []
+    sections = []
     for size, those in cells.items():
         own, corners = np.array([c[0] for c in those]), np.array([c[1] for c in those]) + 1
-        made.append(CardBlock(f"CGAX{size}", used_kind(f"CGAX{size}"), own, corners, block.place))
-    return made
+        sections.append(
+            CardBlock(f"CGAX{size}", used_kind(f"CGAX{size}"), own, corners, block.place)
+        )
+    return sections
 
 
 def _cell(ring: np.ndarray, face: tuple, middle: dict, rings: Rings) -> list[int]:

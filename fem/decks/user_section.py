@@ -325,7 +325,7 @@ def _section(deck: Deck, ring_angles: np.ndarray | None, wishes: Wishes) -> OwnS
         notes.append(
             f"{together} nodes nearer than {wishes.merge:g} m to another are one with it (tire.merge)"
         )
-    notes += [note for one in compounds if one for note in one.notes]
+    notes += [note for compound in compounds if compound for note in compound.notes]
     return OwnSection(
         mesh=mesh,
         rubbers=tuple(compounds),
@@ -426,15 +426,15 @@ def _mass_per_area(deck: Deck, layer: CordLayer, units: Units) -> float:
 def _lines(deck: Deck, quads: Quads, edges: DeckEdges, origins: Origins, wishes: Wishes) -> dict:
     """Named lines inside the body of a Gmsh mesh, for cords of the scene."""
     faces_named = {name.upper() for names in _names(deck, wishes).values() for name in names}
-    found = {}
+    lines = {}
     for name in deck.lines:
         numbers = origins.with_parts(named_edges(deck, edges, name, "cords"))
         sides = with_origin(quads, numbers)
         if name.upper() in faces_named or len(on_outline(quads, sides)) == len(sides):
             continue
         for n, line in enumerate(strings(ends(quads, sides))[0]):
-            found[name if n == 0 else f"{name} ({n + 1})"] = forward(quads, sides[line])
-    return found
+            lines[name if n == 0 else f"{name} ({n + 1})"] = forward(quads, sides[line])
+    return lines
 
 
 def _rubbers(deck: Deck, found: Regions, units: Units, wishes: Wishes) -> list[Rubber | None]:

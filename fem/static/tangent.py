@@ -422,8 +422,8 @@ class LinearContact:
         pressed = ~self._base[self._own][mine]
         force[mine[pressed], order[pressed]] = 1.0
         added = motion, self._gathered(motion[self._road.dofs]), self._gathered(force)
-        kept = self._columns
-        parts = zip((kept.motion, kept.gap, kept.force), added, strict=True)
+        columns = self._columns
+        parts = zip((columns.motion, columns.gap, columns.force), added, strict=True)
         self._columns = _Answer(*(np.hstack(pair) for pair in parts))
         self._number[new] = np.arange(len(new)) + (self._number.max() + 1)
 

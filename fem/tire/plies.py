@@ -199,7 +199,7 @@ class Plies:
 
     def inertia(self, integrand: Expr, kind: str = "full") -> ufl.Form | int:
         """int (mass per area) integrand over all plies that have mass, in UFL."""
-        if not any(one.density for one in self.cords):
+        if not any(cord.density for cord in self.cords):
             return 0
         return _sum(sheet.face.integral(sheet.mass * integrand, kind) for sheet in self.sheets)
 
@@ -233,7 +233,7 @@ def laid_on(tire: TireMesh, cords: Sequence[Cords]) -> list[Laid]:
     Raises InputError for cords without a ply or a ply without cords.
     """
     section = tire.ring.section
-    names = [one.name for one in cords]
+    names = [cord.name for cord in cords]
     for name in section.plies:
         if name not in names:
             raise InputError(f"section: ply {name!r} has no cords")

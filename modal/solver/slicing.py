@@ -361,9 +361,9 @@ def merged(steps: list[tuple[float, np.ndarray]], most: float) -> list[tuple[flo
     The first steps are narrow, because the density of eigenvalues is not known yet.
     """
     kept = steps[:1]
-    for one, following in zip(steps[1:], [*steps[2:], None], strict=True):
+    for step, following in zip(steps[1:], [*steps[2:], None], strict=True):
         if following is None or (following[1] - kept[-1][1]).sum() > most:
-            kept.append(one)
+            kept.append(step)
     return kept
 
 

@@ -112,7 +112,7 @@ class Cache:
 
     def clear(self, unused_for: float) -> str:
         """Remove the stages unused for that many days; returns a report."""
-        old = [one for one in self.entries() if time.time() - one.used >= 86400 * unused_for]
+        old = [entry for entry in self.entries() if time.time() - entry.used >= 86400 * unused_for]
         for one in old:
             one.remove()
         for lock in self.folder.glob("*.lock") if self.folder and not unused_for else ():

@@ -182,14 +182,14 @@ def _killed(worker: int, asked: str) -> int:
 
 def _parts(worker: int) -> list[Path]:
     """Temporary result files that the worker has open."""
-    found = []
+    parts = []
     with suppress(OSError):
         for entry in os.scandir(f"/proc/{worker}/fd"):
             with suppress(OSError):
                 target = Path(os.readlink(entry.path))
                 if target.name.startswith(".") and target.name.endswith(f".{worker}.part"):
-                    found.append(target)
-    return found
+                    parts.append(target)
+    return parts
 
 
 def _verdict(worker: int, state: int, asked: str) -> int:

@@ -345,13 +345,13 @@ def _figures(
     runs: Sequence[RunResults], names: Sequence[str], levels: Sequence[Row]
 ) -> list[Drawing]:
     """Charts of the third octaves that several runs have, of histories and of footprints."""
-    found = []
+    figures = []
     for group in dict.fromkeys(row.group for row in levels if is_drawn(row.group)):
         rows = [row for row in levels if row.group == group]
         several = sum(any(row.values[k] is not None for row in rows) for k in range(len(runs))) > 1
         if len(rows) >= FEWEST_BANDS and several:  # fewer are in the table
             text = f"Third octaves: {group}."
-            found.append(drawing(partial(levels_figure, rows, names), text))
+            figures.append(drawing(partial(levels_figure, rows, names), text))
     histories = {
         name: _valid(run)
         for name, run in zip(names, runs, strict=True)
@@ -359,7 +359,7 @@ def _figures(
     }
     if len(histories) > 1:
         text = "Vertical contact force over time, below the limit of each run's spectra."
-        found.append(drawing(partial(histories_figure, histories), text))
+        figures.append(drawing(partial(histories_figure, histories), text))
     prints = {
         name: (run["static/contact/points"], run["static/contact/pressure"])
         for name, run in zip(names, runs, strict=True)
@@ -367,8 +367,8 @@ def _figures(
     }
     if len(prints) > 1:
         text = "Contact pressure at rest, one scale for all."
-        found.append(drawing(partial(footprints, prints), text))
-    return found
+        figures.append(drawing(partial(footprints, prints), text))
+    return figures
 
 
 def _valid(run: RunResults) -> tuple[Array, Array]:

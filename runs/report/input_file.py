@@ -287,7 +287,7 @@ def describe_road(path: Path, out: Path) -> str:
     lines = [
         f'{path}: a road of kind "{kind}"',
         f"  {length:.6g} m long every {1e3 * along:.4g} mm, {width:.4g} m wide every {1e3 * across:.4g} mm",
-        *(f"  {_reading(one)}" for one in road.readings),
+        *(f"  {_reading(reading)}" for reading in road.readings),
         *(f"  {note}" for note in road.notes),
         f"  along its middle: heights from {1e3 * z.min():.4g} to {1e3 * z.max():.4g} mm, standard deviation {1e3 * z.std():.3g} mm",
     ]

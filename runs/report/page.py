@@ -137,7 +137,7 @@ def _of_spectra(results: Results, name: str) -> Any:
 def _levels(results: Results, given: Given) -> list[Fact]:
     """Levels of the vertical forces over all lines up to the frequency limit, and their errors."""
     end = results.attribute("spectra.h5", "limit")
-    found = []
+    levels = []
     held = str(results.attribute("spectra.h5", "axle_force_is") or "")
     axle = "hub force" if held.startswith("force on the hub") else "blocked axle force"
     upto = f", to {quantity(end, 'Hz')}" if end else ""
@@ -152,10 +152,10 @@ def _levels(results: Results, given: Given) -> list[Fact]:
             text = f"{total:.1f} dB re 1 N, error {about(_error_of(total, level, error))}"
             weighted = given("spectra", f"A-weighted level of the vertical {name}")
             text += f"; {weighted:.1f} dB(A) re 1 N" if weighted is not None else ""
-            found.append((f"{what} z{upto}", text.replace("-", "−")))
+            levels.append((f"{what} z{upto}", text.replace("-", "−")))
         elif level is not None and level[:, 2].max(initial=-np.inf) <= SILENT:
-            found.append((f"{what} z", "constant: no level"))
-    return [*found, ("valid up to", quantity(end, "Hz"))] if end else found
+            levels.append((f"{what} z", "constant: no level"))
+    return [*levels, ("valid up to", quantity(end, "Hz"))] if end else levels
 
 
 def _error_of(total: float, level: np.ndarray | None, error: np.ndarray | None) -> float:

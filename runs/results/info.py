@@ -59,10 +59,14 @@ def describe(file: Path, as_json: bool = False) -> str:
 
 def _candidates(folder: Path) -> str:
     """Files of a folder that can be given instead of it."""
-    found = [str(one) for one in sorted(folder.glob("*.h5"))]
-    if not found:
+    candidates = [str(one) for one in sorted(folder.glob("*.h5"))]
+    if not candidates:
         return "it holds no .h5 file; give a result file of a run, such as static.h5"
-    return f"give a file in it, {found[0]}" if not found[1:] else f"give one of {', '.join(found)}"
+    return (
+        f"give a file in it, {candidates[0]}"
+        if not candidates[1:]
+        else f"give one of {', '.join(candidates)}"
+    )
 
 
 def _held(path: Path, file: h5py.File, checksum_is: str) -> dict:

@@ -252,7 +252,7 @@ def _table(of: type, raw: Any, path: tuple[str, ...], source: Source) -> Any:
     for name in raw:
         if name not in known:
             _unknown(of, path, name, values, source)
-    values = gathered(of, {name: one for name, one in values.items() if one is not _WRONG})
+    values = gathered(of, {name: value for name, value in values.items() if value is not _WRONG})
     if len(source.problems) > before:
         return _without_checks(of, values)
     try:
@@ -354,7 +354,7 @@ def _file(name: str, path: tuple[str, ...], source: Source) -> Any:
     try:
         given = Path(name).expanduser()
         candidates = [(folder / given).resolve() for folder in folders]
-        file = next((one for one in candidates if one.is_file()), candidates[0])
+        file = next((candidate for candidate in candidates if candidate.is_file()), candidates[0])
         found, why = file.is_file(), ""
         if not found:
             file.stat()  # from Python 3.14 on is_file() does not raise for a name that is too long

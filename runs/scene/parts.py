@@ -307,18 +307,18 @@ def listed(tire: Mapping[str, Any]) -> list[Listing]:
     if tire.get("section") != "radial":
         return []
     regions, lines = tire.get("region", []), tire.get("cords", [])
-    compounds = [_compound_row(one) for one in regions if "material" in one]
+    compounds = [_compound_row(region) for region in regions if "material" in region]
     cords: list[tuple[str, ...]] = [
         (
-            str(one["name"]),
-            f"{one['angle']:.4g}",
-            f"{1e-9 * one['youngs_modulus']:.4g}",
-            f"{1e6 * one['area']:.4g}",
-            f"{1e3 * one['spacing']:.4g}",
-            f"{one['density']:.4g}",
-            f"{one['compression']:.4g}",
+            str(line["name"]),
+            f"{line['angle']:.4g}",
+            f"{1e-9 * line['youngs_modulus']:.4g}",
+            f"{1e6 * line['area']:.4g}",
+            f"{1e3 * line['spacing']:.4g}",
+            f"{line['density']:.4g}",
+            f"{line['compression']:.4g}",
         )
-        for one in lines
+        for line in lines
     ]
     return [
         ("compounds of the tire", _COMPOUND_HEAD, compounds),

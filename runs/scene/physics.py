@@ -46,8 +46,8 @@ def make_body(comm: MPI.Comm, tire: TireTable, section: Ring) -> Body:
 
 def damping_of(scene: Scene) -> Damping:
     """Proportional damping if the scene has it, else modal strain energy (loss factors)."""
-    given = scene.damping
-    return StrainEnergy() if given is None else Proportional(given.mass, given.stiffness)
+    damping = scene.damping
+    return StrainEnergy() if damping is None else Proportional(damping.mass, damping.stiffness)
 
 
 def rolling_shape(turning: Turning) -> Rolling:

@@ -421,18 +421,18 @@ def _time(scene: Scene, raw: dict[str, Any], error: Where) -> None:
 
 def check_pattern(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     """Raise an error for an invalid pattern, or for one without a grid that resolves it."""
-    wanted = scene.pattern
-    if wanted is None:
+    pattern = scene.pattern
+    if pattern is None:
         return
     if scene.contact is None or scene.contact.on_nodes:
         raise error(
             ("pattern",), "needs [contact] on a grid that sees it: contact.points = { dx, dy } (m)"
         )
-    if bool(wanted.groove) == (wanted.file is not None):
+    if bool(pattern.groove) == (pattern.file is not None):
         raise error(("pattern",), "needs either [[pattern.groove]] or file")
-    if not wanted.pitch_lengths:
+    if not pattern.pitch_lengths:
         raise error(("pattern", "pitch_lengths"), "must have one number at least")
-    for number_, groove in enumerate(wanted.groove):
+    for number_, groove in enumerate(pattern.groove):
         if groove.span[0] >= groove.span[1]:
             raise error(("pattern", "groove", str(number_), "span"), "must ascend")
 

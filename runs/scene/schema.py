@@ -78,7 +78,7 @@ def parts(dotted: str) -> tuple[str, ...]:
 
 def _paths(text: str) -> list[tuple[int, tuple[str, ...]]]:
     """Every header and assignment with its line number (from 1) and full path."""
-    found: list[tuple[int, tuple[str, ...]]] = []
+    paths: list[tuple[int, tuple[str, ...]]] = []
     here: tuple[str, ...] = ()
     counts: dict[tuple[str, ...], int] = {}
     quoted = ""
@@ -91,12 +91,12 @@ def _paths(text: str) -> list[tuple[int, tuple[str, ...]]]:
             if match[1] == "[[":
                 counts[here] = counts.get(here, -1) + 1
                 here = (*here, str(counts[here]))
-            found.append((line_number, here))
+            paths.append((line_number, here))
         elif match := ASSIGNMENT.match(line):
-            found.append((line_number, here + parts(match[1])))
+            paths.append((line_number, here + parts(match[1])))
             opened = [mark for mark in ('"""', "'''") if line.count(mark) == 1]
             quoted = opened[0] if opened else ""
-    return found
+    return paths
 
 
 def line_of(text: str, path: tuple[str, ...]) -> int | None:

@@ -114,12 +114,12 @@ def _worthwhile(
     """The choices whose cause matters for the error; if any is unknown, only unknown ones."""
     errors = over[:, worst(over)[1]]
     known = dict(zip(CAUSES, errors, strict=True))
-    unknown = [one for one in choices if not np.isfinite(known[one[0]])]
+    unknown = [choice for choice in choices if not np.isfinite(known[choice[0]])]
     if not np.isfinite(errors).all():
         return unknown  # its companion run fails: the coarse setting behind it is refined first
     climbing = {cause for cause, _ in choices}
     stuck = any(error > AIM for cause, error in known.items() if cause not in climbing)
-    return [one for one in choices if known[one[0]] > AIM * (1.0 if stuck else SMALL)]
+    return [choice for choice in choices if known[choice[0]] > AIM * (1.0 if stuck else SMALL)]
 
 
 def fits(scene: Scene, settings: Settings, processes: int) -> bool:
@@ -303,12 +303,12 @@ class Search:
 
     def _limit(self, tried: list[Trial]) -> str:
         """The limit of the search that is reached; "" if none."""
-        wanted = self.scene.accuracy
+        accuracy = self.scene.accuracy
         spent = sum(trial.spent for trial in tried)
-        if len(tried) >= wanted.trials:
-            return f"accuracy.trials = {wanted.trials} are done"
-        if wanted.budget is not None and spent >= wanted.budget:
-            return f"accuracy.budget = {wanted.budget:g} s is spent ({spent:.0f} s)"
+        if len(tried) >= accuracy.trials:
+            return f"accuracy.trials = {accuracy.trials} are done"
+        if accuracy.budget is not None and spent >= accuracy.budget:
+            return f"accuracy.budget = {accuracy.budget:g} s is spent ({spent:.0f} s)"
         return ""
 
     def _keep(self, trial: Trial) -> None:
@@ -333,16 +333,16 @@ class Search:
 
     def _give_up(self, tried: list[Trial], best: Trial, why: str) -> None:
         """Compute the best trial's results, then raise ConvergenceError. Collective."""
-        wanted = self.scene.accuracy
+        accuracy = self.scene.accuracy
         if best.found is None:
             raise ConvergenceError(
                 f"accuracy: no trial finished ({why}); the last: {tried[-1].failed}"
             )
-        over = best.found.over(wanted)
+        over = best.found.over(accuracy)
         largest = CAUSES[int(over[:, worst(over)[1]].argmax())]
         self._final(applied(self.scene, best.settings))
         raise ConvergenceError(
-            f"accuracy: the target is not met: {why}. Reached {shown(over, wanted)} with {best.settings}; largest part: "
+            f"accuracy: the target is not met: {why}. Reached {shown(over, accuracy)} with {best.settings}; largest part: "
             f"{largest}. Its results are in {self.directory}; take a larger target, or raise accuracy.trials or "
             "accuracy.budget and run again: what was tried is kept"
         )

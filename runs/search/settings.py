@@ -107,14 +107,14 @@ class Ladders:
 
 def bounds(scene: Scene) -> list[str]:
     """Lines for `check` about the search that the run begins with."""
-    ladders, wanted = Ladders.of(scene), scene.accuracy
-    limit = f" or {wanted.budget:g} s" if wanted.budget is not None else ""
+    ladders, accuracy = Ladders.of(scene), scene.accuracy
+    limit = f" or {accuracy.budget:g} s" if accuracy.budget is not None else ""
     return [
-        f"search for {wanted.aim()}: mesh, modes, residual, points and step as given are not used",
+        f"search for {accuracy.aim()}: mesh, modes, residual, points and step as given are not used",
         f"  from  {ladders.first()}",
         f"  to    {ladders.finest()}, as far as the memory holds it",
         f"  until {MARGINAL}",
-        f"  in {wanted.trials} trials{limit} at most; sizes and costs below are those of the first",
+        f"  in {accuracy.trials} trials{limit} at most; sizes and costs below are those of the first",
     ]
 
 

@@ -53,15 +53,15 @@ def make_air(job: Job, motions: SmallMotions) -> Column | None:
         return None
     from tireroad.fem.cavity import make_column
 
-    wanted, static = job.scene.tire.cavity, motions.static
+    cavity, static = job.scene.tire.cavity, motions.static
     return make_column(
         motions.body,
         motions.operators.unknowns,
         static.inflation,
-        wanted.temperature,
+        cavity.temperature,
         job.speed,
-        wanted.up_to,
-        wanted.loss_factor,
+        cavity.up_to,
+        cavity.loss_factor,
     )
 
 

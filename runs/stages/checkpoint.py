@@ -81,8 +81,8 @@ class _Parts:
 
     def _read(self, found: list[Entry]) -> str:
         """Append the usable parts to `found`; returns why the next one is not."""
-        wanted = self._job.provenance(self._stage, self._key).input_hash
-        while not (reason := store.why_not(self._path(len(found)), wanted, self._stage)):
+        input_hash = self._job.provenance(self._stage, self._key).input_hash
+        while not (reason := store.why_not(self._path(len(found)), input_hash, self._stage)):
             with store.opened(self._path(len(found))) as file:
                 found += [_entry(file[name]) for name in sorted(file)]
         return reason

@@ -196,8 +196,8 @@ def relief_seen(setup: ContactSetup) -> Relief | None:
     y, half = patch.points[chosen, 1], patch.half_sizes[chosen]
     given = np.repeat(x[:, None], 3, axis=1), np.broadcast_to(y, (len(x), 3))
     raw, seen = road.height(*given), CellMean(road, y, half).height(*given)
-    found = Relief(float(raw.std(axis=0).max()), float(seen.std(axis=0).max()))
-    return found if found.road > NOTHING else None
+    relief = Relief(float(raw.std(axis=0).max()), float(seen.std(axis=0).max()))
+    return relief if relief.road > NOTHING else None
 
 
 def _places(setup: ContactSetup) -> np.ndarray:
@@ -252,9 +252,9 @@ def begun_with(job: Job, key: str) -> Chosen | None:
         if job.fresh or store.why_not(path, job.provenance("contact", key).input_hash, "contact"):
             return None
         with store.opened(path) as file:
-            given = file.attrs
-            reason, limit = str(given["scheme_reason"]), float(given["scheme_limit"])
-            return Chosen(str(given["scheme"]), reason, limit)
+            attrs = file.attrs
+            reason, limit = str(attrs["scheme_reason"]), float(attrs["scheme_limit"])
+            return Chosen(str(attrs["scheme"]), reason, limit)
 
     return on_root(job.comm, found)
 

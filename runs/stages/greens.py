@@ -152,8 +152,8 @@ class GreensStage(Computed[Responses]):
 
     @property
     def _wanted(self) -> Wanted:
-        given = self.job.scene.greens
-        return Wanted(residual=given.residual, dynamic=given.dynamic, band=given.band)
+        greens = self.job.scene.greens
+        return Wanted(residual=greens.residual, dynamic=greens.dynamic, band=greens.band)
 
     def compute(self, record: Record) -> Responses:
         """The responses between all probes. Collective."""
@@ -181,7 +181,7 @@ class GreensStage(Computed[Responses]):
             with record.timing("modes once more"):
                 _ = self.fields.product
         with record.timing("residual flexibility"):
-            made = make_response(
+            response = make_response(
                 lambda: self.wheel.product,
                 rolling,
                 points.outputs,
@@ -190,9 +190,9 @@ class GreensStage(Computed[Responses]):
                 lambda: self.fields.product,
                 self._light(points.loads.shape[1]),
             )
-        record.indicators |= made.figures
-        record.warnings += made.warnings
-        return made
+        record.indicators |= response.figures
+        record.warnings += response.warnings
+        return response
 
     def _of_attached(self, attached: RollingModes) -> dict[str, Any]:
         """The part that the contact needs of the modes with attachment modes: not their fields, which on

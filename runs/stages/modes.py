@@ -168,11 +168,11 @@ def kept(job: Job, key: str, operators: Operators, basis: ModalBasis) -> Modes |
 
 
 def _read(file: Any) -> dict[str, Any]:
-    given = file.attrs
-    found = {name: given[name].item() for name in _KEPT}
+    attrs = file.attrs
+    found = {name: attrs[name].item() for name in _KEPT}
     found |= {"squares": file["square"][:], "residual": file["residual"][:]}
-    found |= {"sectors": tuple(int(n) for n in given["sectors"])}
-    return found | {"symmetries": tuple(map(str, given["symmetries"])), "field": file["field"][:]}
+    found |= {"sectors": tuple(int(n) for n in attrs["sectors"])}
+    return found | {"symmetries": tuple(map(str, attrs["symmetries"])), "field": file["field"][:]}
 
 
 def _size(operators: Operators, count: int) -> float:
@@ -307,7 +307,7 @@ class Fields(Shared[ModalBasis]):
 
     def make(self) -> ModalBasis:
         """The basis with fields. Collective."""
-        wanted, basis = self.job.scene.modes, self.modes.product
+        modes, basis = self.job.scene.modes, self.modes.product
         if basis.modes is not None:
             return basis
         motions, air = self.motions.product, self.air.product
@@ -317,7 +317,7 @@ class Fields(Shared[ModalBasis]):
         again = with_fields(
             basis,
             motions,
-            **wanted.asked,
+            **modes.asked,
             air=air,
             axle=self.job.axle,
             turning=shapes_of(self.job.scene, self.job.speed),

@@ -102,24 +102,24 @@ def planned(job: Job, record: Record, response: Response, shortest: float) -> Pl
 
     `shortest` (s): shortest period of the excitation.
     """
-    wanted = job.scene.time
+    time = job.scene.time
     fastest = np.abs(response.every).max(initial=0.0)
-    if isinstance(wanted.step, str):
-        limits = [wanted.duration / LEAST_STEPS, shortest / _PER_PERIOD]
+    if isinstance(time.step, str):
+        limits = [time.duration / LEAST_STEPS, shortest / _PER_PERIOD]
         if fastest > 0:
             limits.append(TURN / fastest)
-        steps = equal_steps(wanted.duration, min(limits))
+        steps = equal_steps(time.duration, min(limits))
     else:
-        steps = steps_of(wanted.duration, wanted.step)
+        steps = steps_of(time.duration, time.step)
     kept = response.resolved(steps.size)
     moved = len(response.every) - len(kept.every)
     console.say(
         f"  step {steps.size:.4g} s, {steps.count} steps; fastest mode {fastest:.4g} 1/s, "
         f"{moved} states too fast for the step respond statically"
     )
-    if steps.duration > wanted.duration * (1 + 1e-9):
+    if steps.duration > time.duration * (1 + 1e-9):
         console.say(
-            f"  the run ends at {steps.duration:.6g} s: {wanted.duration:.6g} s is not a multiple of the step"
+            f"  the run ends at {steps.duration:.6g} s: {time.duration:.6g} s is not a multiple of the step"
         )
     record.indicators["states moved to the residual"] = (moved, "-")
     return Planned(kept, steps.size, steps.count)
@@ -214,13 +214,13 @@ def chosen_scheme(
 
     `begun`: the choice stored in the checkpoint that the loop continues from, or None.
     """
-    wanted = job.scene.time.scheme
+    scheme = job.scene.time.scheme
     spec, patch = job.scene.contact, setup.patch
     steps = oscillation(spec, patch, plan.response, plan.step, bristles(spec, patch))
     if math.isfinite(steps):
         record.indicators["steps in the fastest oscillation of the contact"] = (steps, "-")
-    given = Chosen(wanted, f'time.scheme = "{wanted}"')
-    return reported(record, begun or (choose(steps) if wanted == "auto" else given))
+    chosen = Chosen(scheme, f'time.scheme = "{scheme}"')
+    return reported(record, begun or (choose(steps) if scheme == "auto" else chosen))
 
 
 def reported(record: Record, chosen: Chosen) -> Chosen:

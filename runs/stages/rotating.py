@@ -150,13 +150,13 @@ class RotatingStage(Computed[RollingModes]):
 
     def inputs(self) -> dict:
         """Also damping, speed and inertia; the number of states only for the full method."""
-        wanted, turning = self.job.scene.rotation, turning_of(self.job.scene, self.job.speed)
+        rotation, turning = self.job.scene.rotation, turning_of(self.job.scene, self.job.speed)
         return super().inputs() | {
             "axle": corner.inputs(self.job),
             "damping": repr(turning.damping),
             "speed": turning.speed,
             "inertia": turning.inertia,
-            "full": (wanted.count, wanted.window) if wanted.method == "full" else None,
+            "full": (rotation.count, rotation.window) if rotation.method == "full" else None,
         }
 
     def compute(self, record: Record) -> RollingModes:
@@ -206,25 +206,27 @@ class RotatingStage(Computed[RollingModes]):
 
     def _full(self, record: Record, projected: RollingModes) -> RollingModes:
         """The states of the finite elements, which replace the projected ones. Collective."""
-        wheel, wanted = self.wheel.product, self.job.scene.rotation
+        wheel, rotation = self.wheel.product, self.job.scene.rotation
         with record.timing("full eigensolver"):
             matrices = wheel.rotating_damping, wheel.rotating_stiffness
             rim = wheel.rim() if wheel.rim else None
             given = wheel.operators, matrices, projected, rim
-            found, figures, warnings = full_states(*given, count=wanted.count, window=wanted.window)
+            found, figures, warnings = full_states(
+                *given, count=rotation.count, window=rotation.window
+            )
         record.indicators |= figures
         record.warnings += warnings
         return found
 
     def _campbell(self, record: Record, waves: FaceWaves) -> Campbell | None:
         """Eigenvalue branches over speed, if the scene asks for them. Collective."""
-        wanted, turning = (
+        campbell, turning = (
             self.job.scene.rotation.campbell,
             turning_of(self.job.scene, self.job.speed),
         )
-        if wanted is None:
+        if campbell is None:
             return None
-        speeds = np.arange(0.0, wanted.to + wanted.step / 2, wanted.step)
+        speeds = np.arange(0.0, campbell.to + campbell.step / 2, campbell.step)
         basis = self.modes.product
         held = replace(basis.projection, corner=None)
 
@@ -232,7 +234,7 @@ class RotatingStage(Computed[RollingModes]):
             return named_states(states, basis.shape, held, waves)
 
         def both() -> Campbell:
-            given = turning.inertia, speeds, wanted.branches
+            given = turning.inertia, speeds, campbell.branches
             free = sweep(held, Proportional(), *given)
             return replace(sweep(held, turning.damping, *given, names), undamped=free.frequency)
 

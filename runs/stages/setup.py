@@ -64,10 +64,10 @@ def make_pattern(wanted: PatternTable | None, rolling_radius: float) -> Pattern 
 
 def inputs(job: Job) -> list | None:
     """The pattern's inputs: its table, and its file by content; None for a slick."""
-    wanted = job.scene.pattern
-    if wanted is None:
+    pattern = job.scene.pattern
+    if pattern is None:
         return None
-    return [asdict(wanted), store.file_hash(wanted.file) if wanted.file else None]
+    return [asdict(pattern), store.file_hash(pattern.file) if pattern.file else None]
 
 
 def describe(record: Record, setup: ContactSetup) -> None:

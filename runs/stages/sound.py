@@ -100,9 +100,9 @@ class RadiationStage(Computed[Paths]):
     @property
     def table(self) -> SoundTable:
         """The table [sound]."""
-        found = self.job.scene.sound
-        assert found is not None, "the stage runs with [sound] only"
-        return found
+        sound = self.job.scene.sound
+        assert sound is not None, "the stage runs with [sound] only"
+        return sound
 
     def compute(self, record: Record) -> Paths:
         """Two meshes, all microphones and directions at each frequency. Collective."""
@@ -271,9 +271,9 @@ class SoundStage(WholeTire[SoundPressure]):
             parts = _sound(heard, self._errors, volumes @ lines.spectrum[below].T, lines.duration)
             normal = _normal_velocity(tire, shape, lines.amplitude[below], heard.frequency)
             efficiency = heard.efficiency(normal)
-        found = SoundPressure(efficiency=efficiency, **parts)
-        _describe(record, found)
-        return found
+        pressure = SoundPressure(efficiency=efficiency, **parts)
+        _describe(record, pressure)
+        return pressure
 
     @cached_property
     def _errors(self) -> tuple[np.ndarray, np.ndarray]:
@@ -305,9 +305,11 @@ class SoundStage(WholeTire[SoundPressure]):
 
     def read(self, file: h5py.File) -> SoundPressure:
         """The same, read back."""
-        kept = read_fields(file, SoundPressure)
+        fields = read_fields(file, SoundPressure)
         names = [str(name) for name in file["microphones"].attrs["names"]]
-        return SoundPressure(names=names, rate=float(file["signal/pressure"].attrs["rate"]), **kept)
+        return SoundPressure(
+            names=names, rate=float(file["signal/pressure"].attrs["rate"]), **fields
+        )
 
 
 def angles() -> tuple[np.ndarray, np.ndarray]:

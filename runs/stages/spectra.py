@@ -239,11 +239,11 @@ class SpectraStage(Computed[Spectra]):
         limit = self._limit(record, step)
         frequency, contact = amplitudes(total, step)
         below = frequency <= limit.frequency
-        found = levels_of(history, start, limit.frequency)
-        describe(record, found, history, start, limit.frequency)
+        levels = levels_of(history, start, limit.frequency)
+        describe(record, levels, history, start, limit.frequency)
         extremes(record, history, start, limit.frequency)
         grows = run_in(self.setup.product, self.job.scene.road)
-        short = too_short(found["third_octave/centre"], limit.frequency, grows)
+        short = too_short(levels["third_octave/centre"], limit.frequency, grows)
         record.warnings += [short] if short else []
         axle = {}
         if history.axle_force is not None:
@@ -252,7 +252,7 @@ class SpectraStage(Computed[Spectra]):
             axle["axle_force"] = amplitude
             _largest(record, frequency[below], amplitude)
         if self.accuracy is not None:
-            bars, centre = self.accuracy.product, found["third_octave/centre"]
+            bars, centre = self.accuracy.product, levels["third_octave/centre"]
             axle["level_error"] = bars.levels("axle_force", centre)
             axle["contact_level_error"] = bars.levels("contact_force", centre)
         wheel = {
@@ -265,7 +265,7 @@ class SpectraStage(Computed[Spectra]):
             left_out=start * step,
             limit=limit,
             wheel=wheel,
-            levels=found,
+            levels=levels,
             too_short=short,
             **axle,
         )
@@ -319,8 +319,8 @@ class SpectraStage(Computed[Spectra]):
         """The same, read back."""
         limit = Limit(float(file.attrs["limit"]), str(file.attrs["limit_cause"]))
         wheel = {name: file[name][:] for name in corner.UNITS if name in file}
-        kept = read_fields(file, Spectra)
-        return Spectra(limit=limit, levels=read(file), wheel=wheel, **kept)
+        fields = read_fields(file, Spectra)
+        return Spectra(limit=limit, levels=read(file), wheel=wheel, **fields)
 
 
 def too_short(centre: np.ndarray, up_to: float, grows: float) -> str:

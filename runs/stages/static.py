@@ -261,9 +261,9 @@ class StaticStage(Computed[StaticState]):
         self, loader: LoadStepper, rolling: Rolling, initial: InitialState | None = None
     ) -> LoadStepper:
         """Inflate the tire and press it on the road; returns the final loader. Collective."""
-        wanted = self.job.scene.static
-        loader.inflate(wanted.inflation, None if initial is None else initial.inflated)
-        placed = wanted.load, wanted.deflection, wanted.road_height
+        static = self.job.scene.static
+        loader.inflate(static.inflation, None if initial is None else initial.inflated)
+        placed = static.load, static.deflection, static.road_height
         return place(loader, *placed, friction_of(self.job.scene, rolling), initial)
 
     def _keep_last(self, loader: LoadStepper) -> str:

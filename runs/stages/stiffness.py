@@ -59,15 +59,15 @@ def slides(job: Job, state: StaticState, stuck: RoadStiffness) -> dict[str, Curv
 
     `start`: initial slope, with all points sticking. Leaves the body in another state. Collective.
     """
-    wanted, friction = job.scene.stiffness, job.scene.static.friction
-    if state.pull is None or not friction or not wanted.slide_steps:
+    stiffness, friction = job.scene.stiffness, job.scene.static.friction
+    if state.pull is None or not friction or not stiffness.slide_steps:
         return {}  # friction 0 resists nothing: no displacement to slide over
     found: dict[str, Curve] = {}
     for axis, name in enumerate(AXES):
         slide = Slide(job.tire.body, state, friction, axis)
         start = slide.start(wheel_slip(job.scene))
         rate = start if slide.rolls else getattr(stuck, name)
-        end = wanted.slip_to if slide.rolls else wanted.slide_to
+        end = stiffness.slip_to if slide.rolls else stiffness.slide_to
         if end is None:
             end = (
                 (_ROLLING if slide.rolls else _STANDING)
@@ -78,7 +78,7 @@ def slides(job: Job, state: StaticState, stuck: RoadStiffness) -> dict[str, Curv
             end = min(end, _MOST) if slide.rolls else end
         points = []
         for point in slide.curve(
-            (end * np.arange(1, wanted.slide_steps + 1) / wanted.slide_steps).tolist()
+            (end * np.arange(1, stiffness.slide_steps + 1) / stiffness.slide_steps).tolist()
         ):
             points.append(point)
             console.say(f"  {name}: {_told(point, slide.rolls)}")
@@ -165,18 +165,18 @@ class StiffnessStage(Computed[Stiffness]):
 
     def compute(self, record: Record) -> Stiffness:
         """Compute; the body is put back to the static state afterwards. Collective."""
-        state, wanted = self.static.product, self.job.scene.stiffness
+        state, stiffness = self.static.product, self.job.scene.stiffness
         body = self.job.tire.body
         body.set_displacement(state.displacement)
         on_road = state.road_height is not None
         stuck = None
-        if wanted.which == "all" and on_road:
+        if stiffness.which == "all" and on_road:
             force = state.force[body.surface.place]
             centre = state.force @ state.positions / state.force.sum()
             stuck = self._stuck(record, body.surface.local[force > 0], centre)
         try:
             points, force = self._curve(record)
-            if wanted.which == "all" and not on_road:
+            if stiffness.which == "all" and not on_road:
                 places = body.lattice.points(body.ids) + body.owned(body.u.x.array)
                 centre = body.comm.allreduce(force @ places) / points[-1].load
                 stuck = self._stuck(record, np.flatnonzero(force > 0), centre)

@@ -89,8 +89,8 @@ class PatchForces:
     @property
     def sudden(self) -> np.ndarray:
         """Modal forces (m,) N kg^-1/2 that come at t = 0: the prescribed ones alone."""
-        given = self.job.scene.force
-        return histories(given, np.zeros(1))[0] @ self.seen[len(self.seen) - len(given) :]
+        force = self.job.scene.force
+        return histories(force, np.zeros(1))[0] @ self.seen[len(self.seen) - len(force) :]
 
     def pushes(self, start: int = 0) -> Iterator[np.ndarray]:
         """Modal forces (n, m) N kg^-1/2 from step `start` on, block by block. Root process only."""

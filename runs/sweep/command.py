@@ -116,8 +116,8 @@ def _dispatch(sweep: Sweep, folder: Path, at_a_time: int, failures: Path) -> lis
     started = 0
     ended: list[Ended] = []
     try:
-        while waiting or any(one.member for one in workers):
-            for one in [one for one in workers if one.crashed]:
+        while waiting or any(worker.member for worker in workers):
+            for one in [worker for worker in workers if worker.crashed]:
                 workers.remove(one)
                 one.close()
             while waiting and len(workers) < at_a_time:
@@ -229,7 +229,9 @@ def _program(sweep: Sweep, *arguments: str) -> list[str]:
 
 def _arguments(sweep: Sweep, member: Member, folder: Path) -> list[str]:
     """The program's arguments for one member's run."""
-    settings: Sequence[str] = [part for one in member.overrides() for part in ("--set", one)]
+    settings: Sequence[str] = [
+        part for override in member.overrides() for part in ("--set", override)
+    ]
     out = str(folder / "members" / member.name)
     return ["run", str(sweep.scene.resolve()), "--out", out, *settings]
 

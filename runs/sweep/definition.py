@@ -105,7 +105,7 @@ def _crossed(path: Path, raw: Mapping[str, Any], plan: str) -> tuple[tuple[str, 
     if plan == "latin-hypercube":
         return keys, _named(keys, _hypercube(path, raw, axes))
     values = [_values(f"{path}: axis {key}", axis) for key, axis in zip(keys, axes, strict=True)]
-    _check_count(path, math.prod(len(one) for one in values))
+    _check_count(path, math.prod(len(value) for value in values))
     return keys, _named(keys, list(itertools.product(*values)))
 
 

@@ -101,7 +101,7 @@ def gather(sweep: Sweep, folder: Path) -> Gathered:
     settings = [_settings(sweep, member) for member in sweep.members]
     return Gathered(
         names=tuple(member.name for member in sweep.members),
-        settings={key: tuple(one[key] for one in settings) for key in sweep.axes},
+        settings={key: tuple(setting[key] for setting in settings) for key in sweep.axes},
         columns=tuple(
             SweepColumn(name, unit, np.array([row.get((name, unit), np.nan) for row in rows]))
             for name, unit in keys
@@ -149,29 +149,29 @@ def _value(scene: Any, path: Sequence[str]) -> Any:
 def _scenes(sweep: Sweep, member: Member, run: RunResults) -> list[str]:
     """The resolved scenes that a run of the member leaves: its own, and those a search tries."""
     scene = sweep.load(member)
-    found = [dumps(scene)]
+    scenes = [dumps(scene)]
     if scene.accuracy.searches:
         with suppress(OSError):
             for trial in read_trials(run.directory / NAME):
-                found.append(dumps(with_modal(applied(scene, trial.settings), None)))
-    return found
+                scenes.append(dumps(with_modal(applied(scene, trial.settings), None)))
+    return scenes
 
 
 def _figures(run: RunResults) -> dict[tuple[str, str], float]:
     """Headline numbers of all stages, third-octave levels and their errors, by (name, unit)."""
-    found: dict[tuple[str, str], float] = {}
+    figures: dict[tuple[str, str], float] = {}
     for stage, entries in run.summary.items():
         for name, entry in (entries.get("headline") or {}).items():
             value = entry.get("value")
             if isinstance(value, int | float) and not isinstance(value, bool):
-                found[f"{stage}: {name}", entry.get("unit", "-")] = float(value)
+                figures[f"{stage}: {name}", entry.get("unit", "-")] = float(value)
     for one in band_levels(run):
         for band, value, error in zip(one.band, one.level, one.error, strict=True):
             if np.isfinite(value):
-                found[f"{one.name}, {band:g} Hz", one.unit] = float(value)
+                figures[f"{one.name}, {band:g} Hz", one.unit] = float(value)
             if np.isfinite(error):
-                found[f"{ERROR}{one.name}, {band:g} Hz", "dB"] = float(error)
-    return found
+                figures[f"{ERROR}{one.name}, {band:g} Hz", "dB"] = float(error)
+    return figures
 
 
 def write(table: Gathered, folder: Path) -> None:
@@ -208,8 +208,8 @@ def numeric(settings: Mapping[str, Sequence[Any]]) -> dict[str, Array]:
 
 
 def _numbers(values: Sequence[Any]) -> bool:
-    given = [v for v in values if v is not None]
-    return bool(given) and all(isinstance(v, int | float) for v in given)
+    numbers = [v for v in values if v is not None]
+    return bool(numbers) and all(isinstance(v, int | float) for v in numbers)
 
 
 @dataclass(frozen=True)
@@ -353,7 +353,7 @@ def _lines(table: Gathered, key: str, values: Array) -> list[list[int]]:
     others: dict[str, list[int]] = {}
     for k in np.argsort(values, kind="stable").tolist():
         if np.isfinite(values[k]):
-            rest = repr([given[k] for name, given in table.settings.items() if name != key])
+            rest = repr([setting[k] for name, setting in table.settings.items() if name != key])
             others.setdefault(rest, []).append(k)
     return list(others.values())
 

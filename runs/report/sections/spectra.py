@@ -39,8 +39,8 @@ def add(results: Results, section: Section) -> None:
 
 
 def _wanted(scene: Mapping[str, Any]) -> AccuracyTable | None:
-    wanted = AccuracyTable(**scene.get("accuracy", {}))
-    return None if wanted.target is None and wanted.target_db is None else wanted
+    table = AccuracyTable(**scene.get("accuracy", {}))
+    return None if table.target is None and table.target_db is None else table
 
 
 def _show(section: Section, wanted: AccuracyTable, trials: list[Trial]) -> None:

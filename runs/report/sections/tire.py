@@ -271,24 +271,26 @@ def _carried(row: NDArray, every: NDArray) -> str:
 
 def stiffness(results: Results) -> Section:
     """The section: curve, table and stiffnesses."""
-    made = Section(
+    section = Section(
         "Load, deflection and stiffness",
         "The standing tire pressed on a flat road, its rim held. Horizontally and about the vertical: "
         "the footprint sticks to a road that moves a little, at constant load.",
     )
     load = float(results.array(_FILE, "load"))
-    made.facts.append(("at a load of", quantity(load, "N")))
+    section.facts.append(("at a load of", quantity(load, "N")))
     for name, title, unit in _FACTS:
         value = results.optional(_FILE, name)
         if value is not None:
-            made.facts.append((title, quantity(float(value), unit)))
+            section.facts.append((title, quantity(float(value), unit)))
     columns = [scale * results.array(_FILE, f"curve/{name}") for name, scale, _ in _COLUMNS]
     head = tuple(title for *_, title in _COLUMNS)
-    made.table = TextTable(head, [tuple(f"{v:.4g}" for v in row) for row in np.transpose(columns)])
+    section.table = TextTable(
+        head, [tuple(f"{v:.4g}" for v in row) for row in np.transpose(columns)]
+    )
     picture = curve(columns[0], columns[1], columns[5], load)
-    made.show(picture, "Load and contact area over deflection; dashed: the scene's load.")
-    _slides(results, made)
-    return made
+    section.show(picture, "Load and contact area over deflection; dashed: the scene's load.")
+    _slides(results, section)
+    return section
 
 
 def _slides(results: Results, made: Section) -> None:

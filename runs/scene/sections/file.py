@@ -167,13 +167,13 @@ def _wall(tire: TireTable) -> MaterialTable:
 
 def _small_motions(rubber: Rubber) -> dict[str, Any]:
     """Properties of a file's compound for small motions: a ratio not 1, a loss factor not 0, a spectrum."""
-    given = {
+    small_motions = {
         "dynamic": rubber.dynamic,
         "loss_factor": rubber.loss_factor,
         "spectrum": rubber.spectrum,
     }
     neutral = {"dynamic": 1.0, "loss_factor": 0.0, "spectrum": None}
-    return {key: value for key, value in given.items() if value != neutral[key]}
+    return {key: value for key, value in small_motions.items() if value != neutral[key]}
 
 
 def file_parts(tire: TireTable) -> Parts:

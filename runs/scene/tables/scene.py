@@ -235,18 +235,18 @@ class AxleTable:
 
 def axle_of(scene: Scene) -> Axle | None:
     """The moving wheel; None if held. Raises InputError if it is no valid mechanical system."""
-    given = scene.axle
-    if given.kind == "fixed" or len(given.locked) == len(DIRECTIONS):
+    axle = scene.axle
+    if axle.kind == "fixed" or len(axle.locked) == len(DIRECTIONS):
         return None
     none = (0.0,) * 6
-    free = given.kind == "free"
+    free = axle.kind == "free"
     return Axle(
-        wheel_mass=given.wheel_mass,
-        wheel_inertia=given.wheel_inertia,
-        stiffness=np.array(none if free else given.stiffness),
-        damping=np.array(none if free else given.damping),
-        body_mass=None if free else given.body_mass,
-        locked=given.locked,
+        wheel_mass=axle.wheel_mass,
+        wheel_inertia=axle.wheel_inertia,
+        stiffness=np.array(none if free else axle.stiffness),
+        damping=np.array(none if free else axle.damping),
+        body_mass=None if free else axle.body_mass,
+        locked=axle.locked,
     )
 
 
@@ -377,27 +377,27 @@ class AccuracyTable:
 
 def check_accuracy(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     """Check what a target requires of the other tables."""
-    wanted = scene.accuracy
-    if not wanted.aimed:
+    accuracy = scene.accuracy
+    if not accuracy.aimed:
         return
-    key = ("accuracy", "target" if wanted.target is not None else "target_db")
-    if not wanted.estimate:
+    key = ("accuracy", "target" if accuracy.target is not None else "target_db")
+    if not accuracy.estimate:
         raise error(key, "is met by the estimated error: it needs accuracy.estimate = true")
     if not scene.in_contact or scene.road is None or scene.time is None:
         raise error(
             key,
             "is of the forces of a tire on a road: add [contact], [road], [time], and load (N) to [static]",
         )
-    if wanted.of == "axle_force" and not scene.output.axle_force:
+    if accuracy.of == "axle_force" and not scene.output.axle_force:
         raise error(("accuracy", "of"), '= "axle_force" needs output.axle_force = true')
     if scene.road.kind == "flat" and scene.road.motion.kind == "none" and not scene.force:
         raise error(key, "is of what varies, and nothing drives the tire: take another road")
-    if wanted.up_to * scene.time.duration < 4:
+    if accuracy.up_to * scene.time.duration < 4:
         raise error(
             ("accuracy", "up_to"),
-            f"= {wanted.up_to:g} Hz is not seen in {scene.time.duration:g} s: four periods at least",
+            f"= {accuracy.up_to:g} Hz is not seen in {scene.time.duration:g} s: four periods at least",
         )
-    if wanted.searches:
+    if accuracy.searches:
         _check_points(scene, error)
 
 
@@ -485,8 +485,8 @@ def deflections(wanted: StiffnessTable, own: float | None) -> list[float]:
 
 def check_stiffness(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     """Raise an error if there is nothing to derive the deflections from."""
-    wanted, static = scene.stiffness, scene.static
-    if wanted is None or wanted.deflections or wanted.up_to:
+    stiffness, static = scene.stiffness, scene.static
+    if stiffness is None or stiffness.deflections or stiffness.up_to:
         return
     if not static.on_road:
         raise error(
