@@ -56,20 +56,22 @@ Writes a scene with that tire and prints the figures beside those reached.
 """
 
 Arguments = Callable[[argparse.ArgumentParser], object]
-READERS = "check", "report", "export", "compare", "info", "cache"  # leave nothing to go on from
 
 
 @dataclass(frozen=True)
 class Command:
     """A command: its line in the list of commands (`text`), and a function that adds its arguments.
 
-    `about` and `usage` replace the help that is otherwise generated from these.
+    `about` and `usage` replace the help that is otherwise generated from these. `alone`: what runs it, of a
+    command of one process; `leaves_nothing`: stopped, it has nothing to go on from.
     """
 
     text: str
     arguments: Arguments
     about: str = ""
     usage: str | None = None
+    alone: Callable[[argparse.Namespace], None] | None = None
+    leaves_nothing: bool = False
 
 
 def _run_options(run: argparse.ArgumentParser) -> None:
@@ -240,60 +242,6 @@ def _folder(text: str) -> Path:
     if not text:
         raise argparse.ArgumentTypeError("the name of the folder is empty")
     return Path(text)
-
-
-COMMANDS = {
-    "run": Command(
-        "run a scene and write its report",
-        _run_options,
-        RUN,
-        f"{PROGRAM} run SCENE.toml [options] [-- PETSc options]",
-    ),
-    "resume": Command("continue from the last checkpoint of a result folder", _resume),
-    "check": Command(
-        "validate a scene, printed with all defaults, its stages and its memory; or a road file alone",
-        _check_options,
-    ),
-    "report": Command("write report.html of a result folder again", _directory),
-    "fit": Command(
-        "the built-in tire's free parameters from a tire's figures (.toml or .tir)",
-        _fit_options,
-        FIT,
-    ),
-    "export": Command(
-        "XDMF for ParaView and CSV for spreadsheets from a result folder", _export_options
-    ),
-    "sweep": Command("run a family of scenes that share stages, in one table", _sweep_options),
-    "compare": Command("compare two to twelve runs in one page and one table", _compare_options),
-    "info": Command(
-        "list the contents of a result file: datasets, shapes, units, provenance; without one the"
-        " versions and places of everything that is installed",
-        _file,
-    ),
-    "python": Command(
-        "run a script, or a prompt, with the python and the path of this program", _script
-    ),
-    "cache": Command(
-        "list or clear the finished stages that runs share (TIREROAD_CACHE or the user's cache)",
-        _cache_options,
-    ),
-    "bench": Command(
-        "measure run time against error, scaling and lower bounds on this machine", _bench_options
-    ),
-    "reproduce": Command(
-        "recompute the thesis's figures and tables, with what agrees and what does not",
-        _reproduce_options,
-        REPRODUCE,
-    ),
-    "validate": Command(
-        "compare with full finite elements and closed forms, and test extreme input",
-        _validate_options,
-    ),
-    "test": Command(
-        "the test suite, serial and on 2 and 3 processes (--all: the long ones too, --fast: the quick ones)",
-        _test,
-    ),
-}
 
 
 def parser() -> argparse.ArgumentParser:
@@ -568,17 +516,79 @@ def _sweep(args: argparse.Namespace) -> None:
     sweep(args.sweep, args.out, at_once=args.local, batch=args.slurm, only_gather=args.gather)
 
 
-ALONE: dict[str, Callable[[argparse.Namespace], None]] = {
-    "check": _check,
-    "report": _report,
-    "export": _export,
-    "fit": _fit,
-    "compare": _compare,
-    "sweep": _sweep,
-    "info": _info,
-    "bench": _bench,
-    "validate": _validate,
-    "cache": _cache,
+COMMANDS = {
+    "run": Command(
+        "run a scene and write its report",
+        _run_options,
+        RUN,
+        f"{PROGRAM} run SCENE.toml [options] [-- PETSc options]",
+    ),
+    "resume": Command("continue from the last checkpoint of a result folder", _resume),
+    "check": Command(
+        "validate a scene, printed with all defaults, its stages and its memory; or a road file alone",
+        _check_options,
+        alone=_check,
+        leaves_nothing=True,
+    ),
+    "report": Command(
+        "write report.html of a result folder again", _directory, alone=_report, leaves_nothing=True
+    ),
+    "fit": Command(
+        "the built-in tire's free parameters from a tire's figures (.toml or .tir)",
+        _fit_options,
+        FIT,
+        alone=_fit,
+    ),
+    "export": Command(
+        "XDMF for ParaView and CSV for spreadsheets from a result folder",
+        _export_options,
+        alone=_export,
+        leaves_nothing=True,
+    ),
+    "sweep": Command(
+        "run a family of scenes that share stages, in one table", _sweep_options, alone=_sweep
+    ),
+    "compare": Command(
+        "compare two to twelve runs in one page and one table",
+        _compare_options,
+        alone=_compare,
+        leaves_nothing=True,
+    ),
+    "info": Command(
+        "list the contents of a result file: datasets, shapes, units, provenance; without one the"
+        " versions and places of everything that is installed",
+        _file,
+        alone=_info,
+        leaves_nothing=True,
+    ),
+    "python": Command(
+        "run a script, or a prompt, with the python and the path of this program", _script
+    ),
+    "cache": Command(
+        "list or clear the finished stages that runs share (TIREROAD_CACHE or the user's cache)",
+        _cache_options,
+        alone=_cache,
+        leaves_nothing=True,
+    ),
+    "bench": Command(
+        "measure run time against error, scaling and lower bounds on this machine",
+        _bench_options,
+        alone=_bench,
+    ),
+    "reproduce": Command(
+        "recompute the thesis's figures and tables, with what agrees and what does not",
+        _reproduce_options,
+        REPRODUCE,
+    ),
+    "validate": Command(
+        "compare with full finite elements and closed forms, and test extreme input",
+        _validate_options,
+        alone=_validate,
+    ),
+    "test": Command(
+        "the test suite, serial and on 2 and 3 processes (--all: the long ones too, --fast: the quick ones)",
+        _test,
+    ),
 }
 
 
@@ -587,9 +597,11 @@ def _alone(args: argparse.Namespace) -> int:
     if rank_before_mpi() != 0:
         return DONE
     signals.stop_on_signals()
-    kept = "the same command begins again" if args.command in READERS else mpi.KEPT
+    command = COMMANDS[args.command]
+    kept = "the same command begins again" if command.leaves_nothing else mpi.KEPT
     with mpi.ending(kept) as end:
-        ALONE[args.command](args)
+        assert command.alone is not None, "a command of one process"
+        command.alone(args)
     if end.message:
         print(end.message, file=sys.stderr)
     return end.status

@@ -26,6 +26,8 @@ from tireroad.runs.scene.tables.scene import (
 )
 
 Say = Callable[[str], object]
+TIRE, MODES = frozenset({"tire"}), frozenset({"tire", "modal"})
+
 BAND_EDGE = 10**0.05  # upper edge of a third octave over its middle
 # Of the band's upper edge: damped forces are off by 3/16 (2 pi / 16)^2 = 2.9 % there, 0.25 dB; on a rough road
 # linear ones chatter.
@@ -238,7 +240,6 @@ class Choice(NamedTuple):
     by: frozenset[str] = frozenset()
 
 
-TIRE, MODES = frozenset({"tire"}), frozenset({"tire", "modal"})
 CHOICES = (
     Choice(lambda scene, given: filled(scene)),  # air in the cavity
     Choice(lambda scene, given: rubbed(scene)),  # friction where the tread shears
