@@ -1,4 +1,4 @@
-"""What a scene leaves open is chosen here, in one list, `CHOICES`: by its other tables, in this order.
+"""Choices of what a scene leaves open, in one list, `CHOICES`: by its other tables, in this order.
 
 A choice is a function of the scene so far and of what was `Given`. Those that depend on each other
 stand in the order in which they do: the mesh before the number of modes that it has.
