@@ -1,4 +1,4 @@
-"""A stage reads no key of the scene that its hash, or that of a stage before it, lacks."""
+"""What a run declares: a stage reads no key that its hash lacks; every dataset has a meaning and a unit."""
 
 from __future__ import annotations
 
@@ -6,13 +6,16 @@ import sys
 from collections import defaultdict
 from dataclasses import fields
 from pathlib import Path
+from runpy import run_path
 from typing import Any
 
+import h5py
 import pytest
 from mpi4py import MPI
 from scene_keys import KEYS
 
 from tireroad.runs.pipeline import PARTS, run_scene
+from tireroad.runs.results.datasets import declared
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.schema import walk
 from tireroad.runs.scene.tables.scene import Scene
@@ -119,15 +122,21 @@ def _visit(value: Any) -> None:
             _visit(getattr(value, item.name))
 
 
-@pytest.mark.slow
-def test_a_stage_reads_what_its_hash_holds(tmp_path: Path, monkeypatch) -> None:
-    (tmp_path / "scene.toml").write_text(ROLLING)
-    scene = load(tmp_path / "scene.toml")
-    with monkeypatch.context() as patched:
+@pytest.fixture(scope="module")
+def run(tmp_path_factory) -> tuple[Reads, Path]:
+    folder = tmp_path_factory.mktemp("run")
+    (folder / "scene.toml").write_text(ROLLING)
+    scene = load(folder / "scene.toml")
+    with pytest.MonkeyPatch.context() as patched:
         reads = Reads(patched)
-        run_scene(
-            scene, tmp_path / "out", MPI.COMM_SELF, until="motion", fresh=True, petsc_options=[]
-        )
+        out = folder / "out"
+        run_scene(scene, out, MPI.COMM_SELF, until="motion", fresh=True, petsc_options=[])
+    return reads, out
+
+
+@pytest.mark.slow
+def test_a_stage_reads_what_its_hash_holds(run) -> None:
+    reads, _ = run
     held: set[str] = set(FREE)
     lacking = {}
     for kind in PARTS:
@@ -136,3 +145,36 @@ def test_a_stage_reads_what_its_hash_holds(tmp_path: Path, monkeypatch) -> None:
             lacking[kind.name] = sorted(wrong)
     assert len(reads.made) >= 9
     assert lacking == {}
+
+
+@pytest.mark.slow
+def test_every_dataset_is_declared_with_its_unit(run) -> None:
+    """In runs.results.datasets, which docs/results.md and `tireroad info` show."""
+    _, folder = run
+    wrong, count = [], 0
+
+    def check(file: str, name: str, dataset: h5py.Dataset) -> None:
+        known = declared(file, name)
+        if known is None:
+            wrong.append(f"{file}: {name} is not declared")
+        elif not known.unit.startswith("as "):  # of several kinds
+            if dataset.attrs["unit"] not in known.unit.split(" or "):
+                wrong.append(f"{file}: {name} has the unit {dataset.attrs['unit']}")
+            if len(list(filter(None, known.shape.split(",")))) != dataset.ndim:
+                wrong.append(f"{file}: {name} has the shape {dataset.shape}")
+
+    for path in sorted(folder.glob("*.h5")):
+        with h5py.File(path) as file:
+            names: list[str] = []
+            file.visit(names.append)
+            for name in names:
+                if isinstance(file[name], h5py.Dataset):
+                    check(path.name, name, file[name])
+                    count += 1
+    assert count > 150 and wrong == []
+
+
+def test_the_page_of_result_files_is_generated(root: Path) -> None:
+    """After a change of datasets: ./tireroad python docs/result_files.py docs/results.md"""
+    text = (root / "docs" / "results.md").read_text(encoding="utf-8")
+    assert text == run_path(str(root / "docs" / "result_files.py"))["written"](text)
