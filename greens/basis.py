@@ -75,8 +75,8 @@ class Basis:
         With the exact static response `flexibility` (r, k), its residual is what the states lack of
         it.
         """
-        given = self.seen(outputs), self.seen(loads)
-        response = couple(self.states, *given, self.carried)
+        arguments = self.seen(outputs), self.seen(loads)
+        response = couple(self.states, *arguments, self.carried)
         wanted = self.of_hub(outputs)
         if wanted.nnz:
             response = reading(response, self.states, wanted, self.beside(wanted)[3:])

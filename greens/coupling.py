@@ -272,8 +272,8 @@ class Wheel:
 
     def _with_statics(self, basis: Basis, outputs: Probes, loads: Probes) -> Response:
         """The states, and the exact static flexibility of what they lack. Collective."""
-        given = self.operators, self.rotating_stiffness, outputs, loads
-        answers = compliance(*given, self.air, beside=self._beside(basis.of_hub(outputs)))
+        arguments = self.operators, self.rotating_stiffness, outputs, loads
+        answers = compliance(*arguments, self.air, beside=self._beside(basis.of_hub(outputs)))
         flexibility, beside = answers[: outputs.shape[0]], answers[outputs.shape[0] :]
         if self._apart:
             lacking = regained(basis.held, *self._stiffnesses(basis.projection), outputs, loads)
@@ -385,13 +385,13 @@ class Wheel:
         complex moduli at each frequency; there is no such problem for one that rolls, whose frequencies
         in the rubber are others.
         """
-        given = outputs, loads
+        arguments = outputs, loads
         if not self._apart:
             full = self.rotating_stiffness, self.rotating_damping
-            return receptance(self.operators, *full, *given, frequency, air=self.air)
+            return receptance(self.operators, *full, *arguments, frequency, air=self.air)
         assert not self.speed, "the scene's rules refuse it"
         parts = [
-            receptance(self.operators, *self._complex(f), *given, np.array([f]), air=self.air)
+            receptance(self.operators, *self._complex(f), *arguments, np.array([f]), air=self.air)
             for f in frequency
         ]
         return np.concatenate(parts)

@@ -144,8 +144,8 @@ def make_response(
         every = loads if light is None else sparse.vstack([loads, light], format="csr")
         return _made(Basis.of(rolling).couple(outputs, every))
     if not kind.joins:
-        given = Basis.of(rolling), None, outputs, loads, residual, light
-        return _made(_singular_named(wheel(), lambda: wheel().respond(*given)))
+        arguments = Basis.of(rolling), None, outputs, loads, residual, light
+        return _made(_singular_named(wheel(), lambda: wheel().respond(*arguments)))
     found = fields()
     if found is not rolling.basis:  # a new solution: its states must be its own too
         rolling = rolling_modes(found, rolling.turning, wheel().operators.body.comm)

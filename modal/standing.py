@@ -121,11 +121,11 @@ def projected(
     matrices = motions.rotation if rotation else None
     comm, compounds = operators.body.comm, operators.compounds()
     doppler = turning is None or turning.inertia == "doppler"
-    given = matrices, operators.carried, comm
-    projection = project(modes, *given, compounds=compounds, doppler=doppler)
+    arguments = matrices, operators.carried, comm
+    projection = project(modes, *arguments, compounds=compounds, doppler=doppler)
     if turning is not None and turning.speed:
         modes = with_rotation_shapes(modes, projection, operators, matrices, turning)
-        projection = project(modes, *given, projection, compounds, doppler)
+        projection = project(modes, *arguments, projection, compounds, doppler)
     for compound in compounds:
         compound.stiffness.destroy()
     wheel = axle, motions.rim_motion(rotation), motions.static.positions, comm

@@ -323,13 +323,13 @@ def _run(args: argparse.Namespace, petsc_options: list[str]) -> int:
         stack.enter_context(console.log_to(directory / "log.txt"))
         for remark in remarks:
             console.say(f"note: {remark}")
-        given = {"fresh": args.fresh, "petsc_options": petsc_options, "cache": Cache.of_user()}
+        arguments = {"fresh": args.fresh, "petsc_options": petsc_options, "cache": Cache.of_user()}
         try:
             if searches(scene, args.until):
-                search(scene, directory, comm, **given)
+                search(scene, directory, comm, **arguments)
             else:
                 mpi.on_root(comm, lambda: journal.leave(directory))
-                tell_error(scene, run_scene(scene, directory, comm, until=args.until, **given))
+                tell_error(scene, run_scene(scene, directory, comm, until=args.until, **arguments))
         except (InputError, ConvergenceError) as error:
             console.log(f"error: {error}")
             raise

@@ -720,8 +720,8 @@ class Generator:
         if one is None:
             self._sets.add_elements(card, np.empty(0, np.int64), scope)
             return
-        made = master + elements[1:], one.nodes + nodes[1:, None]
-        self._elements.add(CardBlock(one.type, one.kind, *made, place))
+        arguments = master + elements[1:], one.nodes + nodes[1:, None]
+        self._elements.add(CardBlock(one.type, one.kind, *arguments, place))
         self._sets.add_elements(card, master + elements, scope)
 
     def _elcopy(self, card: Card, lines: list[Data], scope: int) -> None:

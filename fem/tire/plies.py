@@ -185,11 +185,11 @@ class Plies:
         def correction(sheet: Sheet) -> ufl.Form:
             line, last = self._lines(sheet, u, before)[0], self._lines(sheet, before, v)[0]
             change = ufl.dot(ufl.grad(u - before), sheet.direction)
-            given = sheet.stiffness, sheet.slack
+            arguments = sheet.stiffness, sheet.slack
             was = ufl.dot(last, last)
-            predicted = law.tension_over_stretch(was, *given)
-            predicted += law.tension_over_stretch_rate(was, *given) * 2 * ufl.dot(last, change)
-            excess = predicted - law.tension_over_stretch(ufl.dot(line, line), *given)
+            predicted = law.tension_over_stretch(was, *arguments)
+            predicted += law.tension_over_stretch_rate(was, *arguments) * 2 * ufl.dot(last, change)
+            excess = predicted - law.tension_over_stretch(ufl.dot(line, line), *arguments)
             bending = ufl.dot(
                 ufl.dot(ufl.grad(du), sheet.direction), ufl.dot(ufl.grad(v), sheet.direction)
             )

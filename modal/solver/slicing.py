@@ -721,8 +721,8 @@ class SymmetricProblem:
         """The eigenpairs of a part, or the journal's copy of them. Collective in the team."""
 
         def solve() -> Entry:
-            given = self.parts[part].matrix, interval, self.team
-            values, vectors = eigenpairs(*given, SOLVERS[self._solver])
+            arguments = self.parts[part].matrix, interval, self.team
+            values, vectors = eigenpairs(*arguments, SOLVERS[self._solver])
             return {"values": values, "vectors": vectors}
 
         entry = self._journal.step(self.team.comm, solve)

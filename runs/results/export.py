@@ -481,7 +481,8 @@ def stiffness(file: h5py.File) -> dict[str, Callable[[Path], object]]:
         f"{name.replace('_', ' ')} [{curve[name].attrs['unit']}]": curve[name][()] for name in curve
     }
     files = _table(
-        "stiffness.csv", dict(sorted(columns.items(), key=lambda one: "deflection" not in one[0]))
+        "stiffness.csv",
+        dict(sorted(columns.items(), key=lambda column: "deflection" not in column[0])),
     )
     for axis in file.get("slide", {}):
         parts = file[f"slide/{axis}"]

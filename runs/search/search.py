@@ -71,7 +71,9 @@ def planned(ladders: Ladders, trial: Trial, processes: int) -> Settings | None:
         choices = _worthwhile(over, choices)
         if not choices:
             break
-        cause, finer = max(choices, key=lambda one: _worth(over, one[0], one[1], now, costs, rates))
+        cause, finer = max(
+            choices, key=lambda choice: _worth(over, choice[0], choice[1], now, costs, rates)
+        )
         over, now = _finer(over, cause, now, finer, rates), finer
     now = _without_excess(ladders, trial, now, costs, rates)
     return now if now != trial.settings else None

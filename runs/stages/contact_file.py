@@ -194,8 +194,8 @@ def relief_seen(setup: ContactSetup) -> Relief | None:
     order = held[np.argsort(patch.points[held, 1], kind="stable")]
     chosen = order[[0, len(order) // 2, -1]]
     y, half = patch.points[chosen, 1], patch.half_sizes[chosen]
-    given = np.repeat(x[:, None], 3, axis=1), np.broadcast_to(y, (len(x), 3))
-    raw, seen = road.height(*given), CellMean(road, y, half).height(*given)
+    arguments = np.repeat(x[:, None], 3, axis=1), np.broadcast_to(y, (len(x), 3))
+    raw, seen = road.height(*arguments), CellMean(road, y, half).height(*arguments)
     relief = Relief(float(raw.std(axis=0).max()), float(seen.std(axis=0).max()))
     return relief if relief.road > NOTHING else None
 

@@ -252,8 +252,8 @@ class ModesStage(Computed[ModalBasis]):
         with record.timing("air"):
             air = cavity.make_air(self.job, motions)
         with record.timing("projection and rotation shapes"):
-            given = air, self.job.axle, shapes_of(self.job.scene, self.job.speed)
-            basis = projected(motions, modes, self.job.speed != 0, *given)
+            arguments = air, self.job.axle, shapes_of(self.job.scene, self.job.speed)
+            basis = projected(motions, modes, self.job.speed != 0, *arguments)
             basis = named(basis, motions.lattice)
         _describe(record, modes, basis)
         if self._shapes:
@@ -311,8 +311,8 @@ class Fields(Shared[ModalBasis]):
         if basis.modes is not None:
             return basis
         motions, air = self.motions.product, self.air.product
-        given = self.job, self.modes.key, motions.operators
-        if (known := kept(*given, basis)) is not None:
+        arguments = self.job, self.modes.key, motions.operators
+        if (known := kept(*arguments, basis)) is not None:
             return replace(basis, modes=known, column=air)
         again = with_fields(
             basis,
@@ -323,7 +323,7 @@ class Fields(Shared[ModalBasis]):
             turning=shapes_of(self.job.scene, self.job.speed),
         )
         assert again.modes is not None, "they were solved just now"
-        keep(*given, again.modes)
+        keep(*arguments, again.modes)
         return again
 
 

@@ -109,8 +109,8 @@ class FullMatrices(Shared[Wheel]):
             turning_of(self.job.scene, self.job.speed),
             self.modes.product.projection,
         )
-        given = self.motions.product, turning, self.air.product, projection
-        return wheel_of(*given, self.job.axle)
+        arguments = self.motions.product, turning, self.air.product, projection
+        return wheel_of(*arguments, self.job.axle)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -184,9 +184,9 @@ class RotatingStage(Computed[RollingModes]):
         if rolling.states.unstable:
             record.warnings.append(_growth(job, rolling, basis))
         waves = FaceWaves(job.tire.lattice)
-        given = rolling.basis.shape, rolling.basis.projection, waves
+        arguments = rolling.basis.shape, rolling.basis.projection, waves
         with record.timing("names"):
-            names = on_root(job.comm, lambda: named_states(rolling.states, *given))
+            names = on_root(job.comm, lambda: named_states(rolling.states, *arguments))
         return replace(rolling, names=names, campbell=self._campbell(record, waves))
 
     def _where(self, basis: ModalBasis, wave: np.ndarray) -> tuple[int, float]:
@@ -210,9 +210,9 @@ class RotatingStage(Computed[RollingModes]):
         with record.timing("full eigensolver"):
             matrices = wheel.rotating_damping, wheel.rotating_stiffness
             rim = wheel.rim() if wheel.rim else None
-            given = wheel.operators, matrices, projected, rim
+            arguments = wheel.operators, matrices, projected, rim
             found, figures, warnings = full_states(
-                *given, count=rotation.count, window=rotation.window
+                *arguments, count=rotation.count, window=rotation.window
             )
         record.indicators |= figures
         record.warnings += warnings
@@ -234,9 +234,9 @@ class RotatingStage(Computed[RollingModes]):
             return named_states(states, basis.shape, held, waves)
 
         def both() -> Campbell:
-            given = turning.inertia, speeds, campbell.branches
-            free = sweep(held, Proportional(), *given)
-            return replace(sweep(held, turning.damping, *given, names), undamped=free.frequency)
+            arguments = turning.inertia, speeds, campbell.branches
+            free = sweep(held, Proportional(), *arguments)
+            return replace(sweep(held, turning.damping, *arguments, names), undamped=free.frequency)
 
         with record.timing("campbell"):
             lines = on_root(self.job.comm, both)
@@ -329,12 +329,12 @@ def _describe(record: Record, rolling: RollingModes, critical: float) -> None:
 def _growth(job: Job, rolling: RollingModes, basis: ModalBasis) -> str:
     """Warning of an unstable tire. Collective."""
     states, turning = rolling.states, rolling.turning
-    given = turning.damping, turning.inertia
+    arguments = turning.damping, turning.inertia
 
     def first() -> float:
-        if not growth(basis.projection, turning.speed, *given):
+        if not growth(basis.projection, turning.speed, *arguments):
             return turning.speed  # only the full problem is unstable
-        return onset(basis.projection, *given, turning.speed)
+        return onset(basis.projection, *arguments, turning.speed)
 
     return (
         f"{states.unstable} state(s) of the rolling tire are unstable, the fastest growing at "

@@ -104,11 +104,11 @@ class PatchForces:
             return prescribed
         with h5py.File(self.job.path("contact")) as file:
             horizontal = self.job.scene.horizontal_forces
-            given = (
+            arguments = (
                 file["normal_force"][some],
                 file["horizontal_force"][some] if horizontal else None,
             )
-            return np.hstack([*self._on_nodes(file, *given), prescribed])
+            return np.hstack([*self._on_nodes(file, *arguments), prescribed])
 
     def _on_nodes(
         self, file: h5py.File, normal: np.ndarray, horizontal: np.ndarray | None
@@ -221,10 +221,10 @@ def replayed(basis: Basis, forces: PatchForces, wanted: Collection[int]) -> np.n
     response = couple(basis.states, unit, unit, np.zeros((3, len(unit))))
     always = forces.always
     begun = always + forces.sudden, forces.pushes(), always
-    given = response, forces.step, recursive(forces.scheme), *begun
+    arguments = response, forces.step, recursive(forces.scheme), *begun
     found = np.empty((len(wanted), len(unit)))
     number = filled = 0
-    for moved in marched(*given):
+    for moved in marched(*arguments):
         some = [k for k in range(len(moved)) if number + k in wanted]
         found[filled : filled + len(some)] = moved[some]
         filled, number = filled + len(some), number + len(moved)
