@@ -13,9 +13,9 @@ from mpi4py import MPI
 
 import tireroad
 from tireroad.fem.parameters import number
+from tireroad.runs.pipeline import run_scene
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.outputs import OUTPUTS, Output
-from tireroad.runs.stages.pipeline import run_scene
 
 
 @OUTPUTS.register("footprint_length", "length of the footprint over time")

@@ -15,8 +15,8 @@ import tireroad
 from tireroad.contact.roads.road import EndlessRoad, road_kind
 from tireroad.contact.tread.law import TreadLaw, tread_law
 from tireroad.fem.parameters import ParameterError, number
+from tireroad.runs.pipeline import run_scene
 from tireroad.runs.scene.load import load
-from tireroad.runs.stages.pipeline import run_scene
 
 
 @road_kind("humps", "rounded humps across the road, one after the other")

@@ -15,9 +15,9 @@ from mpi4py import MPI
 from tireroad.fem.parameters import number
 from tireroad.fem.static.press import press
 from tireroad.runs.scene.load import load
+from tireroad.runs.scene.physics import make_tire
 from tireroad.runs.scene.sections.torus import TorusSection
 from tireroad.runs.scene.tables.tire import SECTIONS, section_kind
-from tireroad.runs.stages.stage import make_tire
 
 
 @section_kind("ellipse", "the torus, stretched along the axle")

@@ -41,6 +41,10 @@ GAS_CONSTANT = 287.0  # J/(kg K), of dry air
 RATIO = 1.4  # of specific heats
 ATMOSPHERE = 101325.0  # Pa; inflation is measured above it
 _PRANDTL = 0.71
+WAVES = 8  # around the ring, kept by default: 1.7 kHz in a passenger tire
+_STATIONS = 16  # per wave: integrals of triple products are exact, others to 1e-6
+PROFILE_WAVES = 24  # of the profile: a footprint of an eighth of the ring has little content beyond
+_LEAST = 1e-12  # of a column's largest entry; smaller ones are rounding
 
 
 @dataclass(frozen=True)
@@ -79,10 +83,6 @@ class Gas:
 def inflated(inflation: float, temperature: float) -> Gas:
     """The air of a tire at `inflation` Pa above atmospheric pressure and `temperature` K."""
     return Gas(inflation + ATMOSPHERE, temperature)
-
-
-WAVES = 8  # around the ring, kept by default: 1.7 kHz in a passenger tire
-_STATIONS = 16  # per wave: integrals of triple products are exact, others to 1e-6
 
 
 @dataclass(frozen=True)
@@ -281,10 +281,6 @@ def _signed(shape: np.ndarray) -> np.ndarray:
     """Columns with their largest entry made positive."""
     largest = np.take_along_axis(shape, np.abs(shape).argmax(axis=0)[None], axis=0)
     return shape * np.sign(largest)
-
-
-PROFILE_WAVES = 24  # of the profile: a footprint of an eighth of the ring has little content beyond
-_LEAST = 1e-12  # of a column's largest entry; smaller ones are rounding
 
 
 class CavityTrace:

@@ -1,13 +1,12 @@
-"""Collective operations: sums, gathering and broadcast of arrays, release of PETSc objects, sparse matrices from rows.
+"""Collective operations on arrays and PETSc objects: sums, gathering, broadcast, release.
 
 Arrays are sent as buffers. Pickling would make two further copies and is limited to 2 GB, the
 largest byte count of an MPI message. Messages counted in numbers or rows may hold 16 GB and more;
 of an object only the small remainder without its arrays is pickled.
 
-Release of PETSc objects that Python no longer references.
-
-petsc4py does not destroy them: an object may be distributed, and the garbage collectors of its
-processes run at different times. PETSc keeps such objects until all processes of their communicator
+PETSc objects that Python no longer references are released by `collect`. petsc4py does not destroy
+them: an object may be distributed, and the garbage collectors of its processes run at different
+times. PETSc keeps such objects until all processes of their communicator
 call its cleanup. dolfinx gives each mesh a communicator of its own, which is freed with the mesh; a
 small vector keeps it alive until the cleanup. Without this, a process that loads one tire after
 another, as in a search or a notebook, kept all matrices and factors: 50 MB for each tire of 7,000
@@ -27,6 +26,7 @@ from petsc4py import PETSc
 from scipy import sparse
 
 T = TypeVar("T")
+_kept: list[tuple[MPI.Comm, weakref.ref, PETSc.Vec]] = []
 
 
 def summed(comm: MPI.Comm, values: np.ndarray) -> np.ndarray:
@@ -45,13 +45,13 @@ def allgather_rows(comm: MPI.Comm, values: np.ndarray) -> np.ndarray:
     rows = np.array(comm.allgather(len(values)))
     each = int(np.prod(values.shape[1:], dtype=int))
     every = np.empty((rows.sum(), *values.shape[1:]), values.dtype)
-    one = dtlib.from_numpy_dtype(values.dtype).Create_contiguous(max(each, 1)).Commit()
+    row = dtlib.from_numpy_dtype(values.dtype).Create_contiguous(max(each, 1)).Commit()
     try:  # counts are rows: below 2^31 where the number of values is not
         comm.Allgatherv(
-            [np.ascontiguousarray(values), one], [every, rows if each else 0 * rows, one]
+            [np.ascontiguousarray(values), row], [every, rows if each else 0 * rows, row]
         )
     finally:
-        one.Free()
+        row.Free()
     return every
 
 
@@ -67,9 +67,6 @@ def broadcast(comm: MPI.Comm, value: T, root: int = 0) -> T:
     sent = pkl5.Intracomm(comm).bcast(value, root)
     # Root returns its own object, so that resources reached through it stay open.
     return value if comm.rank == root else sent
-
-
-_kept: list[tuple[MPI.Comm, weakref.ref, PETSc.Vec]] = []
 
 
 def watch(comm: MPI.Comm, owner: object, mesh: Any) -> None:
@@ -88,10 +85,10 @@ def collect(comm: MPI.Comm) -> None:
         PETSc.garbage_cleanup(keeper.comm)
     alive = np.array([owner() is not None for _, owner, _ in ours], dtype=np.int8)
     comm.Allreduce(MPI.IN_PLACE, alive, MPI.MAX)
-    for one, lives in zip(ours, alive, strict=True):
+    for owned, lives in zip(ours, alive, strict=True):
         if not lives:
-            _kept.remove(one)
-            one[2].destroy()
+            _kept.remove(owned)
+            owned[2].destroy()
 
 
 def from_local_rows(local: sparse.csr_matrix, sizes: Any, comm: PETSc.Comm | MPI.Comm) -> PETSc.Mat:

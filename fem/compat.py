@@ -44,9 +44,22 @@ _FAMILIES = {
 }
 OLDEST = (0, 5)
 
+# Newer FFCx vectorises better by itself. In both cases -O3 and the native instruction set halve the
+# assembly time of a hyperelastic tangent on 27-node hexahedra. Nothing of how Python was compiled: its
+# flags have -g, which takes a third of the compiler's time.
+JIT = {
+    "cffi_extra_compile_args": [
+        "-O3", "-march=native", "-fno-math-errno", "-shared", "-fPIC", f"-DCPU_{cpu()}",
+    ],
+}  # fmt: skip
+_JIT_KEY = (
+    "jit_options" if "jit_options" in inspect.signature(fem.form).parameters else "jit_params"
+)
+_DECLARED = "tireroad_declarations"  # the C declarations of a plain library, kept inside it
+
 
 def misfit(version: str, scalar: type, maps: str) -> str:
-    """What does not fit together in an environment, and what to do; "" if all does.
+    """Name the libraries of an environment that do not fit together, and a remedy; "" if all fit.
 
     `version` of dolfinx, `scalar` type of PETSc, `maps` the text of /proc/self/maps.
     """
@@ -105,18 +118,6 @@ except ImportError:  # dolfinx 0.5: elements come from legacy UFL
 else:
     HAS_BASIX_UFL = hasattr(basix.ufl, "element")
 
-# Newer FFCx vectorises better by itself. In both cases -O3 and the native instruction set halve the
-# assembly time of a hyperelastic tangent on 27-node hexahedra. Nothing of how Python was compiled: its
-# flags have -g, which takes a third of the compiler's time.
-JIT = {
-    "cffi_extra_compile_args": [
-        "-O3", "-march=native", "-fno-math-errno", "-shared", "-fPIC", f"-DCPU_{cpu()}",
-    ],
-}  # fmt: skip
-_JIT_KEY = (
-    "jit_options" if "jit_options" in inspect.signature(fem.form).parameters else "jit_params"
-)
-
 
 class _PlainBuilder(cffi.FFI):
     """Builds a form's C code into a plain shared library, where FFCx makes extension modules.
@@ -169,9 +170,6 @@ def _loaded(path: str) -> tuple[cffi.FFI, Any]:
     text = getattr(reader.dlopen(path), _DECLARED)
     ffi.cdef(reader.string(text).decode())
     return ffi, ffi.dlopen(path)
-
-
-_DECLARED = "tireroad_declarations"  # the C declarations of a plain library, kept inside it
 
 
 def _build_plain_libraries() -> None:

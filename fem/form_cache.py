@@ -42,6 +42,11 @@ _SUFFIX = EXTENSION_SUFFIXES[0]  # of the libraries that are built here
 _AHEAD = "ahead-"  # before the names of what is built ahead of its use
 
 _LOG = logging.getLogger(__name__)  # tells the user that forms are being compiled
+_ahead: list[bool] = []  # whether forms are asked for ahead of their use
+_begun: dict[
+    Path, subprocess.Popen
+] = {}  # compilers at work for libraries of this process's folder
+_held: list[int] = []  # locks of this process's folders, released however it ends
 
 
 def kept_in() -> Path:
@@ -100,12 +105,6 @@ def begin(comm: Any, make: Callable[[Path], Any]) -> None:
 
 class Begun(RuntimeError):
     """A form's compiler is at work."""
-
-
-_ahead: list[bool] = []  # whether forms are asked for ahead of their use
-_begun: dict[
-    Path, subprocess.Popen
-] = {}  # compilers at work for libraries of this process's folder
 
 
 def build(
@@ -214,9 +213,6 @@ def _leave(folder: Path) -> None:
     shutil.rmtree(folder, ignore_errors=True)
 
 
-_held: list[int] = []  # locks of this process's folders, released however it ends
-
-
 def _new_folder(kept: Path) -> Path:
     folder = Path(tempfile.mkdtemp(prefix=folder_prefix(os.getpid()), dir=kept))
     _held.append(os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600))
@@ -294,14 +290,14 @@ def _borrow(kept: Path, folder: Path, names: list[str]) -> None:
 
 def _keep(folder: Path) -> None:
     """Copy new complete forms of the folder to the cache."""
-    kept = folder.parent
-    if kept != kept_in():
+    parent = folder.parent
+    if parent != kept_in():
         return  # a temporary folder: there is no cache
     for form, names in _forms(folder).items():
-        if not (kept / f"{form}{DONE}").exists():
+        if not (parent / f"{form}{DONE}").exists():
             with suppress(OSError):  # disk full: this process has its own copy
                 for name in names:
-                    _put(folder / name, kept / name)
+                    _put(folder / name, parent / name)
 
 
 def _put(source: Path, target: Path) -> None:

@@ -83,8 +83,8 @@ class SmallMotions:
             return None
         if turns not in self._rim_motions:
             self.body.set_displacement(self.static.displacement)
-            given = self.body, self.static.inflation, self.static.rolling
-            self._rim_motions[turns] = rim_motion(*given, turns)
+            arguments = self.body, self.static.inflation, self.static.rolling
+            self._rim_motions[turns] = rim_motion(*arguments, turns)
         return self._rim_motions[turns]
 
     def _touching(self) -> np.ndarray:

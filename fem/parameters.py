@@ -1,8 +1,4 @@
-"""Parameters of models: type, unit, range and meaning, and registries of named variants.
-
-Description of one parameter: unit, meaning and range, and how a value is read.
-
-All packages may import this module; it needs only the standard library.
+"""Parameters of models, declared once: type, unit, range and meaning; and registries of named variants.
 
 Dataclass fields are made by `number`, `integer`, `flag`, `choice`, `text`, `filename` or `vector`.
 They are the only description of a parameter: the constructor, the scene file, `check`, the key

@@ -18,6 +18,10 @@ from tireroad.fem.parameters import Limits, finite
 
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 _VERTICAL = 2
+INERTIAS = ("full", "doppler")
+SHAPE_TOLERANCE = 2e-3  # -, of Turning
+_RATES = Limits(least=0.0)
+TOLERANCES = Limits(least=1e-6, most=1.0)  # -
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,12 +127,6 @@ class Axle:
         elongation is wheel minus body in height."""
         apart = np.hstack([np.eye(6), -np.eye(6)[:, [_VERTICAL]]])
         return apart.T @ matrix @ apart
-
-
-INERTIAS = ("full", "doppler")
-SHAPE_TOLERANCE = 2e-3  # -, of Turning
-_RATES = Limits(least=0.0)
-TOLERANCES = Limits(least=1e-6, most=1.0)  # -
 
 
 class Proportional(NamedTuple):

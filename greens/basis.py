@@ -15,6 +15,10 @@ from tireroad.modal.corner import MOMENTS, SEEN
 from tireroad.modal.rolling import RollingModes
 from tireroad.modal.states import StateModes
 
+Array = np.ndarray
+Probes = sparse.csr_matrix  # (k, 3 s) over the outer face, or (k, 3 s + 6) with the rim
+ABOUT_AXLE = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])  # e_y x
+
 
 class Statics(NamedTuple):
     """Static answers of loads: `compliance` (r, k) m/N; `momentum` (3, k) kg m/N, int rho x, or (12, k),
@@ -30,11 +34,6 @@ def modal_statics(
     """Static answers between outputs (r, m) and loads (k, m) of a pencil with stiffness K~."""
     x = np.linalg.solve(stiffness, loads.T)
     return Statics(outputs @ x, carried @ x)
-
-
-Array = np.ndarray
-Probes = sparse.csr_matrix  # (k, 3 s) over the outer face, or (k, 3 s + 6) with the rim
-ABOUT_AXLE = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])  # e_y x
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,8 +75,8 @@ class Basis:
         With the exact static response `flexibility` (r, k), its residual is what the states lack of
         it.
         """
-        given = self.seen(outputs), self.seen(loads)
-        response = couple(self.states, *given, self.carried)
+        arguments = self.seen(outputs), self.seen(loads)
+        response = couple(self.states, *arguments, self.carried)
         wanted = self.of_hub(outputs)
         if wanted.nnz:
             response = reading(response, self.states, wanted, self.beside(wanted)[3:])
@@ -136,7 +135,7 @@ class Basis:
         return self.projection.carried.shape[1]
 
     def seen(self, probes: sparse.csr_matrix) -> np.ndarray:
-        """What the probes read of all coordinates, (k, m + a + c) (modal.basis.Projection.seen)."""
+        """Readings of the probes per coordinate, (k, m + a + c) (modal.basis.Projection.seen)."""
         return self.projection.seen(self._of_modes(probes), probes)
 
     def face(self, nodes: int) -> np.ndarray:
@@ -147,7 +146,7 @@ class Basis:
         return self.seen(sparse.identity(3 * nodes, format="csr"))
 
     def _of_modes(self, probes: sparse.csr_matrix) -> np.ndarray:
-        """What the probes read of the modes (k, m); columns of a corner's motions are skipped."""
+        """Readings of the probes per mode (k, m); columns of a corner's motions are skipped."""
         width = min(probes.shape[1], len(self.shape))
         return probes[:, :width] @ self.shape[:width]
 

@@ -1,6 +1,6 @@
-"""The wheel's full matrices, and the responses between probes that come from them and the modes.
+"""Responses between probes from the wheel's full matrices and its modes, with attachment modes.
 
-Attachment modes: the static shapes under the probes' loads join the basis, with their inertia.
+The static shapes under the probes' loads join the basis, with their inertia:
 
     R = K_Omega^-1 B,  joined to the modes as in modal.basis
 
@@ -46,6 +46,7 @@ from tireroad.greens.basis import (
     modal_statics,
     regained,
 )
+from tireroad.greens.residuals import residual_of
 from tireroad.greens.response import Response
 from tireroad.modal.basis import Projection, extended, project, same_fields, with_air, with_corner
 from tireroad.modal.damping import Damping, StrainEnergy, beyond, tail_growth
@@ -234,14 +235,15 @@ class Wheel:
 
         The forces of `light` follow those of the `loads`; they act on the states alone, without what
         these lack.
-        `modes` on all unknowns, for "attachment" only, must be the solution that `basis` projects:
+        `modes` on all unknowns, for attachment modes only, must be the solution that `basis` projects:
         another one has other signs and vectors of repeated frequencies. InputError otherwise."""
-        if option in ("static", "dirac"):
+        kind = residual_of(option)
+        if kind.static:
             whole = self._with_statics(basis, outputs, loads)
             if light is not None:
                 whole = whole.with_forces(basis.couple(outputs, light))
             moved = outputs.shape[0] - np.count_nonzero(basis.of_hub(outputs).getnnz(axis=1))
-            return replace(whole, pulse=moved if option == "dirac" else 0)
+            return replace(whole, pulse=moved if kind.pulse else 0)
         assert modes is not None, "attachment modes need the modes on all unknowns"
         return self.respond_attached(basis, modes, outputs, loads, light)[0]
 
@@ -270,8 +272,8 @@ class Wheel:
 
     def _with_statics(self, basis: Basis, outputs: Probes, loads: Probes) -> Response:
         """The states, and the exact static flexibility of what they lack. Collective."""
-        given = self.operators, self.rotating_stiffness, outputs, loads
-        answers = compliance(*given, self.air, beside=self._beside(basis.of_hub(outputs)))
+        arguments = self.operators, self.rotating_stiffness, outputs, loads
+        answers = compliance(*arguments, self.air, beside=self._beside(basis.of_hub(outputs)))
         flexibility, beside = answers[: outputs.shape[0]], answers[outputs.shape[0] :]
         if self._apart:
             lacking = regained(basis.held, *self._stiffnesses(basis.projection), outputs, loads)
@@ -281,7 +283,7 @@ class Wheel:
     def _completed(
         self, basis: Basis, outputs: Probes, loads: Probes, flexibility: Array, beside: Array
     ) -> Response:
-        """The states completed by what they lack."""
+        """The states with the static correction for truncated modes."""
         made = with_static_correction(basis, self.turning, outputs, loads, flexibility, beside)
         return made if self.air is None else replace(made, left_out=None)
 
@@ -383,13 +385,13 @@ class Wheel:
         complex moduli at each frequency; there is no such problem for one that rolls, whose frequencies
         in the rubber are others.
         """
-        given = outputs, loads
+        arguments = outputs, loads
         if not self._apart:
             full = self.rotating_stiffness, self.rotating_damping
-            return receptance(self.operators, *full, *given, frequency, air=self.air)
+            return receptance(self.operators, *full, *arguments, frequency, air=self.air)
         assert not self.speed, "the scene's rules refuse it"
         parts = [
-            receptance(self.operators, *self._complex(f), *given, np.array([f]), air=self.air)
+            receptance(self.operators, *self._complex(f), *arguments, np.array([f]), air=self.air)
             for f in frequency
         ]
         return np.concatenate(parts)
@@ -399,11 +401,11 @@ class Wheel:
         stiffness = self.operators.stiffness.copy()
         uniform = (0.0, 0.0) if self.beyond is not None else self._uniform
         lost = rotating_damping(self.operators, None, 0.0, uniform)
-        for one in self._compounds:
-            modulus = one.kind.modulus(frequency)
-            add_part(stiffness, modulus.real - 1, one.stiffness)
+        for compound in self._compounds:
+            modulus = compound.kind.modulus(frequency)
+            add_part(stiffness, modulus.real - 1, compound.stiffness)
             if self.beyond is not None:
-                add_part(lost, modulus.imag / (2 * np.pi * frequency), one.stiffness)
+                add_part(lost, modulus.imag / (2 * np.pi * frequency), compound.stiffness)
         return stiffness, lost
 
 

@@ -10,6 +10,12 @@ from scipy import linalg, sparse
 
 from tireroad.modal.states import StateModes, growing
 
+# Radians a state may rotate in a step and stay dynamic. Undamped, bouncing on a stiff tread, up to
+# 3 gained no energy and 5 diverged: rotation beyond pi is not resolved. Rolling on a rough road in
+# steps of 0.2 ms, 1 has an error of 1.6 % in the axle force, 1.5 to 3 of 0.7 %: a rotating state is
+# better kept dynamic.
+RESOLVED = 2.0
+
 
 @dataclass(frozen=True)
 class SplitStates:
@@ -50,13 +56,6 @@ def split_states(block: np.ndarray, values: np.ndarray, stays: np.ndarray) -> Sp
     right[:, p:] += turn[:, :p] @ X
     left[:p] -= X @ turn.T[p:]
     return SplitStates(schur[:p, :p], right[:, :p], left[:p], schur[p:, p:], right[:, p:], left[p:])
-
-
-# Radians a state may rotate in a step and stay dynamic. Undamped, bouncing on a stiff tread, up to
-# 3 gained no energy and 5 diverged: rotation beyond pi is not resolved. Rolling on a rough road in
-# steps of 0.2 ms, 1 has an error of 1.6 % in the axle force, 1.5 to 3 of 0.7 %: a rotating state is
-# better kept dynamic.
-RESOLVED = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -185,7 +184,7 @@ class Response:
         """Followed by the forces of `more`, a response of the same states and outputs."""
 
         def beside(mine: np.ndarray | None, theirs: np.ndarray | None) -> np.ndarray | None:
-            """What is not known of the others' is zero."""
+            """Place this response beside others: terms between them are zero."""
             if mine is None:
                 return None
             wide = np.zeros((len(mine), more.input.shape[1])) if theirs is None else theirs
@@ -271,7 +270,8 @@ def _horner(rows: np.ndarray, rate: Callable[[np.ndarray], np.ndarray]) -> list[
 
 
 def at_once(response: Response) -> np.ndarray:
-    """Rate of momentum (3, k) due to each force at the same instant, A_0 u of what follows it too."""
+    """Rate of momentum (3, k) due to each force at the same instant, including the part of the residual that
+    follows the force."""
     poles, block = rates(response)[0]
     direct = (poles @ response.input).real + block @ response.block_input
     follows = response.left_out

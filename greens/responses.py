@@ -22,12 +22,19 @@ from typing import TypeVar
 import numpy as np
 from scipy import sparse
 
-from tireroad.fem.errors import ConvergenceError, InputError, NearlySingular
+from tireroad.fem.errors import ConvergenceError, NearlySingular
 from tireroad.greens.coupling import FASTEST, Basis, Wheel
+from tireroad.greens.residuals import residual_of
 from tireroad.greens.response import Response, keep
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.damping import beyond
 from tireroad.modal.rolling import RollingModes, rolling_modes
+
+Figures = dict[str, tuple[float, str]]
+Answer = TypeVar("Answer")
+# Points and frequencies at which the truncation error is estimated: enough for its magnitude.
+_SAMPLE = 40
+_FREQUENCIES = 25
 
 
 @dataclass(frozen=True)
@@ -50,10 +57,11 @@ def estimate(response: Response, option: str, cutoff: Cutoff, frequency: np.ndar
     H = response.receptance(frequency)
     share = cutoff.share(frequency)
     beyond = np.abs(response.eigenvalue) > cutoff.circular
-    if option == "none":
+    kind = residual_of(option)
+    if not kind.solves:
         upper = np.abs(response.eigenvalue) > np.median(np.abs(response.eigenvalue))
         off = _size(response.static() - response.keeping(~upper).static()) * (1 + share)
-    elif option in ("dirac", "static"):
+    elif kind.static:
         off = _size(response.residual) * share
     else:
         lagging = H - response.keeping(~beyond).receptance(frequency)
@@ -86,15 +94,6 @@ def _size(matrices: np.ndarray) -> np.ndarray:
     return np.linalg.norm(matrices, axis=(-2, -1))
 
 
-Figures = dict[str, tuple[float, str]]
-
-Answer = TypeVar("Answer")
-RESIDUALS = ("none", "dirac", "static", "attachment")
-# Points and frequencies at which the truncation error is estimated: enough for its magnitude.
-_SAMPLE = 40
-_FREQUENCIES = 25
-
-
 @dataclass(frozen=True, kw_only=True)
 class Wanted:
     """Options of a response.
@@ -109,13 +108,7 @@ class Wanted:
     band: float | None = None
 
     def __post_init__(self) -> None:
-        _check_known("residual", self.residual, RESIDUALS)
-
-
-def _check_known(name: str, value: str, known: tuple[str, ...]) -> None:
-    """InputError for a value that is none of the known ones."""
-    if value not in known:
-        raise InputError(f'greens.{name} = "{value}" is unknown: take {", ".join(known)}')
+        residual_of(self.residual)
 
 
 @dataclass(frozen=True)
@@ -146,31 +139,27 @@ def make_response(
     `wheel` returns the full matrices and `fields` the modes on all unknowns; each is called only if
     the residual needs it. InputError for an unknown residual. Collective.
     """
-    _check_known("residual", residual, RESIDUALS)
-    if residual == "none":
+    kind = residual_of(residual)
+    if not kind.solves:
         every = loads if light is None else sparse.vstack([loads, light], format="csr")
         return _made(Basis.of(rolling).couple(outputs, every))
-    if residual == "attachment":
-        found = fields()
-        if found is not rolling.basis:  # a new solution: its states must be its own too
-            rolling = rolling_modes(found, rolling.turning, wheel().operators.body.comm)
-        assert found.modes is not None, "the modes on all unknowns"
-        joined = Basis.of(rolling), found.modes, outputs, loads, light
-        response, basis = _singular_named(wheel(), lambda: wheel().respond_attached(*joined))
-        attached: RollingModes | None = _attached(basis, rolling)
-    else:
-        given = Basis.of(rolling), None, outputs, loads, residual, light
-        response, attached = _singular_named(wheel(), lambda: wheel().respond(*given)), None
-    if residual in ("static", "dirac"):
-        return _made(response)
+    if not kind.joins:
+        arguments = Basis.of(rolling), None, outputs, loads, residual, light
+        return _made(_singular_named(wheel(), lambda: wheel().respond(*arguments)))
+    found = fields()
+    if found is not rolling.basis:  # a new solution: its states must be its own too
+        rolling = rolling_modes(found, rolling.turning, wheel().operators.body.comm)
+    assert found.modes is not None, "the modes on all unknowns"
+    joined = Basis.of(rolling), found.modes, outputs, loads, light
+    response, basis = _singular_named(wheel(), lambda: wheel().respond_attached(*joined))
+    attached = _attached(basis, rolling)
     highest = cutoff(rolling)
     limit = FASTEST * max(highest.circular, highest.rate)
     kept = response.keeping_where(lambda s: np.abs(s) <= limit)
     static = len(response.every) - len(kept.every)
     what = f"residual states faster than {FASTEST:g} times the highest mode, made static"
-    if attached is not None:
-        slow = np.abs(attached.states.eigenvalue) <= limit
-        attached = replace(attached, states=attached.states.among(slow))
+    slow = np.abs(attached.states.eigenvalue) <= limit
+    attached = replace(attached, states=attached.states.among(slow))
     return replace(_made(kept, {what: (static, "-")}), attached=attached)
 
 
@@ -182,7 +171,7 @@ def _attached(basis: Basis, rolling: RollingModes) -> RollingModes:
 
 
 def _singular_named(wheel: Wheel, respond: Callable[[], Answer]) -> Answer:
-    """What `respond` returns; the speed is named if K_Omega is singular. Collective."""
+    """The value of `respond`; the speed is named if K_Omega is singular. Collective."""
     try:
         return respond()
     except NearlySingular as error:
@@ -216,7 +205,7 @@ def selected(
     if wanted.dynamic is None:
         return whole
     kept = keep(whole, wanted.dynamic, band(rolling, wanted), counted)
-    return replace(kept, residual=whole.residual) if wanted.residual == "none" else kept
+    return kept if residual_of(wanted.residual).solves else replace(kept, residual=whole.residual)
 
 
 def band(rolling: RollingModes, wanted: Wanted) -> float:

@@ -308,7 +308,7 @@ class SoundBody:
 
     @cached_property
     def defect(self) -> Array:
-        """What the row sums of D lack of -1/2, (e,): small for a closed surface."""
+        """Defect of the row sums of D from -1/2, (e,): small for a closed surface."""
         return -0.5 - self._static[0]
 
     def _far(self, k: float, hyper: bool) -> Iterator[tuple[slice, Single, Single]]:
@@ -366,7 +366,7 @@ class SoundBody:
 
     @cached_property
     def _around(self) -> list[tuple[Array, ...]]:
-        """Of the near pairs (p,), at 4 x 4 points: r, a, b and c (16, p) of `_smooth`, and n.n' (p,)."""
+        """Geometry of the near pairs (p,) at 4 x 4 points: r, a, b and c (16, p) of `_smooth`, and n.n' (p,)."""
         place, weight = self.points_and_weights(4)
         found: list[tuple[Array, ...]] = []
         for mirror, i, j in zip(self._mirrors, *self._near, strict=True):
@@ -380,7 +380,7 @@ class SoundBody:
         return found
 
     def _smooth(self, k: float, hyper: bool) -> list[tuple[Complex, Complex]]:
-        """What D and, if wanted, H of the near pairs exceed their values at k = 0 by."""
+        """Smooth parts of D and, if wanted, H of the near pairs: their differences from k = 0."""
         found = []
         for (r, a, b, c, turned), closed in zip(self._around, self._closed, strict=True):
             z = k * r

@@ -100,7 +100,7 @@ class SoundingTire:
         wheel_depth: float = 0.0,
         leak: float = 0.0,
     ) -> SoundingTire:
-        """Of a static state on a plane, with elements of at most `coarser` times `size` m.
+        """The sounding body of a static state on a plane, with elements of at most `coarser` times `size` m.
 
         `wheel`: "disc", closed on both sides, `wheel_depth` m behind the beads, or "open", a barrel
         between them; `leak` m: height of the contact over the road.
@@ -384,8 +384,8 @@ def _slopes(
         weight = np.linalg.pinv(ahead, rcond=0.1)
         entries += [(n, m, w) for m, w in zip(beside, weight.T, strict=True)]
         entries.append((n, n, -weight.sum(axis=1)))
-    row, column = ([one[k] for one in entries] for k in (0, 1))
-    value = np.array([one[2] for one in entries]).reshape(-1, 2)
+    row, column = ([entry[k] for entry in entries] for k in (0, 1))
+    value = np.array([entry[2] for entry in entries]).reshape(-1, 2)
     return tangent, [sparse.csr_matrix((value[:, t], (row, column)), (e, e)) for t in range(2)]
 
 

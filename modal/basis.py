@@ -21,6 +21,16 @@ from tireroad.modal.solver.fields import between, gram, projected, strain_energi
 from tireroad.modal.solver.slicing import Modes
 from tireroad.modal.waves import ModeNames
 
+Array = np.ndarray
+
+# Fraction of the largest squared length below which a direction is rounding.
+_ROUNDING = 1e-12
+# Share of a unit column, or its squared length afterwards, from which taking it off leaves rounding
+# of more than a hundred times the last digit.
+_CLEAN = 1e-4
+_ROWS = 4096  # of all fields at a time, when they are changed in place
+_SAME = 1e-9  # of the largest trace: two solutions of the same modes differ at least in signs
+
 
 @dataclass(frozen=True)
 class Air:
@@ -48,16 +58,6 @@ class Air:
         """The air's share (q,) of the states' kinetic energy, from their vectors (m + a ..., q)."""
         squares, own = np.abs(right) ** 2, self.coupling.shape[1]
         return squares[own : own + self.count].sum(axis=0) / squares.sum(axis=0)
-
-
-Array = np.ndarray
-
-# Fraction of the largest squared length below which a direction is rounding.
-_ROUNDING = 1e-12
-# Share of a unit column, or its squared length afterwards, from which taking it off leaves rounding
-# of more than a hundred times the last digit.
-_CLEAN = 1e-4
-_ROWS = 4096  # of all fields at a time, when they are changed in place
 
 
 def extended(modes: Modes, columns: Array, operators: Operators) -> Modes:
@@ -142,9 +142,6 @@ def with_air(projection: Projection, modes: Modes, air: Column | None) -> Projec
     return replace(projection, air=Air(air.duct, air.coupling(modes.vectors)) if air else None)
 
 
-_SAME = 1e-9  # of the largest trace: two solutions of the same modes differ at least in signs
-
-
 @dataclass(frozen=True, kw_only=True)
 class Projection:
     """Phi^T X Phi of the rotating-frame matrices, factors of Omega taken out.
@@ -227,7 +224,7 @@ class Projection:
         return turn.T @ whole[0] @ turn, turn.T @ whole[1] @ turn
 
     def hub_damping(self) -> tuple[np.ndarray, np.ndarray]:
-        """Of a wheel that moves: tire and air relative to it (m + a, all), and its dampers (all, all) 1/s.
+        """Damping of a wheel that moves: tire and air relative to it (m + a, all), and its dampers (all, all) 1/s.
 
         Both act on all coordinates, of unit mass.
         """
@@ -239,7 +236,7 @@ class Projection:
         return turn[:n], turn[n:].T @ dampers @ turn[n:]
 
     def seen(self, shapes: np.ndarray, probes: sparse.csr_matrix) -> np.ndarray:
-        """What `probes` read of all coordinates (k, m + a + c), from `shapes` (k, m) of the modes.
+        """Readings of `probes` per coordinate (k, m + a + c), from `shapes` (k, m) of the modes.
 
         The coordinates of the air are not visible to probes.
         """
@@ -425,7 +422,7 @@ def _of_compounds(
     squares, m = modes.squares, modes.count
     done = 0 if known is None else known.own
     stored = strain_energies(modes.vectors[:, done:], compounds, comm)
-    kinds = [one.kind for one in compounds]
+    kinds = [compound.kind for compound in compounds]
 
     def before(name: str) -> np.ndarray:
         values = None if known is None else getattr(known, name)

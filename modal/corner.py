@@ -31,7 +31,10 @@ from tireroad.fem.wheel import DIRECTIONS, Axle
 BODY = 6  # index of the body's height, after the six motions of the rim
 # Motions that probes can read or load after the outer face: the rim's six and the body's height.
 SEEN = 7
-MOMENTS = slice(3, 6)  # of the six; after the motions probes can read the hub moments, N m
+MOMENTS = slice(3, 6)  # of the six
+HUB_MOMENTS = 3  # N m: after the motions, the last readings of every wheel
+READINGS = SEEN + HUB_MOMENTS  # that probes can have after those of the outer face
+_PER_MODE = ("mass", "stiffness", "gyroscopic", "convective")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -137,11 +140,11 @@ class Corner:
         return linalg.qr(np.vstack([p.T @ drifts, lower.T @ drifts]), mode="economic")[0]
 
     def seen(self, tire: np.ndarray, probes: sparse.csr_matrix) -> np.ndarray:
-        """What probes (k, 3 s) or wider read of (eta, xi), (k, n + c); `tire` (k, n) of eta."""
+        """Readings of probes (k, 3 s) or wider per coordinate (eta, xi), (k, n + c); `tire` (k, n) of eta."""
         return np.hstack([tire, self.rigid(probes)[:, self.taking_part]])
 
     def rigid(self, probes: sparse.csr_matrix) -> np.ndarray:
-        """What probes read of the motions of rim and body, (k, 7), m per m and per rad.
+        """Readings of probes per motion of rim and body, (k, 7), m per m and per rad.
 
         The transpose gives the forces N and the moments N m about the axle's centre of unit loads
         at the probes.
@@ -189,7 +192,6 @@ class Corner:
         return np.hstack([tire, whole[:, self.taking_part]])
 
 
-_PER_MODE = ("mass", "stiffness", "gyroscopic", "convective")
 ARRAYS = tuple(item.name for item in fields(Corner) if item.name != "axle")
 
 
@@ -204,3 +206,12 @@ def meeting(
     }
     own = {f"own_{name}": rim.whole.get(name, np.zeros((6, 6))) for name in _PER_MODE}
     return Corner(axle=axle, places=places, **per_mode, **own)
+
+
+def widened(probes: sparse.csr_matrix, count: int) -> sparse.csr_matrix:
+    """Probes (k, 3 s) of the outer face, plus the last `count` readings of wheel, body, hub.
+
+    Returns (k + count, 3 s + 10).
+    """
+    every = sparse.identity(READINGS, format="csr")
+    return sparse.block_diag([probes, every[READINGS - count :]], format="csr")

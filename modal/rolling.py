@@ -45,6 +45,13 @@ from tireroad.modal.waves import (
 )
 
 _BORDER = 0.02  # relative: truncation may move a state across a limit by as much
+_ROUNDING = 1e-14  # of the largest squared length: smaller directions are rounding of the fields
+Figures = dict[str, tuple[float, str]]
+
+# Conditions above which vectors count as defective. Where the checks fail, a lower limit moves more
+# states into the block (observed beside the rigid motions of a free rim with air, on two processes
+# of three).
+_CONDITIONS = DEFECTIVE, 1e4, 1e2
 
 
 def truncation(full: np.ndarray, projected: np.ndarray) -> np.ndarray:
@@ -65,11 +72,6 @@ def missing(full: np.ndarray, projected: np.ndarray, low: float, high: float) ->
     inside = (projected > low * (1 + _BORDER)) & (projected < high * (1 - _BORDER))
     found = (full >= low) & (full <= high)
     return max(int(inside.sum()) - int(found.sum()), 0)
-
-
-_ROUNDING = 1e-14  # of the largest squared length: smaller directions are rounding of the fields
-
-Figures = dict[str, tuple[float, str]]
 
 
 def full_states(
@@ -181,12 +183,6 @@ def _compared(found: FullModes, projected: StateModes) -> Figures:
         "truncation error of the projected eigenvalues, lower half": (float(half.max()), "-"),
         "truncation error of the projected eigenvalues": (float(error.max()), "-"),
     }
-
-
-# Conditions above which vectors count as defective. Where the checks fail, a lower limit moves more
-# states into the block (observed beside the rigid motions of a free rim with air, on two processes
-# of three).
-_CONDITIONS = DEFECTIVE, 1e4, 1e2
 
 
 def pencil(projection: Projection, turning: Turning) -> tuple[np.ndarray, np.ndarray]:

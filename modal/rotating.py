@@ -27,6 +27,12 @@ AT_REST = 1e-5
 _ROUGH = 1e-11  # residual above which a state is refined
 _MOST = 20  # refinements, a factorisation each; only a few slow states ever need one
 _SAME = 1e-4  # relative change beyond which inverse iteration has moved on to a neighbouring state
+DEFECTIVE = 1e6  # above, an eigenvector has lost six of sixteen digits, and goes to the block
+SINGULAR = 1e13  # condition of K~ above which it counts as singular
+# States at rest go to the block, as rigid modes do, unless there is one, of at most this condition.
+_SKEWED = 1e2
+Pencil = tuple[Array, Array]
+LIMITS = 1e-8, 1e-6  # largest residual, and largest error of an identity, that are accepted
 
 
 def _real_by_complex(matrix: Array, vectors: Array) -> Array:
@@ -140,14 +146,6 @@ def at_rest(matrix: Array, span: Array, shift: float) -> tuple[Array, Array]:
     return shift * np.eye(len(inverse)) + np.linalg.inv(inverse), span
 
 
-DEFECTIVE = 1e6  # above, an eigenvector has lost six of sixteen digits, and goes to the block
-SINGULAR = 1e13  # condition of K~ above which it counts as singular
-# States at rest go to the block, as rigid modes do, unless there is one, of at most this condition.
-_SKEWED = 1e2
-
-Pencil = tuple[Array, Array]
-
-
 def matrices(projection: Projection, speed: float, damping: Damping, inertia: str) -> Pencil:
     """D~ (1/s) and K~ (1/s2) of the projected problem; `damping` as in modal.damping."""
     return projection.pencil(*held_matrices(projection, speed, damping, inertia), speed)
@@ -208,9 +206,6 @@ def standing(projection: Projection, damping: Damping) -> StateModes:
         condition=float(condition[np.r_[paired, real]].max(initial=1.0)),
         rigid=2 * int(rigid.sum()),
     )
-
-
-LIMITS = 1e-8, 1e-6  # largest residual, and largest error of an identity, that are accepted
 
 
 def checks(

@@ -25,6 +25,7 @@ from tireroad.modal.waves import RIGID, FaceWaves
 
 _COUNT, _UP_TO = Limits(least=1), Limits(least=1e-3)  # -, Hz
 _SAME = 1e-6  # relative difference of the frequencies of one mode in two solutions
+_ALIKE = 1e-9  # relative difference of equal squares, which keep their order
 
 
 def standing_modes(
@@ -120,11 +121,11 @@ def projected(
     matrices = motions.rotation if rotation else None
     comm, compounds = operators.body.comm, operators.compounds()
     doppler = turning is None or turning.inertia == "doppler"
-    given = matrices, operators.carried, comm
-    projection = project(modes, *given, compounds=compounds, doppler=doppler)
+    arguments = matrices, operators.carried, comm
+    projection = project(modes, *arguments, compounds=compounds, doppler=doppler)
     if turning is not None and turning.speed:
         modes = with_rotation_shapes(modes, projection, operators, matrices, turning)
-        projection = project(modes, *given, projection, compounds, doppler)
+        projection = project(modes, *arguments, projection, compounds, doppler)
     for compound in compounds:
         compound.stiffness.destroy()
     wheel = axle, motions.rim_motion(rotation), motions.static.positions, comm
@@ -144,9 +145,6 @@ def named(basis: ModalBasis, lattice: NodeGrid) -> ModalBasis:
     waves = FaceWaves(lattice)
     fields = waves.read(basis.shape[:, : len(basis.frequency)])
     return replace(basis, names=waves.named(fields, dict.fromkeys(range(rigid), RIGID)))
-
-
-_ALIKE = 1e-9  # relative difference of equal squares, which keep their order
 
 
 def _by_own_frequency(modes: Modes, operators: Operators, up_to: float | None) -> Modes:

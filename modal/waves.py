@@ -41,6 +41,7 @@ MOTION = {
 RIGID = "rigid", "rigid body"
 STILL = "overdamped", "does not oscillate"
 WHEEL = "wheel", "wheel and body on their springs"
+_EVEN = 4  # angles a node, at which the elements' fields are read
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,7 +79,7 @@ class AirWaves:
 
 @dataclass(frozen=True, kw_only=True)
 class _Series:
-    """What a mode's series says, (m,) each; `second`: the wave number with the second largest share,
+    """Figures of each mode's series, (m,) each; `second`: the wave number with the second largest share,
     `parity`: from 1, symmetric in y, to -1; `turns`: whether the tread moves around the axle alone.
     """
 
@@ -165,7 +166,7 @@ class FaceWaves:
     def _series(self, fields: np.ndarray) -> _Series:
         starts = range(0, max(fields.shape[-1], 1), _AT_ONCE)
         parts = [vars(self._of_some(fields[..., k : k + _AT_ONCE])) for k in starts]
-        return _Series(**{key: np.concatenate([one[key] for one in parts]) for key in parts[0]})
+        return _Series(**{key: np.concatenate([part[key] for part in parts]) for key in parts[0]})
 
     def coefficients(self, fields: np.ndarray) -> np.ndarray:
         """c_n (k, p, 3, m) of fields (a, p, 3, m): n = 0, 1, ... to `highest`, then -1, -2, ...
@@ -243,9 +244,6 @@ def air_waves(share: np.ndarray, cosine: np.ndarray, sine: np.ndarray) -> AirWav
         np.concatenate([none, along]), np.abs(cosine + 1j * sine) ** 2
     )
     return AirWaves(mostly=share >= HALF, wave=wave, pure=pure, travel=travel)
-
-
-_EVEN = 4  # angles a node, at which the elements' fields are read
 
 
 def _weights(lattice: NodeGrid, number: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -1,7 +1,4 @@
-"""The command line's commands, options and help texts.
-
-The command line. Heavy imports are deferred to the command that needs them.
-"""
+"""The command line: commands, options, help texts. Heavy imports are deferred to the command that needs them."""
 
 import argparse
 import logging
@@ -16,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.runs.files.names import STAGES
 from tireroad.runs.process import console, mpi, signals
 from tireroad.runs.process.signals import DONE, INPUT, handed_over, processes_here, rank_before_mpi
 from tireroad.runs.process.surroundings import check_surroundings, crowded
-from tireroad.runs.scene.plan import STAGES
 from tireroad.runs.version import PROGRAM, VERSION
 
 EXIT = """\
@@ -65,13 +62,16 @@ Arguments = Callable[[argparse.ArgumentParser], object]
 class Command:
     """A command: its line in the list of commands (`text`), and a function that adds its arguments.
 
-    `about` and `usage` replace the help that is otherwise generated from these.
+    `about` and `usage` replace the help that is otherwise generated from these. `alone`: what runs it, of a
+    command of one process; `leaves_nothing`: stopped, it has nothing to go on from.
     """
 
     text: str
     arguments: Arguments
     about: str = ""
     usage: str | None = None
+    alone: Callable[[argparse.Namespace], None] | None = None
+    leaves_nothing: bool = False
 
 
 def _run_options(run: argparse.ArgumentParser) -> None:
@@ -244,60 +244,6 @@ def _folder(text: str) -> Path:
     return Path(text)
 
 
-COMMANDS = {
-    "run": Command(
-        "run a scene and write its report",
-        _run_options,
-        RUN,
-        f"{PROGRAM} run SCENE.toml [options] [-- PETSc options]",
-    ),
-    "resume": Command("continue from the last checkpoint of a result folder", _resume),
-    "check": Command(
-        "validate a scene, printed with all defaults, its stages and its memory; or a road file alone",
-        _check_options,
-    ),
-    "report": Command("write report.html of a result folder again", _directory),
-    "fit": Command(
-        "the built-in tire's free parameters from a tire's figures (.toml or .tir)",
-        _fit_options,
-        FIT,
-    ),
-    "export": Command(
-        "XDMF for ParaView and CSV for spreadsheets from a result folder", _export_options
-    ),
-    "sweep": Command("run a family of scenes that share stages, in one table", _sweep_options),
-    "compare": Command("compare two to twelve runs in one page and one table", _compare_options),
-    "info": Command(
-        "list the contents of a result file: datasets, shapes, units, provenance; without one the"
-        " versions and places of everything that is installed",
-        _file,
-    ),
-    "python": Command(
-        "run a script, or a prompt, with the python and the path of this program", _script
-    ),
-    "cache": Command(
-        "list or clear the finished stages that runs share (TIREROAD_CACHE or the user's cache)",
-        _cache_options,
-    ),
-    "bench": Command(
-        "measure run time against error, scaling and lower bounds on this machine", _bench_options
-    ),
-    "reproduce": Command(
-        "recompute the thesis's figures and tables, with what agrees and what does not",
-        _reproduce_options,
-        REPRODUCE,
-    ),
-    "validate": Command(
-        "compare with full finite elements and closed forms, and test extreme input",
-        _validate_options,
-    ),
-    "test": Command(
-        "the test suite, serial and on 2 and 3 processes (--all: the long ones too, --fast: the quick ones)",
-        _test,
-    ),
-}
-
-
 def parser() -> argparse.ArgumentParser:
     """The parser of all commands."""
     top = _parser(argparse.ArgumentParser, PROGRAM, ABOUT)
@@ -346,6 +292,7 @@ def _world() -> Any:
     comm = MPI.COMM_WORLD
     console.set_root(comm.rank == 0)
     console.show_log("tireroad.fem")
+    console.show_log("tireroad.runs.files")
     _only_warnings()
     signals.stop_on_signals()
     return comm
@@ -368,21 +315,21 @@ def _run(args: argparse.Namespace, petsc_options: list[str]) -> int:
         mpi.start_petsc(petsc_options)
         from tireroad.runs.files.cache import Cache
         from tireroad.runs.files.folder import claimed
+        from tireroad.runs.pipeline import run_scene
         from tireroad.runs.search import journal
         from tireroad.runs.search.search import search, searches, tell_error
-        from tireroad.runs.stages.pipeline import run_scene
 
         mpi.on_root(comm, lambda: stack.enter_context(claimed(directory, scene.name)))
         stack.enter_context(console.log_to(directory / "log.txt"))
         for remark in remarks:
             console.say(f"note: {remark}")
-        given = {"fresh": args.fresh, "petsc_options": petsc_options, "cache": Cache.of_user()}
+        arguments = {"fresh": args.fresh, "petsc_options": petsc_options, "cache": Cache.of_user()}
         try:
             if searches(scene, args.until):
-                search(scene, directory, comm, **given)
+                search(scene, directory, comm, **arguments)
             else:
                 mpi.on_root(comm, lambda: journal.leave(directory))
-                tell_error(scene, run_scene(scene, directory, comm, until=args.until, **given))
+                tell_error(scene, run_scene(scene, directory, comm, until=args.until, **arguments))
         except (InputError, ConvergenceError) as error:
             console.log(f"error: {error}")
             raise
@@ -437,8 +384,8 @@ def _check(args: argparse.Namespace) -> None:
     if args.scene.suffix.lower() not in ("", ".toml"):
         _check_file(args.scene)
         return
+    from tireroad.runs.check import explain
     from tireroad.runs.report.section_figure import write_section
-    from tireroad.runs.scene.check import explain
     from tireroad.runs.scene.load import load
 
     scene = load(args.scene, args.set, lambda remark: print(f"note: {remark}"), args.until)
@@ -486,7 +433,7 @@ def _fit(args: argparse.Namespace) -> None:
 
 def _export(args: argparse.Namespace) -> None:
     directory = _results(args.directory)
-    from tireroad.runs.files.export import export
+    from tireroad.runs.results.export import export
 
     told: list[tuple[str, str]] = []
     paths = export(
@@ -509,13 +456,13 @@ def _info(args: argparse.Namespace) -> None:
 
         mpi.start_petsc([])
         return print(described(args.json))
-    from tireroad.runs.files.info import describe
+    from tireroad.runs.results.info import describe
 
     return print(describe(args.file, args.json))
 
 
 def _check_checkout(folder: str, command: str) -> None:
-    """Refuse what an installation leaves out: evidence that stands beside the tests."""
+    """Raise InputError for commands whose code is part of a checkout only."""
     if not (Path(__file__).resolve().parents[1] / "tests" / folder).is_dir():
         raise InputError(
             f"{command} is part of a checkout, not of an installation: clone the repository and run ./tireroad {command} there"
@@ -538,7 +485,7 @@ def _validate(args: argparse.Namespace) -> None:
 def _results(directory: Path) -> Path:
     """The folder, if it is one of results; says which of its files are left out."""
     from tireroad.runs.files.folder import remarks
-    from tireroad.runs.files.reader import check_results
+    from tireroad.runs.results.reader import check_results
 
     check_results(directory)
     for text in remarks(directory):
@@ -569,21 +516,80 @@ def _sweep(args: argparse.Namespace) -> None:
     sweep(args.sweep, args.out, at_once=args.local, batch=args.slurm, only_gather=args.gather)
 
 
-ALONE: dict[str, Callable[[argparse.Namespace], None]] = {
-    "check": _check,
-    "report": _report,
-    "export": _export,
-    "fit": _fit,
-    "compare": _compare,
-    "sweep": _sweep,
-    "info": _info,
-    "bench": _bench,
-    "validate": _validate,
-    "cache": _cache,
+COMMANDS = {
+    "run": Command(
+        "run a scene and write its report",
+        _run_options,
+        RUN,
+        f"{PROGRAM} run SCENE.toml [options] [-- PETSc options]",
+    ),
+    "resume": Command("continue from the last checkpoint of a result folder", _resume),
+    "check": Command(
+        "validate a scene, printed with all defaults, its stages and its memory; or a road file alone",
+        _check_options,
+        alone=_check,
+        leaves_nothing=True,
+    ),
+    "report": Command(
+        "write report.html of a result folder again", _directory, alone=_report, leaves_nothing=True
+    ),
+    "fit": Command(
+        "the built-in tire's free parameters from a tire's figures (.toml or .tir)",
+        _fit_options,
+        FIT,
+        alone=_fit,
+    ),
+    "export": Command(
+        "XDMF for ParaView and CSV for spreadsheets from a result folder",
+        _export_options,
+        alone=_export,
+        leaves_nothing=True,
+    ),
+    "sweep": Command(
+        "run a family of scenes that share stages, in one table", _sweep_options, alone=_sweep
+    ),
+    "compare": Command(
+        "compare two to twelve runs in one page and one table",
+        _compare_options,
+        alone=_compare,
+        leaves_nothing=True,
+    ),
+    "info": Command(
+        "list the contents of a result file: datasets, shapes, units, provenance; without one the"
+        " versions and places of everything that is installed",
+        _file,
+        alone=_info,
+        leaves_nothing=True,
+    ),
+    "python": Command(
+        "run a script, or a prompt, with the python and the path of this program", _script
+    ),
+    "cache": Command(
+        "list or clear the finished stages that runs share (TIREROAD_CACHE or the user's cache)",
+        _cache_options,
+        alone=_cache,
+        leaves_nothing=True,
+    ),
+    "bench": Command(
+        "measure run time against error, scaling and lower bounds on this machine",
+        _bench_options,
+        alone=_bench,
+    ),
+    "reproduce": Command(
+        "recompute the thesis's figures and tables, with what agrees and what does not",
+        _reproduce_options,
+        REPRODUCE,
+    ),
+    "validate": Command(
+        "compare with full finite elements and closed forms, and test extreme input",
+        _validate_options,
+        alone=_validate,
+    ),
+    "test": Command(
+        "the test suite, serial and on 2 and 3 processes (--all: the long ones too, --fast: the quick ones)",
+        _test,
+    ),
 }
-
-
-READERS = "check", "report", "export", "compare", "info", "cache"  # leave nothing to go on from
 
 
 def _alone(args: argparse.Namespace) -> int:
@@ -591,9 +597,11 @@ def _alone(args: argparse.Namespace) -> int:
     if rank_before_mpi() != 0:
         return DONE
     signals.stop_on_signals()
-    kept = "the same command begins again" if args.command in READERS else mpi.KEPT
+    command = COMMANDS[args.command]
+    kept = "the same command begins again" if command.leaves_nothing else mpi.KEPT
     with mpi.ending(kept) as end:
-        ALONE[args.command](args)
+        assert command.alone is not None, "a command of one process"
+        command.alone(args)
     if end.message:
         print(end.message, file=sys.stderr)
     return end.status

@@ -11,6 +11,20 @@ from tireroad.fem.sections.radial import radial
 
 PLAUSIBLE = 1.5  # a factor beyond it, or under its inverse, is said
 
+# What the parameters multiply, as keys of [tire.scale].
+_RUBBERS = ("tread", "skim", "ply", "sidewall", "apex", "bead")
+SCALED = {
+    "density": ("compounds density",),
+    "tread": ("tread",),
+    "skim": ("skim",),
+    "sidewall": ("sidewall", "ply"),
+    "apex": ("apex",),
+    "carcass": ("carcass",),
+    "dynamic": ("compounds dynamic",),
+    "tread loss": ("tread loss factor",),
+    "other loss": tuple(f"{name} loss factor" for name in _RUBBERS if name != "tread"),
+}
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -39,21 +53,6 @@ PARAMETERS = (
     Parameter("carcass", 1.5, 0.2, 5.0, "modulus of the carcass cords"),
     Parameter("dynamic", 1.25, 0.87, 1.7, "dynamic over static modulus of all compounds"),
 )
-
-
-# What the parameters multiply, as keys of [tire.scale].
-_RUBBERS = ("tread", "skim", "ply", "sidewall", "apex", "bead")
-SCALED = {
-    "density": ("compounds density",),
-    "tread": ("tread",),
-    "skim": ("skim",),
-    "sidewall": ("sidewall", "ply"),
-    "apex": ("apex",),
-    "carcass": ("carcass",),
-    "dynamic": ("compounds dynamic",),
-    "tread loss": ("tread loss factor",),
-    "other loss": tuple(f"{name} loss factor" for name in _RUBBERS if name != "tread"),
-}
 
 
 def construction(

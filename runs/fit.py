@@ -46,8 +46,40 @@ from tireroad.fem.sections.construction import INFLATION
 from tireroad.fem.sections.inflated import InflatedRing
 from tireroad.fem.sections.radial import radial, size
 from tireroad.runs.factors import PARAMETERS, PLAUSIBLE, SCALED, construction
+from tireroad.runs.files.names import scene_name
 from tireroad.runs.process import console
-from tireroad.runs.scene.resolved import scene_name
+
+LOADS, PRINTS = 0.03, 0.05  # relative tolerance of the load at a deflection, of a footprint's sizes
+ALIKE = 4  # points of a curve from which on their errors are one another's
+MODES = "lateral", "yaw", "windup", "vertical"
+_LOAD_RANGES = ((0.0, 0.5), (0.0, 1e6))
+_PRINT_RANGES = ((10.0, 1e6), (0.01, 1.0), (0.01, 1.0))
+_EXAMPLE = {"size": '"205/55 R16"', "inflation": "2.4e5   # Pa"}
+_LINE = re.compile(r"^\s*([A-Za-z_]\w*)\s*=\s*('[^']*'|\"[^\"]*\"|[^$!]*)")
+_UNITS: Mapping[str, tuple[str, tuple[str, ...]]] = {
+    "LENGTH": ("meter", ("m", "meter", "metre", "meters", "metres")),
+    "FORCE": ("newton", ("n", "newton", "newtons")),
+    "TIME": ("second", ("s", "sec", "second", "seconds")),
+    "MASS": ("kg", ("kg", "kilogram", "kilograms", "kilo")),
+    "ANGLE": ("radians", ("rad", "radian", "radians")),
+    "PRESSURE": ("pascal", ("pa", "pascal", "pascals")),
+}
+"""What a .tir file calls the SI units."""
+_CURVE = "DEFLECTION_LOAD_CURVE"
+_MOST_LOADS = 3  # points of a curve that are fitted
+_STEP = 0.1  # of the finite differences, and the largest of an iteration is _TRUST
+_TRUST = 0.5
+_ITERATIONS = 8
+_COMPUTED = 6  # deflections of a run on the road
+_SAME = 5e-7  # a factor that is 1
+_ENOUGH = 0.02  # of a residual: change of the sum's root at which iterations end
+ELEMENTS, ORDER = 26, 2
+COARSE = 20, 20  # elements around, and from bead to bead, of the runs on the road
+_LOSSES = ("tread", "other")  # factors of the loss factors, fitted to the damping ratios afterwards
+_LOSS, _LOSS_SPREAD = (0.1, 3.0), 1.0  # range, and standard deviation of a factor
+_SHARP, _KNEE = 4.0, 0.125  # of rho: weight of a residual, and where it turns linear, in tolerances
+_LOAD_AT = "load at "
+_STAYS = 0.9  # of its spread without figures is left: they do not determine the factor
 
 
 @dataclass(frozen=True)
@@ -89,9 +121,6 @@ KINDS: Mapping[str, FigureKind] = {
     "footprint_length": FigureKind("m", 0.05, 0.01, 1, "", "at the load"),
     "footprint_width": FigureKind("m", 0.05, 0.01, 1, "", "at the load"),
 }
-LOADS, PRINTS = 0.03, 0.05  # relative tolerance of the load at a deflection, of a footprint's sizes
-ALIKE = 4  # points of a curve from which on their errors are one another's
-MODES = "lateral", "yaw", "windup", "vertical"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -211,10 +240,6 @@ def _from_table(table: dict, path: Path, notes: list[str]) -> FitFigures:
     )
 
 
-_LOAD_RANGES = ((0.0, 0.5), (0.0, 1e6))
-_PRINT_RANGES = ((10.0, 1e6), (0.01, 1.0), (0.01, 1.0))
-
-
 def _rows(
     path: Path, key: str, table: dict, form: str, ranges: Sequence[tuple[float, float]]
 ) -> tuple[tuple[float, ...], ...]:
@@ -231,9 +256,6 @@ def _rows(
     return tuple(sorted(rows))
 
 
-_EXAMPLE = {"size": '"205/55 R16"', "inflation": "2.4e5   # Pa"}
-
-
 def _number(
     path: Path, key: str, value: object, least: float, most: float, unit: str = ""
 ) -> float:
@@ -247,20 +269,6 @@ def _number(
 def _checked(path: Path, key: str, value: object) -> float:
     kind = KINDS[key]
     return _number(path, key, value, kind.least, kind.most, kind.unit)
-
-
-_LINE = re.compile(r"^\s*([A-Za-z_]\w*)\s*=\s*('[^']*'|\"[^\"]*\"|[^$!]*)")
-_UNITS: Mapping[str, tuple[str, tuple[str, ...]]] = {
-    "LENGTH": ("meter", ("m", "meter", "metre", "meters", "metres")),
-    "FORCE": ("newton", ("n", "newton", "newtons")),
-    "TIME": ("second", ("s", "sec", "second", "seconds")),
-    "MASS": ("kg", ("kg", "kilogram", "kilograms", "kilo")),
-    "ANGLE": ("radians", ("rad", "radian", "radians")),
-    "PRESSURE": ("pascal", ("pa", "pascal", "pascals")),
-}
-"""What a .tir file calls the SI units."""
-_CURVE = "DEFLECTION_LOAD_CURVE"
-_MOST_LOADS = 3  # points of a curve that are fitted
 
 
 @dataclass(frozen=True)
@@ -381,7 +389,7 @@ def _curve(tir: Tir, nominal: float | None, notes: list[str]) -> list[list[float
             raise InputError(f"{tir.path}, line {line}: [{_CURVE}] must ascend, not {text[:40]!r}")
         points.append(pair)
     middle = nominal or 4000.0
-    near = [one for one in points if one[0] > 0 and 0.3 * middle <= one[1] <= 1.7 * middle]
+    near = [point for point in points if point[0] > 0 and 0.3 * middle <= point[1] <= 1.7 * middle]
     chosen = (
         [near[k] for k in sorted({round(k) for k in np.linspace(0, len(near) - 1, _MOST_LOADS)})]
         if near
@@ -478,21 +486,6 @@ def _size(path: Path, value: Callable[[str], float | None]) -> tuple[str, float]
     return named, (made.rim + made.height) / radius - 1 if radius else 0.0
 
 
-_STEP = 0.1  # of the finite differences, and the largest of an iteration is _TRUST
-_TRUST = 0.5
-_ITERATIONS = 8
-_COMPUTED = 6  # deflections of a run on the road
-_SAME = 5e-7  # a factor that is 1
-_ENOUGH = 0.02  # of a residual: change of the sum's root at which iterations end
-ELEMENTS, ORDER = 26, 2
-COARSE = 20, 20  # elements around, and from bead to bead, of the runs on the road
-
-
-_LOSSES = ("tread", "other")  # factors of the loss factors, fitted to the damping ratios afterwards
-_LOSS, _LOSS_SPREAD = (0.1, 3.0), 1.0  # range, and standard deviation of a factor
-_SHARP, _KNEE = 4.0, 0.125  # of rho: weight of a residual, and where it turns linear, in tolerances
-
-
 @dataclass(frozen=True)
 class Fitted:
     """`factors` by parameter, each figure as `reached` and as the size alone gives it at the `start`, and the
@@ -507,9 +500,6 @@ class Fitted:
     def row(self, name: str) -> tuple[float, float, float]:
         """Target, of the size alone, reached."""
         return self.figures.targets[name], self.start[name], self.reached[name]
-
-
-_LOAD_AT = "load at "
 
 
 def _load_name(deflection: float) -> str:
@@ -620,9 +610,9 @@ def _run(folder: Path) -> Path:
     from mpi4py import MPI
 
     from tireroad.runs.files.cache import Cache
+    from tireroad.runs.pipeline import run_scene
     from tireroad.runs.process import mpi
     from tireroad.runs.scene.load import load
-    from tireroad.runs.stages.pipeline import run_scene
 
     mpi.start_petsc([])
     scene = load(folder / "scene.toml", [], lambda remark: None, "stiffness")
@@ -815,9 +805,6 @@ def _aligned(rows: Sequence[tuple[str, ...]]) -> list[str]:
 
 def _implausible(factor: float) -> bool:
     return max(factor, 1 / factor) > PLAUSIBLE
-
-
-_STAYS = 0.9  # of its spread without figures is left: they do not determine the factor
 
 
 def _factor_row(found: Fitted, name: str) -> tuple[str, ...]:

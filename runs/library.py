@@ -5,7 +5,7 @@
   static = press(tire, inflation=2e5, load=500.0, turning=turning)
   standing = modes(tire, static, count=60)
   rolling = roll(standing, turning)
-  run = drive(rolling, make_road(kind="sine", amplitude=1e-3), duration=0.1)     # runs.drive
+  run = drive(rolling, make_road(kind="sine", amplitude=1e-3), duration=0.1)
 
 SI units, angles in radians. Every function is collective: all processes of the tire's communicator
 call it with the same arguments and get the same arrays.
@@ -56,20 +56,19 @@ from tireroad.greens.response import Response
 from tireroad.greens.responses import make_response
 from tireroad.modal.basis import ModalBasis, same_fields
 from tireroad.modal.campbell import Campbell, sweep
+from tireroad.modal.corner import HUB_MOMENTS, READINGS, widened
 from tireroad.modal.damping import ratios
 from tireroad.modal.rolling import RollingModes, named_states, rolling_modes
 from tireroad.modal.standing import named, standing_modes
 from tireroad.modal.states import StateModes
 from tireroad.modal.waves import FaceWaves, ModeNames
 from tireroad.runs.scene.parts import scaled
+from tireroad.runs.scene.physics import make_tire, rolling_shape, run_in_time
 from tireroad.runs.scene.rules import barred_from_contact
 from tireroad.runs.scene.sections.radial import RadialSection
 from tireroad.runs.scene.sections.torus import TorusSection
 from tireroad.runs.scene.tables.contact import DRY_ASPHALT
 from tireroad.runs.scene.tables.tire import NEAR_ROAD, TireTable
-from tireroad.runs.stages.corner import BESIDE, MOMENTS, widened
-from tireroad.runs.stages.rolling import grown
-from tireroad.runs.stages.stage import make_tire, rolling_shape
 
 # Arguments that are one number.
 _NUMBERS = {"inflation", "load", "deflection", "road_height", "count", "up_to", "duration", "step"}
@@ -108,6 +107,8 @@ _ARGUMENTS = {
     **{f"tire.{name}": name for name in ("footprint_size", "order")},
 }
 _KEYS = re.compile("|".join(rf"(?<![\w.]){re.escape(key)}(?!\w)" for key in _ARGUMENTS))
+Array = NDArray[np.float64]
+_OF_ONE_TIRE = 1e-5  # relative difference of a mode's mass and stiffness from 1 kg and omega^2
 
 
 def in_arguments(text: str) -> str:
@@ -131,16 +132,16 @@ def typed(function: Callable[P, T]) -> Callable[P, T]:
     @wraps(function)
     def checked(*args: P.args, **keys: P.kwargs) -> T:
         bound = signature.bind(*args, **keys)
-        given = bound.arguments
-        for name, value in given.items():
-            given[name] = plain(value)
-            if isinstance(given[name], np.ndarray) and name in _NUMBERS:
+        arguments = bound.arguments
+        for name, value in arguments.items():
+            arguments[name] = plain(value)
+            if isinstance(arguments[name], np.ndarray) and name in _NUMBERS:
                 raise InputError(
                     f"{function.__name__}: {name} is an array of shape {value.shape}: it must be one number"
                 )
         for name, kind in kinds().items():
-            if name in given and not isinstance(given[name], kind):
-                found = type(given[name]).__name__
+            if name in arguments and not isinstance(arguments[name], kind):
+                found = type(arguments[name]).__name__
                 raise InputError(
                     f"{function.__name__}: {name} is of the type {found}: take what {_maker(kind)} returns"
                 )
@@ -154,13 +155,9 @@ def typed(function: Callable[P, T]) -> Callable[P, T]:
 
 
 def _maker(hint: Any) -> str | None:
-    """What makes the class of an annotation, which may also allow None."""
+    """The function that makes the class of an annotation, which may also allow None."""
     names = [getattr(one, "__name__", "") for one in (hint, *get_args(hint))]
     return next((_MADE_BY[name] for name in names if name in _MADE_BY), None)
-
-
-Array = NDArray[np.float64]
-_OF_ONE_TIRE = 1e-5  # relative difference of a mode's mass and stiffness from 1 kg and omega^2
 
 
 @typed
@@ -492,8 +489,8 @@ class RollingTire:
                 'road = "forces"'
             )
         count = probes.shape[0]
-        loads = sparse.hstack([probes, sparse.csr_matrix((count, BESIDE))], format="csr")
-        response = self.respond(widened(probes, MOMENTS), loads, residual)
+        loads = sparse.hstack([probes, sparse.csr_matrix((count, READINGS))], format="csr")
+        response = self.respond(widened(probes, HUB_MOMENTS), loads, residual)
         force = by_momentum(response, np.tile(np.eye(3), len(spots)), at)
         moment = response.between(slice(count, None), slice(None)).receptance(at)
         return np.concatenate([force, moment], axis=1)
@@ -669,7 +666,7 @@ def drive(
     blocks = _blocks(spec, setup, response, chosen, motions.body.comm)
     highest = tire.states.highest / (2 * np.pi)
     bounds = limits(step=chosen.size, highest=highest, pitch=pitch(setup.patch), speed=rolled.speed)
-    return _history(setup.patch, blocks, lowest(bounds), grown(setup, road.run_in))
+    return _history(setup.patch, blocks, lowest(bounds), run_in_time(setup, road.run_in))
 
 
 def _check_motions(motions: SmallMotions) -> None:
@@ -738,7 +735,7 @@ def _history(patch: Patch, blocks: list[Block], limit: Limit, run_in: float) -> 
     }
     if (kept["force"][:, patch.edge] > 0).any():
         raise ConvergenceError(
-            "drive: the road touches the edge of the patch of contact points: it rises above the highest "
-            "point that it states; take a smoother road or smaller steps"
+            "drive: contact at the edge of the patch of contact points: the road is higher than its declared "
+            "maximum; take a smoother road or smaller steps"
         )
     return History(**kept, patch=patch, limit=limit, run_in=run_in)

@@ -10,6 +10,12 @@ from tireroad.runs.process import signals, supervisor
 from tireroad.runs.process.packages import missing
 from tireroad.runs.process.signals import DONE, INPUT, STOPPED, handed_over
 
+_APART = (
+    "error: srun started {tasks} processes without MPI, so that each would compute all by itself: start one "
+    "(srun -n 1 --pty bash) and take ./tireroad run … -n {tasks} in it, or mpirun -n {tasks} python3 -m runs run …, or "
+    "srun --mpi=pmix where the cluster's MPI has it"
+)
+
 
 def program() -> None:
     """The command `tireroad`: takes the process's arguments and sets its exit status."""
@@ -40,13 +46,6 @@ def program() -> None:
             raise
         print(f"stopped by {signals.raised()} before anything was started", file=sys.stderr)
         os._exit(handed_over(STOPPED, for_all=False))
-
-
-_APART = (
-    "error: srun started {tasks} processes without MPI, so that each would compute all by itself: start one "
-    "(srun -n 1 --pty bash) and take ./tireroad run … -n {tasks} in it, or mpirun -n {tasks} python3 -m runs run …, or "
-    "srun --mpi=pmix where the cluster's MPI has it"
-)
 
 
 def _need_home() -> None:

@@ -1,4 +1,4 @@
-"""How far a reader goes from outside to where something is computed: files entered, functions deep."""
+"""How far a reader goes from outside to where something is computed: files, functions, and how deep."""
 
 import pytest
 
@@ -6,7 +6,7 @@ PROFILE = """
 import os, sys
 from tireroad.tests.started import ROOT
 
-files, importing, rounds = set(), 0, 0
+files, functions, importing, rounds = set(), set(), 0, 0
 
 
 def own(code):
@@ -18,7 +18,7 @@ def told(frame):
     while frame is not None:
         depth += own(frame.f_code)
         frame = frame.f_back
-    print("journey", len(files), depth, flush=True)
+    print("journey", len(files), len(functions), depth, flush=True)
 
 
 def profile(frame, event, argument):
@@ -31,7 +31,9 @@ def profile(frame, event, argument):
             rounds += 1
             if rounds == 2:  # the first one prepares
                 files.clear()
+                functions.clear()
         files.add(code.co_filename)
+        functions.add((code.co_filename, code.co_qualname))
         if code.co_name == END or rounds == 3:
             sys.setprofile(None)
             told(frame)
@@ -66,6 +68,10 @@ turning = tr.roll(tr.modes(tire, static, count=20), tr.Turning(speed=50.0, dampi
 road = tr.make_road(kind="sine", amplitude=5e-4, wavelength=0.2)
 follow(lambda: tr.drive(turning, road, duration=0.01, spacing=0.004), every="predict")
 """
+LOADED = """
+from tireroad.runs.scene.load import load
+follow(lambda: load(sys.argv[1]))
+"""
 SCENE = """
 [tire]
 segments = 12
@@ -75,33 +81,47 @@ youngs_modulus = 48e6
 [static]
 load = 300.0
 """
+ON_A_ROAD = """
+[contact]
+[road]
+kind = "sine"
+[time]
+"""
 
 
-def journey(launch, script: str, *arguments: object) -> tuple[int, int]:
-    """Files of the program entered, and its functions on the stack at the end."""
+def journey(launch, script: str, *arguments: object) -> tuple[int, int, int]:
+    """Files of the program entered, functions called, and functions on the stack at the end."""
     done = launch("-c", PROFILE + script, *arguments)
     line = next(line for line in done.stdout.splitlines() if line.startswith("journey"))
-    files, depth = line.split()[1:]
-    return int(files), int(depth)
+    files, functions, depth = map(int, line.split()[1:])
+    return files, functions, depth
 
 
 @pytest.mark.slow
 def test_from_the_command_to_the_first_tangent(launch, tmp_path) -> None:
-    """It was 113 files and 34 functions."""
+    """It was 113 files, and 34 functions deep."""
     (tmp_path / "scene.toml").write_text(SCENE)
-    files, depth = journey(launch, TANGENT, tmp_path / "scene.toml", tmp_path / "out")
-    assert 20 < files <= 45 and 8 < depth <= 16
+    files, functions, depth = journey(launch, TANGENT, tmp_path / "scene.toml", tmp_path / "out")
+    assert 20 < files <= 52 and functions <= 520 and 8 < depth <= 16
 
 
 @pytest.mark.slow
 def test_from_the_library_to_the_modes(launch) -> None:
     """It was 46 files."""
-    files, _ = journey(launch, MODES)
-    assert 10 < files <= 27
+    files, functions, _ = journey(launch, MODES)
+    assert 10 < files <= 27 and functions <= 255
 
 
 @pytest.mark.slow
 def test_one_time_step(launch) -> None:
-    """With friction, on a grid of points; it was 13 files."""
-    files, _ = journey(launch, STEP)
-    assert 2 < files <= 6
+    """With friction, on a grid of points; it was 13 files and 77 functions."""
+    files, functions, _ = journey(launch, STEP)
+    assert 2 < files <= 6 and functions <= 20
+
+
+@pytest.mark.slow
+def test_from_a_file_to_a_scene(launch, tmp_path) -> None:
+    """Of a tire on a road; it was 31 files, then 15 with 158 functions."""
+    (tmp_path / "scene.toml").write_text(SCENE + ON_A_ROAD)
+    files, functions, _ = journey(launch, LOADED, tmp_path / "scene.toml")
+    assert 10 < files <= 15 and functions <= 160

@@ -386,7 +386,7 @@ def test_the_radial_tire_is_that_of_a_scene(tmp_path: Path) -> None:
     from mpi4py import MPI
 
     from tireroad.runs.scene.load import load
-    from tireroad.runs.stages.stage import make_tire
+    from tireroad.runs.scene.physics import make_tire
 
     scene = tmp_path / "scene.toml"
     scene.write_text(

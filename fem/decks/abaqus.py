@@ -62,6 +62,30 @@ _SINGLE = 5000  # elements with a *REBAR each: a section has some hundreds
 # Of the thickness: from a shell's middle to its nodes.
 _OFFSETS = {"": 0.0, "SPOS": 0.5, "SNEG": -0.5}
 
+# Keywords that describe an analysis and not the tire; all others not handled are reported as
+# unknown.
+_ANALYSIS = frozenset(
+    """AMPLITUDE|ANALYTICAL SURFACE|ASSEMBLY|BOUNDARY|CHANGE FRICTION|CONSTRAINT CONTROLS|CONTACT|
+CONTACT PAIR|CONTROLS|CLOAD|CONTACT CONTROLS|CONTACT INCLUSIONS|CONTACT OUTPUT|CONTACT PRINT|CONTACT FILE|
+CONTACT PROPERTY ASSIGNMENT|CONTACT INITIALIZATION DATA|COUPLING|DISTRIBUTING|KINEMATIC|DISTRIBUTION|
+DISTRIBUTION TABLE|DLOAD|DSLOAD|DYNAMIC|EL FILE|EL PRINT|ELEMENT OUTPUT|END ASSEMBLY|END INSTANCE|END PART|
+END STEP|ENERGY PRINT|EQUATION|FILE FORMAT|FILM|FIELD|FILTER|FLUID BEHAVIOR|FLUID CAVITY|FLUID DENSITY|
+FLUID INFLATOR|FREQUENCY|FRICTION|GAP|HEADING|HOURGLASS STIFFNESS|IMPORT|INITIAL CONDITIONS|
+INTEGRATED OUTPUT|MASS|MASS SCALING|MODEL CHANGE|MONITOR|MPC|NODE FILE|NODE OUTPUT|NODE PRINT|OUTPUT|
+PARAMETER|PERTURBATION|PHYSICAL CONSTANTS|PREPRINT|PRE-TENSION SECTION|PRINT|RADIATION|RESTART|
+RIGID SURFACE|ROTARY INERTIA|SECTION CONTROLS|SPRING|STATIC|STEADY STATE DYNAMICS|STEADY STATE TRANSPORT|
+STEP|SURFACE BEHAVIOR|SURFACE INTERACTION|SYMMETRIC MODEL GENERATION|SYMMETRIC RESULTS TRANSFER|SYSTEM|
+TEMPERATURE|TIE|TIME POINTS|TRANSFORM|TRANSPORT VELOCITY|USER SUBROUTINES|VISCO|SURFACE SMOOTHING|MOTION|
+CONTACT DAMPING|FASTENER|CONNECTOR SECTION|CONNECTOR BEHAVIOR|BEAM SECTION|RELEASE""".replace(
+        "\n", ""
+    ).split("|")
+)
+# Ignoring these would give a different tire.
+_REFUSED = {
+    "NMAP": "nodes are read as they are given, moved by no map: write their places out",
+    "IMPERFECTION": "nodes are read as they are given, without imperfections: write their places out",
+}
+
 
 @dataclass
 class _Skin:
@@ -95,7 +119,8 @@ class _Skin:
 
     @property
     def middle(self) -> float:
-        """Of a shell, along the normal from its nodes: OFFSET= is a share of the thickness, towards them."""
+        """The middle surface of a shell lies so far along the normal from its nodes: OFFSET= is a share of the
+        thickness, towards them."""
         offset = self.card.options.get("OFFSET", "").upper() if self.shell else ""
         share = _OFFSETS[offset] if offset in _OFFSETS else number(offset, self.card.place)
         return -share * self._thickness
@@ -227,7 +252,8 @@ class SectionReader:
         return name, line
 
     def complete(self, elements: np.ndarray) -> None:
-        """Once all elements (labels, ascending) are known: those of *REBAR, and what carries its sections."""
+        """Called when all element labels (ascending) are known: resolves references of *REBAR and the elements that
+        carry them."""
         scopes: dict[str, list[int]] = {}
         for scope, part in self._sets.parts.items():
             scopes.setdefault(part, []).append(scope)
@@ -342,31 +368,6 @@ class SectionReader:
         yield from (f"{count} {name}" for name, count in counts.items() if count)
 
 
-# Keywords that describe an analysis and not the tire; all others not handled are reported as
-# unknown.
-_ANALYSIS = frozenset(
-    """AMPLITUDE|ANALYTICAL SURFACE|ASSEMBLY|BOUNDARY|CHANGE FRICTION|CONSTRAINT CONTROLS|CONTACT|
-CONTACT PAIR|CONTROLS|CLOAD|CONTACT CONTROLS|CONTACT INCLUSIONS|CONTACT OUTPUT|CONTACT PRINT|CONTACT FILE|
-CONTACT PROPERTY ASSIGNMENT|CONTACT INITIALIZATION DATA|COUPLING|DISTRIBUTING|KINEMATIC|DISTRIBUTION|
-DISTRIBUTION TABLE|DLOAD|DSLOAD|DYNAMIC|EL FILE|EL PRINT|ELEMENT OUTPUT|END ASSEMBLY|END INSTANCE|END PART|
-END STEP|ENERGY PRINT|EQUATION|FILE FORMAT|FILM|FIELD|FILTER|FLUID BEHAVIOR|FLUID CAVITY|FLUID DENSITY|
-FLUID INFLATOR|FREQUENCY|FRICTION|GAP|HEADING|HOURGLASS STIFFNESS|IMPORT|INITIAL CONDITIONS|
-INTEGRATED OUTPUT|MASS|MASS SCALING|MODEL CHANGE|MONITOR|MPC|NODE FILE|NODE OUTPUT|NODE PRINT|OUTPUT|
-PARAMETER|PERTURBATION|PHYSICAL CONSTANTS|PREPRINT|PRE-TENSION SECTION|PRINT|RADIATION|RESTART|
-RIGID SURFACE|ROTARY INERTIA|SECTION CONTROLS|SPRING|STATIC|STEADY STATE DYNAMICS|STEADY STATE TRANSPORT|
-STEP|SURFACE BEHAVIOR|SURFACE INTERACTION|SYMMETRIC MODEL GENERATION|SYMMETRIC RESULTS TRANSFER|SYSTEM|
-TEMPERATURE|TIE|TIME POINTS|TRANSFORM|TRANSPORT VELOCITY|USER SUBROUTINES|VISCO|SURFACE SMOOTHING|MOTION|
-CONTACT DAMPING|FASTENER|CONNECTOR SECTION|CONNECTOR BEHAVIOR|BEAM SECTION|RELEASE""".replace(
-        "\n", ""
-    ).split("|")
-)
-# Ignoring these would give a different tire.
-_REFUSED = {
-    "NMAP": "nodes are read as they are given, moved by no map: write their places out",
-    "IMPERFECTION": "nodes are read as they are given, without imperfections: write their places out",
-}
-
-
 def read(path: Path) -> Deck:
     """The deck in a file. Raises InputError with file and line for errors in it."""
     reader = _Reader(path)
@@ -380,7 +381,7 @@ def read(path: Path) -> Deck:
 
 @dataclass
 class _Part:
-    """What a *PART holds, read once for each of its instances, and their scopes."""
+    """The content of a *PART, read once for each of its instances, and their scopes."""
 
     name: str
     place: Place
@@ -509,7 +510,9 @@ class _Reader:
                 self.handlers[card.keyword](card, lines, self.scope)
         part.instances.append(self.scope)
         part.orientations |= {
-            name: one for name, one in self.sections.orientations.items() if name not in before
+            name: orientation
+            for name, orientation in self.sections.orientations.items()
+            if name not in before
         }
         self.system = None
 

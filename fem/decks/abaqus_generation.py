@@ -1,8 +1,6 @@
-"""Nodes, elements, sets and surfaces of an Abaqus deck, given or generated.
+"""Nodes, elements, sets and surfaces of an Abaqus deck, listed or generated.
 
-Nodes and elements that an Abaqus deck generates: *NGEN, *NFILL, *NCOPY, *ELGEN, *ELCOPY.
-
-As in Abaqus a keyword sees the nodes, elements and sets defined before it. Source: the Keywords
+*NGEN, *NFILL, *NCOPY, *ELGEN and *ELCOPY generate nodes and elements. As in Abaqus a keyword sees the nodes, elements and sets defined before it. Source: the Keywords
 Reference, and "Node definition" and "Element definition" in the Analysis User's Guide.
 """
 
@@ -37,21 +35,26 @@ from tireroad.fem.decks.deck import (
 from tireroad.fem.errors import InputError
 
 _FACE = re.compile(r"S([1-6])")
+_FACES = 16  # more than the faces of an element
+_NAME = re.compile(r"[^\d\s+.-]")  # marks a field as the name of a set, not a number
+_FEW = 64  # blocks searched one by one; more are merged first
+_APART = 1e-9  # of the deck's size: tolerance for a node defined again at the same place
+_SAME = 1e-6  # of a radius: tolerance for the two ends of an arc
+MOST = 10**7  # limit of generated nodes and elements per deck
+Line = tuple[Place, list[str]]
 
 
 def _among(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Which rows (k, 2) of `first` are rows of `second`."""
+    """Mask of the rows (k, 2) of `first` that are rows of `second`."""
     one, other = (rows[:, 0] * _FACES + rows[:, 1] for rows in (first, second))
     return np.isin(one, other)
 
 
-_FACES = 16  # more than the faces of an element
 _COMBINED = {
     "UNION": lambda first, second: np.concatenate([first, second]),
     "INTERSECTION": lambda first, second: first[_among(first, second)],
     "DIFFERENCE": lambda first, second: first[~_among(first, second)],
 }
-_NAME = re.compile(r"[^\d\s+.-]")  # marks a field as the name of a set, not a number
 
 
 def data_lines(lines: list[Data]) -> Iterator[tuple[Place, list[str]]]:
@@ -84,7 +87,7 @@ class _Combination:
 
 @dataclass(frozen=True)
 class _Within:
-    """What of a surface belongs to the scope of an instance."""
+    """The part of a surface that belongs to the scope of an instance."""
 
     surface: str
     scope: int
@@ -196,7 +199,7 @@ class SetReader:
             members.labels.append(found + offset)
 
     def _asked(self, card: Card, name: str, scope: int) -> str:
-        """What a data line names; INSTANCE= looks for it in that instance."""
+        """The set or label that a data line names; INSTANCE= looks for it in that instance."""
         instance = card.options.get("INSTANCE", "").upper()
         plain = name.strip("\"'")
         return self.name(f"{instance}.{plain}" if instance in self.scopes else plain, scope)
@@ -346,7 +349,7 @@ class InstancePlacement:
 
     @classmethod
     def read(cls, lines: list[Data]) -> InstancePlacement | None:
-        """Of the data lines of *INSTANCE: a shift, then two points of a line and degrees."""
+        """Read the data lines of *INSTANCE: a shift, then two points of a line and degrees."""
         table = [
             (place, [number(part, place) for part in parts]) for place, parts in data_lines(lines)
         ]
@@ -390,10 +393,6 @@ class InstancePlacement:
         """Whether a section in the plane z = 0 is seen from behind afterwards."""
         x, y = turned(np.eye(3)[:2], self.axis, self.angle)
         return bool(x[0] * y[1] - x[1] * y[0] < 0)
-
-
-_FEW = 64  # blocks searched one by one; more are merged first
-_APART = 1e-9  # of the deck's size: tolerance for a node defined again at the same place
 
 
 class KnownNodes:
@@ -531,9 +530,6 @@ class KnownElements:
             raise block.place.error(f"element {again[0] % SCOPE} is defined twice")
 
 
-_SAME = 1e-6  # of a radius: tolerance for the two ends of an arc
-
-
 def along_line(first: np.ndarray, last: np.ndarray, share: np.ndarray) -> np.ndarray:
     """Points (..., k, 3) at fractions (k,) of the way from `first` to `last`."""
     return first + share[:, None] * (last - first)
@@ -601,11 +597,6 @@ def _unit(direction: np.ndarray, card: Card) -> np.ndarray:
     if not length > 0:
         raise card.place.error("*NCOPY: its points give no line or plane")
     return direction / length
-
-
-MOST = 10**7  # limit of generated nodes and elements per deck
-
-Line = tuple[Place, list[str]]
 
 
 class Generator:
@@ -729,8 +720,8 @@ class Generator:
         if one is None:
             self._sets.add_elements(card, np.empty(0, np.int64), scope)
             return
-        made = master + elements[1:], one.nodes + nodes[1:, None]
-        self._elements.add(CardBlock(one.type, one.kind, *made, place))
+        arguments = master + elements[1:], one.nodes + nodes[1:, None]
+        self._elements.add(CardBlock(one.type, one.kind, *arguments, place))
         self._sets.add_elements(card, master + elements, scope)
 
     def _elcopy(self, card: Card, lines: list[Data], scope: int) -> None:

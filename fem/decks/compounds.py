@@ -16,6 +16,11 @@ from tireroad.fem.sections.construction import RADII
 from tireroad.fem.tire.material import DYNAMIC_FREQUENCY, MATERIALS, Spectrum, prony
 
 _SMALLEST, _LARGEST = RADII
+_STIFF = 0.4999  # Poisson's ratio from which on a neo-Hookean law is taken for incompressible
+INCOMPRESSIBLE = 0.49  # Poisson's ratio in place of 1/2: changes modes by under 0.3 %
+_MODULUS = (1e4, 1e12)  # Pa; range of any material in a tire
+_DENSITY = (100.0, 2e4)  # kg/m3
+_TESTED = {"polynomial": {1: "mooney-rivlin", 2: "polynomial"}}
 
 
 @dataclass(frozen=True)
@@ -65,7 +70,7 @@ class Series:
 
 
 def _series(parts: dict, notes: list[str]) -> Series:
-    """Of a *VISCOELASTIC, TIME=PRONY; without one nothing is lost."""
+    """The Prony series of a *VISCOELASTIC, TIME=PRONY; without one no energy is lost."""
     if "VISCOELASTIC" not in parts:
         return Series()
     given, table, place = parts["VISCOELASTIC"]
@@ -83,12 +88,6 @@ def _series(parts: dict, notes: list[str]) -> Series:
         f"loss factor {loss:.3g}; modes have those at their own frequencies ({place})"
     )
     return Series(1 - share.sum(), 1 - of_bulk.sum(), dynamic, loss, spectrum)
-
-
-_STIFF = 0.4999  # Poisson's ratio from which on a neo-Hookean law is taken for incompressible
-INCOMPRESSIBLE = 0.49  # Poisson's ratio in place of 1/2: changes modes by under 0.3 %
-_MODULUS = (1e4, 1e12)  # Pa; range of any material in a tire
-_DENSITY = (100.0, 2e4)  # kg/m3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -218,7 +217,7 @@ def rubber(compound: DeckCompound, units: Units) -> Rubber:
 
 
 def _by_fit(law: _Law) -> str:
-    """What is added to an error of constants that the deck does not state."""
+    """The addition to an error whose constants the deck does not state: they were fitted."""
     if law.fit is None:
         return ""
     tests = " and ".join(f"*{curve.test}" for curve in law.fit.curves)
@@ -309,9 +308,6 @@ def _simplest(values: dict[str, float], bulk: float, place: Place, compound: Dec
         f"material {compound.name}: polynomials in both invariants are read to N=2, in I1 alone to N=6; give "
         f'[[tire.region]] name = "{compound.name}" a material of one of these'
     )
-
-
-_TESTED = {"polynomial": {1: "mooney-rivlin", 2: "polynomial"}}
 
 
 def _tested(form: str, order: int, parts: dict, compound: DeckCompound, notes: list[str]) -> _Law:

@@ -26,6 +26,37 @@ _COMMENT = re.compile(rb"^[ \t]*\*\*[^\n]*", re.MULTILINE)
 _KEYWORD = re.compile(rb"^[ \t]*\*(?:[^\n]*,[ \t]*\n)*[^\n]*", re.MULTILINE)
 _SPLIT = re.compile(r'(?:^|,)((?:[^,"]|"[^"]*"?)*)')
 
+# Fortran writes 1.0D-3; commas and tabs are separators only.
+_CLEAN = bytes.maketrans(b",\tDd", b"  ee")
+_EMPTY_FIELD = re.compile(rb",[ \t]*(?=,)|,[ \t]*$", re.MULTILINE)
+LABEL = 10**9  # the largest label of a node or element
+LABELS = "whole numbers up to 1,000,000,000 are read, as Abaqus allows: renumber the mesh"
+_TRIANGLE = ((0, 1), (1, 2), (2, 0))
+_QUAD = ((0, 1), (1, 2), (2, 3), (3, 0))
+_WEDGE = ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0))
+_HEXAHEDRON = (
+    (0, 1, 2, 3),
+    (4, 7, 6, 5),
+    (0, 4, 5, 1),
+    (1, 5, 6, 2),
+    (2, 6, 7, 3),
+    (3, 7, 4, 0),
+)
+
+# H hybrid, R reduced, I incompatible modes, T coupled temperature, M modified: the program has its
+# own integration rules and ignores these.
+_FAMILIES = (
+    (re.compile(r"(?:CGAX|CAX)([3468])[RHIMT]*"), "solid", 2),
+    (re.compile(r"C3D(4|6|8|10|15|20|27)[RHIMST]*"), "solid", 3),
+    (re.compile(r"(?:SFMGAX|SFMAX|MGAX|MAX)([12])[RHT]*"), "membrane", 2),
+    (re.compile(r"(?:SFM3D|M3D)([34689])[R]*"), "membrane", 3),
+    (re.compile(r"SAX([12])T?"), "shell", 2),
+    (re.compile(r"S([34689])R?[5ST]?W?"), "shell", 3),
+)
+ALL_FACES = -1  # in a surface, of a solid element: its faces on the boundary
+BOTH_SIDES = -2  # in a surface, of a membrane: where it lies
+SCOPE = 10**10  # labels are offset by SCOPE * number of their part
+
 
 @dataclass(frozen=True)
 class Place:
@@ -206,13 +237,6 @@ def _beside(name: str, place: Place, reading: _Reading) -> Path:
     if not path.is_file():
         raise place.error(f"the included file {name} is not there ({path})")
     return path
-
-
-# Fortran writes 1.0D-3; commas and tabs are separators only.
-_CLEAN = bytes.maketrans(b",\tDd", b"  ee")
-_EMPTY_FIELD = re.compile(rb",[ \t]*(?=,)|,[ \t]*$", re.MULTILINE)
-LABEL = 10**9  # the largest label of a node or element
-LABELS = "whole numbers up to 1,000,000,000 are read, as Abaqus allows: renumber the mesh"
 
 
 def rows(data: list[Data], width: int, least: int = 1) -> np.ndarray:
@@ -407,28 +431,6 @@ class ElementShape:
         return _REFLECTED[self]
 
 
-_TRIANGLE = ((0, 1), (1, 2), (2, 0))
-_QUAD = ((0, 1), (1, 2), (2, 3), (3, 0))
-_WEDGE = ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0))
-_HEXAHEDRON = (
-    (0, 1, 2, 3),
-    (4, 7, 6, 5),
-    (0, 4, 5, 1),
-    (1, 5, 6, 2),
-    (2, 6, 7, 3),
-    (3, 7, 4, 0),
-)
-
-# H hybrid, R reduced, I incompatible modes, T coupled temperature, M modified: the program has its
-# own integration rules and ignores these.
-_FAMILIES = (
-    (re.compile(r"(?:CGAX|CAX)([3468])[RHIMT]*"), "solid", 2),
-    (re.compile(r"C3D(4|6|8|10|15|20|27)[RHIMST]*"), "solid", 3),
-    (re.compile(r"(?:SFMGAX|SFMAX|MGAX|MAX)([12])[RHT]*"), "membrane", 2),
-    (re.compile(r"(?:SFM3D|M3D)([34689])[R]*"), "membrane", 3),
-    (re.compile(r"SAX([12])T?"), "shell", 2),
-    (re.compile(r"S([34689])R?[5ST]?W?"), "shell", 3),
-)
 _SOLIDS = {
     (2, 3): ElementShape("solid", 2, 3, 3, _TRIANGLE),
     (2, 4): ElementShape("solid", 2, 4, 4, _QUAD),
@@ -499,10 +501,6 @@ class CardBlock:
     def rows(self, rows: list[int] | np.ndarray) -> CardBlock:
         """The given rows of the block."""
         return CardBlock(self.type, self.kind, self.labels[rows], self.nodes[rows], self.place)
-
-
-ALL_FACES = -1  # in a surface, of a solid element: its faces on the boundary
-BOTH_SIDES = -2  # in a surface, of a membrane: where it lies
 
 
 @dataclass
@@ -710,7 +708,7 @@ class Deck:
         """Pairs (k, 2) of rows that are nearer to each other than `tolerance`, among `nodes`."""
         from scipy.spatial import cKDTree
 
-        used = np.unique(np.concatenate([np.empty(0, np.int64), *(one.ravel() for one in nodes)]))
+        used = np.unique(np.concatenate([np.empty(0, np.int64), *(node.ravel() for node in nodes)]))
         tree = cKDTree(self.points[used])
         return used[tree.query_pairs(tolerance, p=np.inf, output_type="ndarray")].reshape(-1, 2)
 
@@ -753,6 +751,3 @@ def first_of(pairs: np.ndarray, count: int) -> np.ndarray:
     _, group = connected_components(links, directed=False)
     _, first = np.unique(group, return_index=True)
     return first[group]
-
-
-SCOPE = 10**10  # labels are offset by SCOPE * number of their part

@@ -1,8 +1,6 @@
-"""Membranes with cords in a section: where they lie, and the cells split along them.
+"""Membranes with cords are embedded in a section: its cells are split along them, and each becomes a ply.
 
-The cords of a deck on the sides of a section's cells: course, angle and data of each ply.
-
-In an axisymmetric membrane Abaqus measures the cord angle a from the meridian, the direction t from
+A ply has a course along sides of cells, the angle of its cords, and their data. In an axisymmetric membrane Abaqus measures the cord angle a from the meridian, the direction t from
 the element's first node to its second, positive about the normal, which is t rotated by 90 degrees
 in the (r, z) plane: the cord lies along cos a t + sin a e_theta, e_theta right-handed about z. At
 the lowest point e_theta is -x, so relative to a chain that runs along s t (s = 1 or -1) the cord
@@ -35,6 +33,13 @@ from tireroad.fem.decks.quads import (
 from tireroad.fem.errors import InputError
 
 _NEWTON = 12
+Marks = dict[int, float]  # by a side's middle node: position of its cut from its lower end node
+SNAP = 0.01  # of a cell: tolerance within which a point lies on a node or side
+# A line that ends nearer than this to a side ends on it: a cell of a hundredth of its neighbours'
+# length left no correct digits in the modes (relative residual 0.6), one of a twentieth does not.
+_SNAP_END = 0.05
+_WITHIN = 1e-3  # of an element of the line: from its end to where its last cell is looked for
+_LEAST_ANGLE = 0.1  # sine between a line and a side; below it the line runs along the side
 
 
 def rate(t: np.ndarray) -> np.ndarray:
@@ -94,9 +99,6 @@ def locate(quads: Quads, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np
     for into, value in zip(found, (cells, where, beyond), strict=True):
         into[there] = value[best]
     return found
-
-
-Marks = dict[int, float]  # by a side's middle node: position of its cut from its lower end node
 
 
 class Origins:
@@ -191,15 +193,15 @@ def _closed(
 
 def _cut_sides(quads: Quads, marks: Marks, points: list) -> dict[int, tuple]:
     """New points of each cut side from its lower end: first middle, cut, second middle."""
-    found = {}
+    cut_sides = {}
     sides = {int(side[1]): side for side in quads.sides().reshape(-1, 3)}
     for middle, t in marks.items():
         side = sides[middle]
         low_first = side if side[0] < side[2] else side[::-1]
         new = shape(np.array([t / 2, t, (1 + t) / 2])) @ quads.points[low_first]
-        found[middle] = tuple(range(len(points), len(points) + 3))
+        cut_sides[middle] = tuple(range(len(points), len(points) + 3))
         points.extend(new)
-    return found
+    return cut_sides
 
 
 def _halves(
@@ -241,14 +243,6 @@ def _tidy(quads: Quads) -> Quads:
     """Remove nodes that no cell uses any more."""
     used, cells = np.unique(quads.cells, return_inverse=True)
     return replace(quads, points=quads.points[used], cells=cells.reshape(quads.cells.shape))
-
-
-SNAP = 0.01  # of a cell: tolerance within which a point lies on a node or side
-# A line that ends nearer than this to a side ends on it: a cell of a hundredth of its neighbours'
-# length left no correct digits in the modes (relative residual 0.6), one of a twentieth does not.
-_SNAP_END = 0.05
-_WITHIN = 1e-3  # of an element of the line: from its end to where its last cell is looked for
-_LEAST_ANGLE = 0.1  # sine between a line and a side; below it the line runs along the side
 
 
 @dataclass(frozen=True)
@@ -351,7 +345,7 @@ def _stations(quads: Quads, line: HostedLine, reach: tuple[float, float]) -> lis
     _, first = np.unique(sides[:, 1], return_index=True)
     sides = sides[first]
     low = np.where((sides[:, 0] < sides[:, 2])[:, None], sides, sides[:, ::-1])
-    found: dict[tuple, _Station] = {}
+    stations: dict[tuple, _Station] = {}
     for number, s in _candidates(quads.points[low], line):
         hit = _meet(quads.points[low[number]], line, s)
         if hit is None or not reach[0] <= hit[1] <= reach[1]:
@@ -359,8 +353,8 @@ def _stations(quads: Quads, line: HostedLine, reach: tuple[float, float]) -> lis
         t, s = hit
         node = low[number, 0] if t < SNAP else low[number, 2] if t > 1 - SNAP else -1
         station = _Station(s, int(node), int(low[number, 1]), t)
-        found.setdefault(("node", node) if node >= 0 else ("side", station.side), station)
-    return sorted(found.values(), key=lambda one: one.s)
+        stations.setdefault(("node", node) if node >= 0 else ("side", station.side), station)
+    return sorted(stations.values(), key=lambda one: one.s)
 
 
 def _candidates(sides: np.ndarray, line: HostedLine) -> Iterator[tuple[int, float]]:
@@ -695,7 +689,7 @@ def _embed(
 
 
 def _turned(ends: np.ndarray) -> np.ndarray:
-    """Which elements of an ordered chain run against it."""
+    """Mask of the elements of an ordered chain that run against it."""
     if len(ends) == 1:
         return np.zeros(1, bool)
     turned = np.empty(len(ends), bool)

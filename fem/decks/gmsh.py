@@ -58,6 +58,8 @@ FACES = {2: ("M3D3", 3), 3: ("M3D4", 4), 9: ("M3D6", 6), 10: ("M3D9", 9), 16: ("
 
 LARGEST = 1 << 29  # bytes
 _BEGIN = re.compile(rb"^\$([A-Za-z]+)[ \t\r]*\n", re.MULTILINE)
+Elements = list[tuple[int, tuple[int, ...], int, np.ndarray]]  # type, physical groups, label, nodes
+Groups = dict[tuple[int, int], tuple[int, ...]]  # (dimension, entity) -> its physical groups
 
 
 @dataclass(frozen=True)
@@ -185,7 +187,6 @@ class BinaryNumbers(_Numbers):
 
 
 Numbers = TextNumbers | BinaryNumbers
-Elements = list[tuple[int, tuple[int, ...], int, np.ndarray]]  # type, physical groups, label, nodes
 
 
 def read(path: Path) -> Deck:
@@ -245,9 +246,6 @@ def _names(part: Part | None) -> dict[tuple[int, int], str]:
         except (ValueError, IndexError):
             raise part.line(offset).error('a physical name is: dimension number "name"') from None
     return names
-
-
-Groups = dict[tuple[int, int], tuple[int, ...]]  # (dimension, entity) -> its physical groups
 
 
 def _entities(numbers: Numbers) -> Groups:
@@ -400,7 +398,7 @@ def _deck(
         raise InputError(f"{path.name}: a section must lie in z = 0, x from the axle, y along it")
     if names and not any(group for _, group, *_ in elements):
         raise part.place.error(
-            "the file names physical groups and none of its elements is in one: it was saved with Mesh.SaveAll = 1, "
+            "the file defines physical groups, but no element belongs to one: it was saved with Mesh.SaveAll = 1, "
             "which in format 2.2 loses them. Save with Mesh.SaveAll = 0, or in format 4.1 (gmsh -format msh41)"
         )
     blocks, sets, surfaces = _groups(elements, dimension, names, part)
@@ -421,11 +419,11 @@ def _deck(
 
 def _renumbered(labels: np.ndarray, elements: Elements, part: Part) -> tuple[np.ndarray, Elements]:
     """Nodes and elements numbered from 1, where labels are larger than this program's."""
-    nodes = np.concatenate([one[3] for one in elements])
+    nodes = np.concatenate([element[3] for element in elements])
     at = np.minimum(np.searchsorted(labels, nodes), len(labels) - 1)
     if (labels[at] != nodes).any():
         raise part.place.error(f"node {nodes[labels[at] != nodes][0]} of an element is not there")
-    split = np.split(at + 1, np.cumsum([len(one[3]) for one in elements])[:-1])
+    split = np.split(at + 1, np.cumsum([len(element[3]) for element in elements])[:-1])
     renumbered = [
         (sort, groups, k, own)
         for k, ((sort, groups, *_), own) in enumerate(zip(elements, split, strict=True), 1)

@@ -1,4 +1,4 @@
-"""What the steps of a deck do with the tire: revolve, inflate, load and roll it, as far as a scene has keys for it."""
+"""The steps of a deck revolve, inflate, load and roll its tire: they are read as far as a scene has keys for it."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ from pathlib import Path
 from tireroad.fem.decks.abaqus_generation import data_lines
 from tireroad.fem.decks.deck import Card, Data, cards, number
 from tireroad.fem.errors import InputError
+
+_Table = list[list[str]]
+_Values = list[list[float | None]]
 
 
 @dataclass
@@ -31,7 +34,7 @@ class DeckHistory:
 
 
 def history(path: Path) -> DeckHistory:
-    """What the keywords of a deck say; unreadable numbers among them are left out. InputError for no deck."""
+    """Read the history of a deck from its keywords; unreadable numbers among them are left out. InputError for no deck."""
     found = DeckHistory()
     card: Card | None = None
     lines: list[Data] = []
@@ -64,10 +67,6 @@ def _number(text: str, card: Card) -> float | None:
         return number(text, card.place) if text else None
     except InputError:
         return None
-
-
-_Table = list[list[str]]
-_Values = list[list[float | None]]
 
 
 def _revolve(found: DeckHistory, card: Card, _: _Table, values: _Values) -> None:

@@ -19,6 +19,9 @@ from tireroad.fem.errors import InputError
 SIDE_NODES = np.array([[0, 1, 2], [6, 7, 8], [0, 3, 6], [2, 5, 8]])
 SIDE_OF_FACE = np.array([2, 1, 3, 0])  # faces S1 to S4 of a quadrilateral
 TENSOR = np.array([0, 7, 3, 4, 8, 6, 1, 5, 2])  # corners 0-3, middles 4-7, centre 8 in tensor order
+_MOST = 50_000  # elements of a section
+_BASE = 0.15  # of the inner face's length: a longer gap between it and the rim is an error
+_CLOSE = 1e-4  # of the section's size: tolerance for nodes on the centre plane
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -193,9 +196,6 @@ def _six(area: np.ndarray) -> np.ndarray:
     corner = area * (2 * area - 1)
     edge = 4 * area * np.roll(area, -1, axis=1)
     return np.concatenate([corner, edge], axis=1)
-
-
-_MOST = 50_000  # elements of a section
 
 
 @dataclass(frozen=True)
@@ -440,9 +440,6 @@ def faces(
     return Faces(outer, tread, inner, rim, tuple(notes))
 
 
-_BASE = 0.15  # of the inner face's length: a longer gap between it and the rim is an error
-
-
 def _closed(
     quads: Quads, inner: np.ndarray, rim: np.ndarray, lines: list[np.ndarray]
 ) -> tuple[np.ndarray, int]:
@@ -513,11 +510,8 @@ def one_body(quads: Quads, name: Callable[[int], str]) -> None:
         )
 
 
-_CLOSE = 1e-4  # of the section's size: tolerance for nodes on the centre plane
-
-
 def on_centre(quads: Quads) -> np.ndarray:
-    """Which points lie on the plane z = 0."""
+    """Mask of the points that lie on the plane z = 0."""
     return np.abs(quads.points[:, 1]) < _CLOSE * np.ptp(quads.points, axis=0).max()
 
 

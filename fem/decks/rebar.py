@@ -207,7 +207,7 @@ class _Lines:
         return self._deck.element_sets.labels(name, layer.place)
 
     def _shift(self, number: int) -> int:
-        """What the labels of new membranes have more than those of their elements."""
+        """The offset of the labels of new membranes from those of their elements."""
         every = [int(block.labels.max(initial=0)) for block in self._deck.blocks]
         return number * SCOPE * (1 + max(every, default=0) // SCOPE)
 
@@ -286,7 +286,8 @@ class _Lines:
 
 
 def _joined(points: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
-    """Points (m, 3) of which none are nearer than a tolerance, and of which (k,) each given one is."""
+    """Merge points closer than a tolerance: distinct points (m, 3), and for each input point the index (k,) of
+    its distinct point."""
     from scipy.spatial import cKDTree
 
     pairs = cKDTree(points).query_pairs(tolerance, output_type="ndarray").reshape(-1, 2)

@@ -1,16 +1,15 @@
-"""Reduction of three-dimensional decks that are bodies of revolution to their section.
-
-Cord angles in three-dimensional membranes, converted to angles from the section's meridian.
-
-In a membrane the angle is measured from the local first direction 1 about the normal n: the cord
-lies along cos a e_1 + sin a (n x e_1). Two systems are the same at every angle around: the default
-one if x is the axle, where e_1 is the projection of global x (the meridian m towards larger x), and
-a cylindrical one about the axle with its first axis as normal, where e_1 is e_theta. With n x m = s
-e_theta, s = 1 or -1, the angle from m towards e_theta is s a in the first; in the second, as n x
-e_theta = -s m, it is atan2(cos a, -s sin a).
+"""Three-dimensional decks of bodies of revolution are reduced to their section.
 
 The program's rolling states require a body whose undeformed shape is the same at every angle; any
 other body is refused, with the reason.
+
+Cord angles become angles from the section's meridian. In a membrane the angle is measured from the
+local first direction 1 about the normal n: the cord lies along cos a e_1 + sin a (n x e_1). Two
+systems are the same at every angle around: the default one if x is the axle, where e_1 is the
+projection of global x (the meridian m towards larger x), and a cylindrical one about the axle with
+its first axis as normal, where e_1 is e_theta. With n x m = s e_theta, s = 1 or -1, the angle from m
+towards e_theta is s a in the first; in the second, as n x e_theta = -s m, it is
+atan2(cos a, -s sin a).
 """
 
 from __future__ import annotations
@@ -33,6 +32,7 @@ from tireroad.fem.decks.deck import (
 from tireroad.fem.errors import InputError
 
 _SAME = 1e-6  # of the body's size (positions) or of a radian (angles): tolerance for equality
+_NODES = 2_000_000
 
 
 @dataclass(frozen=True)
@@ -172,9 +172,6 @@ def _from_circumference(deck: Deck, layer: CordLayer, axis: int) -> int:
     return 1 if line[axis] > 0 else -1
 
 
-_NODES = 2_000_000
-
-
 @dataclass
 class _Section:
     """The section so far: the section element of each solid and membrane (`owner`), the corners of
@@ -255,11 +252,13 @@ def _sections(deck: Deck, block: CardBlock, rows: np.ndarray, section: _Section)
             section.corners[label] = nodes[: len(shape.faces[face])]
         section.owner[label] = seen[key]
         section.faces[label] = [frozenset(ring[list(f)].tolist()) for f in shape.faces]
-    made = []
+    sections = []
     for size, those in cells.items():
         own, corners = np.array([c[0] for c in those]), np.array([c[1] for c in those]) + 1
-        made.append(CardBlock(f"CGAX{size}", used_kind(f"CGAX{size}"), own, corners, block.place))
-    return made
+        sections.append(
+            CardBlock(f"CGAX{size}", used_kind(f"CGAX{size}"), own, corners, block.place)
+        )
+    return sections
 
 
 def _cell(ring: np.ndarray, face: tuple, middle: dict, rings: Rings) -> list[int]:

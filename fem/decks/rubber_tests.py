@@ -207,7 +207,7 @@ def _ogden(points: _Points, order: int) -> _Found:
     given = np.array([2.0, -2.0, 5.0, -4.0, 8.0, -6.0])
     starts = [given[:order], 0.5 * given[:order], -given[:order], 1.0 + np.arange(order)]
     results = [least_squares(off, start, bounds=(-9, 12)) for start in starts]
-    powers = min(results, key=lambda one: one.cost).x
+    powers = min(results, key=lambda result: result.cost).x
     powers[np.abs(powers) <= 1e-3] = 1e-3
     moduli = _linear(columns(points, powers), points.stress)
     values = {"moduli": tuple(moduli.tolist()), "powers": tuple(powers.tolist())}

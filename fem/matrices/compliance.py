@@ -39,6 +39,11 @@ _CHUNK = 64  # right-hand sides per solve: enough for BLAS 3 in MUMPS, little me
 RESIDUAL_TOLERANCE = 1e-8
 _SUMS = 4  # random sums that check a block; checking every column took as long as the solves
 
+# Of the norm of M^-1/2 K M^-1/2: stiffnesses nearer to zero are none, rounding is 1e-16. The modes
+# and the static shapes of a tire must agree on it.
+RIGID = 1e-12
+_PASSES = 8  # each reduces what is out of balance at least a thousandfold where motions are rigid
+
 
 def solve_all(matrix: PETSc.Mat, loads: sparse.spmatrix) -> np.ndarray:
     """Own rows (n, p) of matrix^-1 loads by one factorisation. Collective."""
@@ -132,12 +137,6 @@ def _dense(columns: np.ndarray, comm: PETSc.Comm) -> PETSc.Mat:
     rows, count = columns.shape
     sizes = ((rows, PETSc.DETERMINE), (PETSc.DECIDE, count))
     return PETSc.Mat().createDense(sizes, array=np.asfortranarray(columns), comm=comm)
-
-
-# Of the norm of M^-1/2 K M^-1/2: stiffnesses nearer to zero are none, rounding is 1e-16. The modes
-# and the static shapes of a tire must agree on it.
-RIGID = 1e-12
-_PASSES = 8  # each reduces what is out of balance at least a thousandfold where motions are rigid
 
 
 def rigid_space(operators: Operators) -> np.ndarray:

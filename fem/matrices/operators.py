@@ -40,6 +40,10 @@ from tireroad.fem.tire.material import Kind
 from tireroad.fem.wheel import Axle
 
 TURN = 3  # components 3, 4, 5 of an unknown: rotations about x, y, z
+ROTATION = ("gyroscopic", "convective", "body", "body_convective")
+TRANSLATIONS = slice(0, 3)
+# The factors of 2 Omega and of Omega^2, by the inertia of rotation.
+FELT = {"full": ("gyroscopic", "convective"), "doppler": ("body", "body_convective")}
 
 
 @dataclass(frozen=True)
@@ -220,9 +224,6 @@ def rigid_motions(points: np.ndarray) -> np.ndarray:
     return out.reshape(-1, 6)
 
 
-ROTATION = ("gyroscopic", "convective", "body", "body_convective")
-
-
 class Rotation:
     """G, S and B of the full inertia and S_B of the doppler one, with Omega factored out.
 
@@ -365,11 +366,6 @@ def _without_zeros(matrix: PETSc.Mat) -> PETSc.Mat:
     own = sparse.csr_matrix((values, indices, indptr), sizes[0])
     own.eliminate_zeros()
     return from_local_rows(own, sizes, comm)
-
-
-TRANSLATIONS = slice(0, 3)
-# The factors of 2 Omega and of Omega^2, by the inertia of rotation.
-FELT = {"full": ("gyroscopic", "convective"), "doppler": ("body", "body_convective")}
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from tireroad.fem.sections.mesh2d import lagrange
 from tireroad.fem.tire.mesh import NodeGrid
 
 _POINTS = 6  # Gauss points per direction in each element under a distributed load
+_STEP = 1e-5  # step of the difference quotient, as a fraction of an element
 
 
 def nodes(index: np.ndarray, count: int, component: int = 2) -> sparse.csr_matrix:
@@ -26,9 +27,6 @@ def along(index: np.ndarray, count: int, vectors: np.ndarray) -> sparse.csr_matr
     rows = np.repeat(np.arange(k), 3)
     columns = (3 * index[:, None] + np.arange(3)).ravel()
     return sparse.csr_matrix((vectors.ravel(), (rows, columns)), shape=(k, 3 * count))
-
-
-_STEP = 1e-5  # step of the difference quotient, as a fraction of an element
 
 
 def spot(

@@ -31,6 +31,8 @@ RADII = 0.1, 2.5  # m, range of the outer radius of a tire
 INFLATION = 2.2e5  # Pa, of a passenger tire whose pressure a file does not give
 _SAMPLES = 4001
 _ARC = 24  # points on each arc
+LEAST = (6, 2)  # elements around and along: minimum for a tire
+_ENDS, _ENDS_DEPTH = 0.06, 0.6  # of the half section: belt-end refinement, as for the torus
 
 
 class Outline:
@@ -93,9 +95,6 @@ def _arc(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
     angle = np.unwrap([np.arctan2(*(p - centre)) for p in (a, b, c)])
     turn = np.linspace(angle[0], angle[2], _ARC)
     return centre + np.linalg.norm(a - centre) * np.stack([np.sin(turn), np.cos(turn)], axis=-1)
-
-
-LEAST = (6, 2)  # elements around and along: minimum for a tire
 
 
 @dataclass(frozen=True)
@@ -274,9 +273,6 @@ class Construction:
             return size
         distance = np.abs(np.abs(s)[:, None] - ends).min(axis=1)
         return size * (1 - _ENDS_DEPTH * np.exp(-((distance / (_ENDS * length)) ** 2)))
-
-
-_ENDS, _ENDS_DEPTH = 0.06, 0.6  # of the half section: belt-end refinement, as for the torus
 
 
 def _named(mesh: SectionMesh, arc: np.ndarray, tread: float, held: float) -> SectionMesh:

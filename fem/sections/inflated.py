@@ -164,7 +164,7 @@ def dofs(nodes: np.ndarray) -> np.ndarray:
 
 
 class LayeredSection(Protocol):
-    """What a ring is made of, as a Construction."""
+    """The section, compounds and cords of a ring, as a Construction gives them."""
 
     @property
     def compounds(self) -> Mapping[str, Mapping[str, Any]]:
@@ -461,7 +461,7 @@ class InflatedRing:
         return sparse.csr_matrix(out)
 
     def _tangent(self, wave: int, pressure: float, dynamic: bool = False) -> sparse.csr_matrix:
-        """Of the present state; `dynamic`: of small motions about the inflated one."""
+        """The tangent of the present state; `dynamic`: of small motions about the inflated one."""
         face, u = InnerFace(self.section, self.displacement), self.displacement
         if dynamic:
             excess = (self._dynamic - 1)[:, None, None, None]

@@ -20,6 +20,24 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Limits
 
 SIDES = ("xi = 0", "xi = 1", "eta = 0", "eta = 1")
+Position = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+_SAME = 1e-9  # of the section's size: nodes closer than this coincide
+_GAUSS = 4  # points per direction at which the Jacobian is checked, besides the corners
+
+# Largest error in % of nine frequencies (n = 0, 1, 3; three each) of the clamped torus of order 3,
+# exact ring, with 8, 10, 12, 14 and 16 elements along the arc. This grading: 0.82, 0.38, 0.22,
+# 0.16, 0.14; cosine down to 0.3 of the uniform size at the bead: 1.0, 0.56, 0.37, 0.28, 0.22; sizes
+# from a twelfth of the wall: 12, 5.7, 3.4.
+GROWTH = 1.0
+SPARE = 1.3  # largest size over the uniform one
+LEAST = 1.33  # smallest size: wall thicknesses over the number of elements
+_SAMPLES = 2001
+SIZE = Limits(least=0.05, most=1.0)  # of elements at the footprint, relative to that elsewhere
+# (from, to) rad: the footprint's element size holds up to the first, the full size from the second.
+# A deflection of 20 mm reaches 0.35 rad along a ring of 0.32 m and 0.6 rad along a section of 0.1
+# m.
+RING_NEAR = (0.15, 1.2)
+ARC_NEAR = (0.2, 1.2)
 
 
 def equispaced(order: int) -> np.ndarray:
@@ -63,9 +81,6 @@ def grid_points(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """xi and eta (n * n,) of all nodes of an element with the given nodes (n,) on an edge."""
     xi, eta = np.meshgrid(nodes, nodes, indexing="ij")
     return xi.ravel(), eta.ravel()
-
-
-Position = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -192,10 +207,6 @@ def _joined(sides: np.ndarray) -> np.ndarray:
         if edge[0] != before[-1]:
             return np.zeros(0, int)
     return np.append(sides[:, :-1].ravel(), sides[-1, -1])
-
-
-_SAME = 1e-9  # of the section's size: nodes closer than this coincide
-_GAUSS = 4  # points per direction at which the Jacobian is checked, besides the corners
 
 
 def check(mesh: SectionMesh) -> None:
@@ -366,15 +377,6 @@ def _plies(mesh: SectionMesh, count: np.ndarray) -> None:
             raise InputError(f"section: ply {name!r} meets itself")
 
 
-# Largest error in % of nine frequencies (n = 0, 1, 3; three each) of the clamped torus of order 3,
-# exact ring, with 8, 10, 12, 14 and 16 elements along the arc. This grading: 0.82, 0.38, 0.22,
-# 0.16, 0.14; cosine down to 0.3 of the uniform size at the bead: 1.0, 0.56, 0.37, 0.28, 0.22; sizes
-# from a twelfth of the wall: 12, 5.7, 3.4.
-GROWTH = 1.0
-SPARE = 1.3  # largest size over the uniform one
-LEAST = 1.33  # smallest size: wall thicknesses over the number of elements
-
-
 def graded_size(distance: np.ndarray, length: float, count: int, floor: float) -> np.ndarray:
     """Sizes at distances from the nearer of two clamped edges, for `count` elements over a length.
 
@@ -539,9 +541,6 @@ def element_corners(
     return found
 
 
-_SAMPLES = 2001
-
-
 def _cumulative(
     density: Callable[[np.ndarray], np.ndarray], a: float, b: float
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -562,14 +561,6 @@ def _shared_out(count: int, weight: np.ndarray) -> np.ndarray:
         coarse = share / numbers
         numbers[coarse > (1 - 1e-9) * coarse.max()] += 1
     return numbers
-
-
-SIZE = Limits(least=0.05, most=1.0)  # of elements at the footprint, relative to that elsewhere
-# (from, to) rad: the footprint's element size holds up to the first, the full size from the second.
-# A deflection of 20 mm reaches 0.35 rad along a ring of 0.32 m and 0.6 rad along a section of 0.1
-# m.
-RING_NEAR = (0.15, 1.2)
-ARC_NEAR = (0.2, 1.2)
 
 
 def near_road(distance: np.ndarray, footprint_size: float, near: tuple[float, float]) -> np.ndarray:

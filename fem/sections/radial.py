@@ -1,7 +1,4 @@
-"""Sizes of passenger tires like 205/60 R15.
-
-The built-in radial passenger tire, e.g. 205/60 R15; sources: docs/radial-tire.md.
-"""
+"""The built-in radial passenger tire, of a size like 205/60 R15; sources: docs/radial-tire.md."""
 
 from __future__ import annotations
 
@@ -48,6 +45,48 @@ HALF_INCH, _SAME = 0.0127, 1e-6
 THEORETICAL_RIM, _LOW = (0.74, 0.87), 48  # -, %
 WIDENS = 0.4  # section width over rim width, m/m: 5 mm for half an inch (ECE R30)
 OTHER_RIMS = 0.0254  # m, an inch: how much narrower or wider a rim may be than the measuring rim
+STEEL = {"youngs_modulus": 190e9, "area": 0.246e-6, "spacing": 1.25e-3, "density": 7850.0}
+NYLON = {"youngs_modulus": 3e9, "area": 0.33e-6, "spacing": 1.0e-3, "density": 1140.0}
+POLYESTER = {
+    "youngs_modulus": 7e9,
+    "area": 0.35e-6,
+    "spacing": 1.0e-3,
+    "density": 1380.0,
+    "compression": 0.1,
+}
+BELT_ANGLE = np.radians(22)
+
+# E Pa, Poisson's ratio, kg/m3, dynamic over static modulus, loss factor, both at 100 Hz, exponent of the
+# modulus over frequency.  That of the tread is the rubber between its grooves.
+COMPOUNDS = {
+    "tread": (4.4e6, 0.49, 1110.0, 1.8, 0.3, 0.10),
+    "skim": (11.7e6, 0.49, 1200.0, 1.20, 0.2, 0.08),
+    "ply": (7.0e6, 0.49, 1150.0, 1.20, 0.2, 0.08),
+    "sidewall": (8.5e6, 0.49, 1120.0, 1.20, 0.2, 0.08),
+    "apex": (52e6, 0.49, 1200.0, 1.20, 0.2, 0.08),
+    "bead": (400e6, 0.49, 2200.0, 1.0, 0.05, 0.0),
+}
+FLANGE = 0.016  # m above the rim; below it the rim holds the tire
+# How far the flange leads the face outwards: m, and at most this share of the wall's overhang over the rim.
+LEAN = 0.0105, 0.38
+WIDEST = 0.60  # of the section's height
+APEX = 0.5  # of the length from the flange to the widest point
+TREAD = 0.325  # half width of the crown over the section's width, at an aspect ratio of 60 %
+WIDER = 0.25  # by how much that grows for an aspect ratio lower by 1
+CROWN = 0.0704  # drop of the crown at its edge over the section's height
+# Exponent of that drop over the half width, from an aspect ratio of 55 % up; below, it goes with the ratio's inverse:
+# crowns of low sections are flat in the middle and round at their edges.
+ROUND, FLATTER = 2.6, 0.55
+SHOULDER = 0.075, 0.030  # how far out and down the shoulder reaches from there, over the width
+LOWEST = (
+    0.4,
+    0.6,
+)  # largest drop of the crown and of the shoulder over the height above the widest point
+BELT_2 = 0.9  # its width over that of belt 1, which ends at the edge of the crown
+GROOVES, MOST_GROOVES = 4, 8  # around the tread
+GROOVED = "tread"  # the compound that they cut
+GROOVE = 0.07  # width of each over that of the crown: 9.3 mm for 205/60 R15
+LEAST_HEIGHT = 0.057  # m of a section; less leaves no sidewall above the flange
 
 
 @dataclass(frozen=True)
@@ -164,51 +203,6 @@ def size(text: str) -> Size:
         reinforced=bool(re.search(r"\b(XL|EXTRA ?LOAD|REINFORCED)\b", marks)),
         light_truck=bool(found["light"]) or (found["use"] or "").upper() == "LT",
     )
-
-
-STEEL = {"youngs_modulus": 190e9, "area": 0.246e-6, "spacing": 1.25e-3, "density": 7850.0}
-NYLON = {"youngs_modulus": 3e9, "area": 0.33e-6, "spacing": 1.0e-3, "density": 1140.0}
-POLYESTER = {
-    "youngs_modulus": 7e9,
-    "area": 0.35e-6,
-    "spacing": 1.0e-3,
-    "density": 1380.0,
-    "compression": 0.1,
-}
-BELT_ANGLE = np.radians(22)
-
-# E Pa, Poisson's ratio, kg/m3, dynamic over static modulus, loss factor, both at 100 Hz, exponent of the
-# modulus over frequency.  That of the tread is the rubber between its grooves.
-COMPOUNDS = {
-    "tread": (4.4e6, 0.49, 1110.0, 1.8, 0.3, 0.10),
-    "skim": (11.7e6, 0.49, 1200.0, 1.20, 0.2, 0.08),
-    "ply": (7.0e6, 0.49, 1150.0, 1.20, 0.2, 0.08),
-    "sidewall": (8.5e6, 0.49, 1120.0, 1.20, 0.2, 0.08),
-    "apex": (52e6, 0.49, 1200.0, 1.20, 0.2, 0.08),
-    "bead": (400e6, 0.49, 2200.0, 1.0, 0.05, 0.0),
-}
-
-FLANGE = 0.016  # m above the rim; below it the rim holds the tire
-# How far the flange leads the face outwards: m, and at most this share of the wall's overhang over the rim.
-LEAN = 0.0105, 0.38
-WIDEST = 0.60  # of the section's height
-APEX = 0.5  # of the length from the flange to the widest point
-TREAD = 0.325  # half width of the crown over the section's width, at an aspect ratio of 60 %
-WIDER = 0.25  # by how much that grows for an aspect ratio lower by 1
-CROWN = 0.0704  # drop of the crown at its edge over the section's height
-# Exponent of that drop over the half width, from an aspect ratio of 55 % up; below, it goes with the ratio's inverse:
-# crowns of low sections are flat in the middle and round at their edges.
-ROUND, FLATTER = 2.6, 0.55
-SHOULDER = 0.075, 0.030  # how far out and down the shoulder reaches from there, over the width
-LOWEST = (
-    0.4,
-    0.6,
-)  # largest drop of the crown and of the shoulder over the height above the widest point
-BELT_2 = 0.9  # its width over that of belt 1, which ends at the edge of the crown
-GROOVES, MOST_GROOVES = 4, 8  # around the tread
-GROOVED = "tread"  # the compound that they cut
-GROOVE = 0.07  # width of each over that of the crown: 9.3 mm for 205/60 R15
-LEAST_HEIGHT = 0.057  # m of a section; less leaves no sidewall above the flange
 
 
 class _Stations(NamedTuple):

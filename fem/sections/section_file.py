@@ -175,11 +175,13 @@ def _numbers(
     where: str,
 ) -> dict[str, float]:
     """The numbers of a table by key, within their ranges."""
-    found = {key: _number(table, key, where, default) for key, default in defaults.items()}
+    numbers = {key: _number(table, key, where, default) for key, default in defaults.items()}
     for key, (least, most) in ranges.items():
-        if not least <= found[key] <= most:
-            raise InputError(f"{where}: {key} = {found[key]:g} must lie from {least:g} to {most:g}")
-    return found
+        if not least <= numbers[key] <= most:
+            raise InputError(
+                f"{where}: {key} = {numbers[key]:g} must lie from {least:g} to {most:g}"
+            )
+    return numbers
 
 
 def _known(table: dict[str, Any], keys: set[str], where: str) -> None:

@@ -40,6 +40,12 @@ _REAL = {
     "footprint_size": SIZE,
 }
 
+# A belt ends in a singularity. Ten lowest frequencies of the belted torus
+# (tests/verification/test_belted_torus), largest excess over the reference for n = 0, 1, 2: 16
+# elements along the arc 1.0 %, 20 elements 0.7 %; ungraded with 16, 20, 24 and 32 elements: 1.8,
+# 1.3, 0.8 and 0.5 %. More than one layer per ply gains nothing.
+_ENDS, _ENDS_DEPTH = np.radians(8), 0.7
+
 
 @dataclass(frozen=True, kw_only=True)
 class Torus:
@@ -162,13 +168,6 @@ class Torus:
         wall = np.where(depth == 1.0, self.minor_radius, inner + depth * self.thickness)
         reach = self.outer_radius - self.minor_radius + wall * np.cos(arc)
         return np.stack([reach, wall * np.sin(arc)], axis=-1)
-
-
-# A belt ends in a singularity. Ten lowest frequencies of the belted torus
-# (tests/verification/test_belted_torus), largest excess over the reference for n = 0, 1, 2: 16
-# elements along the arc 1.0 %, 20 elements 0.7 %; ungraded with 16, 20, 24 and 32 elements: 1.8,
-# 1.3, 0.8 and 0.5 %. More than one layer per ply gains nothing.
-_ENDS, _ENDS_DEPTH = np.radians(8), 0.7
 
 
 def _near_ends(angle: np.ndarray, ends: Sequence[float]) -> np.ndarray:

@@ -47,13 +47,19 @@ from tireroad.fem.tire.body import Body
 _WEAK = 0.5  # spectral radius up to which the tangent does without the product
 _MARGIN = 1.3  # over it: held nodes and the deformed tire's other tangent
 _ROUNDS = 20  # of the power method: within 2 % of the spectral radius
+_ROAD = "active", "force", "height"
+MOST_STEPS = 25  # tangents; a load step that needs more is better halved
+TOLERANCE = 1e-12  # of the force scale
+_SERVES = 0.2  # error ratio up to which a tangent is reused, at 1/20 of a new one's cost
+_STAYS = 1e-10  # of the wall: rounding when a state is transferred from half the ring and back
+_DIVERGED = 1e8  # times the force scale, beyond which Newton's method does not recover
 
 
 class ShapeDamping:
     """The force as the UFL form `work`, and the part of its derivative that UFL does not see.
 
-    `lag`: most of an error that a Newton step leaves because its tangent lacks that part; 0 if it
-    has it. Call `update` before assembling `work`. All methods are collective.
+    `convergence_rate`: bound on the error reduction per Newton step when the tangent omits this term; 0
+    if the tangent has it. Call `update` before assembling `work`. All methods are collective.
 
     Stiffness-proportional damping in the steady shape is f = gamma2 Omega K(u) r, r = M^-1 B u: r
     is the body rate of the displacement per unit speed, projected on the finite-element space: its
@@ -79,7 +85,7 @@ class ShapeDamping:
         self._rate_matrix, fastest = _rates(body, self._clamp)
         self._in, self._out = self._rate_matrix.createVecs()
         radius = abs(self._factor) * fastest
-        self.lag = _MARGIN * radius if radius < _WEAK else 0.0
+        self.convergence_rate = _MARGIN * radius if radius < _WEAK else 0.0
         self._stiffness_form = compat.form(ufl.derivative(elastic, body.u, body.trial))
         self._stiffness: PETSc.Mat | None = None
         self._assembled = False
@@ -95,7 +101,7 @@ class ShapeDamping:
     def completed(self, tangent: PETSc.Mat) -> PETSc.Mat:
         """tangent + gamma2 Omega K M^-1 B, always in the same matrix; the tangent if it lags."""
         self._assembled = False
-        if self.lag:
+        if self.convergence_rate:
             return tangent
         stiffness = self._tangent_stiffness()
         self._product = stiffness.matMult(self._rate_matrix, result=self._product)
@@ -145,9 +151,6 @@ def _rates(body: Body, clamp: list[fem.DirichletBC]) -> tuple[PETSc.Mat, float]:
         fastest = x.norm()
     rates.diagonalScale(inverse, root)
     return rates, fastest
-
-
-_ROAD = "active", "force", "height"
 
 
 class SolutionHistory:
@@ -223,7 +226,7 @@ def _same_mesh(problem: Equilibrium, entry: Entry) -> bool:
 
 
 def _state(problem: Equilibrium, when: str) -> dict[str, np.ndarray]:
-    kept = {name: np.array(one) for name, one in zip(_ROAD, problem.road.kept(), strict=True)}
+    kept = {name: np.array(one) for name, one in zip(_ROAD, problem.road.snapshot(), strict=True)}
     kept["field"] = problem.body.u.x.array.copy()
     return {f"{when}/{name}": value for name, value in kept.items()}
 
@@ -231,7 +234,7 @@ def _state(problem: Equilibrium, when: str) -> dict[str, np.ndarray]:
 def _put(problem: Equilibrium, entry: Entry, when: str) -> None:
     problem.body.u.x.array[:] = entry[f"{when}/field"]
     active, force, height = (entry[f"{when}/{name}"] for name in _ROAD)
-    problem.road.put_back((active.copy(), force.copy(), float(height)))
+    problem.road.restore((active.copy(), force.copy(), float(height)))
 
 
 def _step(step: SolveOutcome) -> dict[str, np.ndarray]:
@@ -300,29 +303,33 @@ class Forces:
         if rolling.speed * rolling.stiffness_damping:
             self._damping = ShapeDamping(body, self.pressure, rolling)
             residual += self._damping.work
-        self._residual = compat.form(residual)
+        self._residual_form = compat.form(residual)
         self._tangent = compat.form(tangent(body, residual) + stress_prediction(body, self._before))
         self._inverted = compat.form(inverted_volume(body))
         self._clamp = [body.clamp()]
         self._local_tangent = fem.petsc.create_matrix(self._tangent)
         self.matrix = self._local_tangent
-        self._work = compat.force_vector(self._residual, body.space)
+        self._work = compat.force_vector(self._residual_form, body.space)
         self._rim = (3 * body.rim[body.rim < body.nodes, None] + np.arange(3)).ravel()
 
     @property
-    def lag(self) -> float:
-        """Most of an error that a Newton step leaves because its tangent is incomplete."""
-        return self._damping.lag if self._damping else 0.0
+    def convergence_rate(self) -> float:
+        """Bound on the error reduction per Newton step when the tangent is incomplete."""
+        return self._damping.convergence_rate if self._damping else 0.0
 
     @property
-    def rounds(self) -> int:
+    def correction_steps(self) -> int:
         """Solutions of a linear problem that complete it to 1e-9: 1 with a complete tangent."""
-        return 1 + math.ceil(math.log(1e-9) / math.log(self.lag)) if self.lag else 1
+        return (
+            1 + math.ceil(math.log(1e-9) / math.log(self.convergence_rate))
+            if self.convergence_rate
+            else 1
+        )
 
     def lacking(self, change: np.ndarray, along: RoadCoordinates | None) -> np.ndarray:
         """Forces (N) of a `change` (m) that the tangent lacks, both in the road's coordinates
         `along` or the wheel's axes. Collective."""
-        if not (self._damping and self.lag):
+        if not (self._damping and self.convergence_rate):
             return np.zeros_like(change)
         forces = self._damping.lacking(change if along is None else along.spread(change))
         if along is not None:
@@ -335,7 +342,7 @@ class Forces:
             self._damping.update()
         with self._work.localForm() as local:
             local.set(0.0)
-        fem.petsc.assemble_vector(self._work, self._residual)
+        fem.petsc.assemble_vector(self._work, self._residual_form)
         self._work.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
         if self.springs:
             self.springs.add_to(self._work.array)
@@ -356,13 +363,6 @@ class Forces:
         return self.body.comm.allreduce(fem.assemble_scalar(self._inverted)) > 0
 
 
-MOST_STEPS = 25  # tangents; a load step that needs more is better halved
-TOLERANCE = 1e-12  # of the force scale
-_SERVES = 0.2  # error ratio up to which a tangent is reused, at 1/20 of a new one's cost
-_STAYS = 1e-10  # of the wall: rounding when a state is transferred from half the ring and back
-_DIVERGED = 1e8  # times the force scale, beyond which Newton's method does not recover
-
-
 class Equilibrium(Forces):
     """The nonlinear problem of one body; its solver is created once. Collective.
 
@@ -376,7 +376,7 @@ class Equilibrium(Forces):
         self.shape = shape
         self.road = self._make_road()
         self._unrolled = None if shape.flat else RoadCoordinates(body, self.road)
-        self.force_scale = self._yardsticks()
+        self.force_scale = self._force_scale()
         self._damped = bool(rolling.speed * (rolling.damping + rolling.stiffness_damping))
         self._system = self._make_system("lu" if self._damped else "cholesky")
         self._contact: LinearContact | None = None
@@ -398,7 +398,7 @@ class Equilibrium(Forces):
         """Coordinates in which Newton's method currently works; None: the wheel's axes."""
         return self._unrolled if self.road.height > -np.inf else None
 
-    def _out(self) -> np.ndarray:
+    def _residual(self) -> np.ndarray:
         """Residual forces at the owned unknowns, N. Collective."""
         out, along = self._assemble_residual(), self._in_its_coordinates
         if along is not None:
@@ -429,9 +429,9 @@ class Equilibrium(Forces):
         loop: a dof is held if f - c gap > 0 with its own stiffness c, which is complementarity for
         any c > 0 (Hintermueller, Ito, Kunisch 2003, doi 10.1137/S1052623401383558). Each new
         tangent settles the set (LinearContact) and is reused while each step leaves at most a fifth
-        of the error, or what a new one would leave (`lag`)."""
+        of the error, or what a new one would leave (`convergence_rate`)."""
         field = self.body.u.x
-        kept, self._contact = (field.array.copy(), self.road.kept()), None
+        kept, self._contact = (field.array.copy(), self.road.snapshot()), None
         self.road.height = -np.inf if road_height is None else road_height
         self._before.x.array[:] = field.array
         error, tangents = 0.0, 0
@@ -443,7 +443,7 @@ class Equilibrium(Forces):
                 return self.solved(SolveOutcome(True, tangents, error, reason))
             gap_closure = None
             changed = changed or bool(self._contact and self._contact.changed)
-            if not reason and (changed or not error < max(_SERVES, self.lag) * last):
+            if not reason and (changed or not error < max(_SERVES, self.convergence_rate) * last):
                 tangents += 1
                 reason = "" if self._take_tangent() else "the tangent is singular"
                 gap_closure = self._system.gap_closure
@@ -451,7 +451,7 @@ class Equilibrium(Forces):
             if reason:
                 break
         field.array[:] = kept[0]
-        self.road.put_back(kept[1])
+        self.road.restore(kept[1])
         return self.solved(SolveOutcome(False, tangents, error, reason))
 
     def solved(self, step: SolveOutcome) -> SolveOutcome:
@@ -478,7 +478,7 @@ class Equilibrium(Forces):
         stays = bool(moved <= _STAYS * self.body.ring.thickness)
         if self._contact is None or not self.body.comm.allreduce(stays, op=MPI.LAND):
             return False
-        self._out()
+        self._residual()
         on_road = self.road.height > -np.inf
         rise = road_height - self.road.height if on_road else 0.0
         if not on_road:  # no node touches the road yet, so raising it moves none
@@ -497,8 +497,8 @@ class Equilibrium(Forces):
     def _error(self, load: float | None) -> float:
         """Norm of residual, gaps of held dofs (as forces) and missing load over the force scale."""
         with self.cost("assembly"):
-            out = self._out().copy()
-        self.road.take_off(out)
+            out = self._residual().copy()
+        self.road.subtract_forces(out)
         distance = self.road.distance()
         parts = np.array([out @ out + distance @ distance, self.road.force.sum()])
         square, total = self.body.comm.allreduce(parts)
@@ -534,8 +534,8 @@ class Equilibrium(Forces):
         self._before.x.array[:] = field.array
         along = self._in_its_coordinates
         field.array[: len(change)] += change if along is None else along.spread(change)
-        self.road.lay_on()
-        self.road.react(reaction)
+        self.road.project()
+        self.road.set_reactions(reaction)
         return ""
 
     def road_stiffness(self) -> float:
@@ -544,13 +544,13 @@ class Equilibrium(Forces):
         if not self._take_tangent():
             return float("nan")
         road_rise, lacking = self._system.road_rise, np.zeros(len(self._work.array_r))
-        for _ in range(self.rounds):
+        for _ in range(self.correction_steps):
             change, force = self._system.solve(-lacking, road_rise)
             force += lacking[self.road.held]
             lacking = self.lacking(change, self._in_its_coordinates)
-        return self.body.comm.allreduce(self.road.upward(force))
+        return self.body.comm.allreduce(self.road.vertical_force(force))
 
-    def sinking(self, weights: np.ndarray, load: float) -> tuple[float, float]:
+    def uniform_traction_step(self, weights: np.ndarray, load: float) -> tuple[float, float]:
         """Rise (m) of the face in a Newton step under a vertical traction, without a road, and rise
         per newton. `weights` (s,) of the outer face, of sum 1, distribute the `load` (N) and
         average the rise. Raises ConvergenceError for a singular tangent. Collective."""
@@ -587,11 +587,11 @@ class Equilibrium(Forces):
             self.road.take(force[self.body.ids], height)
         return self.solve(height)
 
-    def _yardsticks(self) -> float:
+    def _force_scale(self) -> float:
         """Force scale (N): the undeformed body's typical dof stiffness times the wall thickness;
         1e-12 of it is far below any load of interest. The road takes the stiffness of its dofs."""
         self._before.x.array[:] = self.body.u.x.array
         self._assemble_tangent()
         diagonal = self.matrix.getDiagonal()
-        self.road.weigh(diagonal.array)
+        self.road.set_stiffness(diagonal.array)
         return self.body.ring.thickness * diagonal.norm() / np.sqrt(diagonal.size)

@@ -11,6 +11,14 @@ from scipy.interpolate import LinearNDInterpolator
 from tireroad.fem.matrices.probe import line_shape
 from tireroad.fem.tire.mesh import NodeGrid
 
+_LINE, _MIDDLE, _SHOULDER = 0.8, 0.2, 0.6  # of the half width
+_NODES = 3  # beyond the contact, used to extrapolate its edge
+_WINDOW = np.radians(75)  # around the lowest point, where the face of a round section points down
+_STEP = 1e-6  # rad, of the difference quotients; affects Newton's rate only, not the result
+_NEWTON = 30
+_CLOSE = 1e-11  # m
+_CLOSE_ANGLE = 1e-9  # rad; at a lowest point the height error is its square times the radius
+
 
 @dataclass(frozen=True)
 class Footprint:
@@ -92,9 +100,6 @@ class Evenness:
 
     shape_factor: float
     shoulder: float
-
-
-_LINE, _MIDDLE, _SHOULDER = 0.8, 0.2, 0.6  # of the half width
 
 
 def evenness(
@@ -207,9 +212,6 @@ def _edge(
     return points[last] + abs(part) * (points[other] - points[last]), part
 
 
-_NODES = 3  # beyond the contact, used to extrapolate its edge
-
-
 def _begins(away: np.ndarray, rise: np.ndarray) -> float:
     """Zero of the parabola through three points (away, rise), or of the line through two.
 
@@ -226,13 +228,6 @@ def _begins(away: np.ndarray, rise: np.ndarray) -> float:
     if slope <= 0:
         return 0.0
     return float(away[0] - 2 * rise[0] / (slope + np.sqrt(square)))
-
-
-_WINDOW = np.radians(75)  # around the lowest point, where the face of a round section points down
-_STEP = 1e-6  # rad, of the difference quotients; affects Newton's rate only, not the result
-_NEWTON = 30
-_CLOSE = 1e-11  # m
-_CLOSE_ANGLE = 1e-9  # rad; at a lowest point the height error is its square times the radius
 
 
 class TreadSurface:

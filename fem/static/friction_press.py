@@ -23,6 +23,13 @@ from tireroad.fem.timing import Timing
 from tireroad.fem.tire.body import Body
 
 Array = np.ndarray
+_NUDGE = 1e-5  # of the last point of a curve: step of the tangent's difference quotient
+_NEAR, _CLOSE = 1e-4, 1e-8  # of the travel: first offset tried, and tolerance of the secant method
+_MOST = 40  # secant iterations
+_ADVICE = (
+    "Take a smaller static.friction or slip, smaller elements at the footprint (tire.footprint_size), or more "
+    "static.friction_steps"
+)
 
 
 class RubbingSystem:
@@ -162,20 +169,17 @@ class RubbingEquilibrium(Equilibrium):
         The stick and slip sets are kept, and the state is restored. Raises ConvergenceError for a
         singular tangent. Collective."""
         field = self.body.u.x
-        kept, self._before.x.array[:] = (field.array.copy(), self.road.kept()), field.array
-        self._out()
+        kept, self._before.x.array[:] = (field.array.copy(), self.road.snapshot()), field.array
+        self._residual()
         if not self._take_tangent() or self._move(self._system.gap_closure, load):
             raise ConvergenceError("static: the tangent of a state with friction is singular")
-        for _ in range(1, self.rounds):  # what an incomplete tangent left
-            self._out()
+        for _ in range(1, self.correction_steps):  # what an incomplete tangent left
+            self._residual()
             self._move(None, load)
         pulled = self.body.comm.allreduce(self.road.pull.sum(axis=0))
         field.array[:] = kept[0]
-        self.road.put_back(kept[1])
+        self.road.restore(kept[1])
         return pulled
-
-
-_NUDGE = 1e-5  # of the last point of a curve: step of the tangent's difference quotient
 
 
 @dataclass(frozen=True)
@@ -308,14 +312,6 @@ class Slide:
         stuck, whole = self.problem.body.comm.allreduce(sums)
         rate = self._rate(self._shift(moved), size)
         return Slid(moved, self._force(), rate, float(state.moment[2]), float(stuck / whole))
-
-
-_NEAR, _CLOSE = 1e-4, 1e-8  # of the travel: first offset tried, and tolerance of the secant method
-_MOST = 40  # secant iterations
-_ADVICE = (
-    "Take a smaller static.friction or slip, smaller elements at the footprint (tire.footprint_size), or more "
-    "static.friction_steps"
-)
 
 
 @dataclass(frozen=True, kw_only=True)

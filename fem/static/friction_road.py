@@ -12,6 +12,9 @@ from tireroad.fem.static.road import FLAT, RoadContact, RoadShape
 from tireroad.fem.tire.body import Body
 
 Array = np.ndarray
+_ROUNDING, _BRINK = 1e-9, 1e-7  # of a node's friction bound
+# k over c of a node about to stick: with 1e6 the rounding of g prevented convergence
+_STIFFEST = 1e3
 
 
 class Sliding(Protocol):
@@ -157,11 +160,6 @@ class Couplings:
     ahead: Array
 
 
-_ROUNDING, _BRINK = 1e-9, 1e-7  # of a node's friction bound
-# k over c of a node about to stick: with 1e6 the rounding of g prevented convergence
-_STIFFEST = 1e3
-
-
 class RubbingRoad(RoadContact):
     """`RoadContact` with friction: `pull` (n, 2) N along and across the road; `sticks` (n,) bool.
 
@@ -199,8 +197,8 @@ class RubbingRoad(RoadContact):
         """Begin the search for another equilibrium."""
         self._came[:] = False
 
-    def weigh(self, diagonal: Array) -> None:
-        super().weigh(diagonal)
+    def set_stiffness(self, diagonal: Array) -> None:
+        super().set_stiffness(diagonal)
         self._softly = diagonal[self._along].mean(axis=1)
 
     @property
@@ -270,8 +268,8 @@ class RubbingRoad(RoadContact):
         off = (self.pull - share[:, None] * trial)[self.active]
         return np.concatenate([super().distance(), off.ravel()])
 
-    def take_off(self, out: Array) -> None:
-        super().take_off(out)
+    def subtract_forces(self, out: Array) -> None:
+        super().subtract_forces(out)
         out[self._along] -= self.pull
 
     def linearise(self) -> None:
@@ -348,12 +346,12 @@ class RubbingRoad(RoadContact):
         self._slips = np.flatnonzero(self.active & ~self.sticks)
         self._way = self.pull[self._slips] / size[self._slips, None]
 
-    def upward(self, reaction: Array) -> float:
+    def vertical_force(self, reaction: Array) -> float:
         return float(reaction[: int(self.active.sum())].sum())
 
-    def react(self, reaction: Array) -> None:
+    def set_reactions(self, reaction: Array) -> None:
         count = int(self.active.sum())
-        super().react(reaction[:count])
+        super().set_reactions(reaction[:count])
         self.pull[self.sticks] = reaction[count:].reshape(-1, 2)
         led, (stretch, lean) = self._led_by(self.sliding.slid()), self._lie()
         stretch, lean = self.friction * stretch[self._slips], lean[self._slips]
@@ -361,11 +359,11 @@ class RubbingRoad(RoadContact):
         pressing /= 1.0 - lean * stretch * self._way[:, 0]
         self.pull[self._slips] = (stretch * pressing)[:, None] * self._way - led
 
-    def kept(self) -> tuple[Any, ...]:
-        return *super().kept(), self.sticks.copy(), self.pull.copy(), self._slips, self._way
+    def snapshot(self) -> tuple[Any, ...]:
+        return *super().snapshot(), self.sticks.copy(), self.pull.copy(), self._slips, self._way
 
-    def put_back(self, state: tuple[Any, ...]) -> None:
-        super().put_back(state[:3])
+    def restore(self, state: tuple[Any, ...]) -> None:
+        super().restore(state[:3])
         self.sticks, self.pull, self._slips, self._way = state[3:]
 
     @property

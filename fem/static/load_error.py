@@ -40,6 +40,21 @@ if TYPE_CHECKING:
 _CANDIDATES = 9  # cells whose centres are nearest to a point: one of them contains it
 _NEWTON = 12
 _OUTSIDE = 0.2  # of an element: limit of the reference coordinates for points off the mesh
+_MERGED = 1e-7  # of the section's size: nodes of two cells closer than this are merged
+_ROUNDING = 1e-9  # rad
+_SAME = 1e-6  # of the wall: the change that a half turn may cause
+HIGHEST = 3  # highest element order available
+CUBIC = 0.1  # ratio of the errors of order 3 and order 2 on the same mesh
+# Fraction of the bulk error that remains: the rest comes from the elements at the footprint, which
+# the first companion refines. Estimated over true error of the soft torus at 4 and 12 mm
+# deflection, order 2 on 16 x 8, 20 x 8 and 24 x 10 elements and order 3 on 16 x 6 and 30 x 14 (4
+# mm): 0.6 to 1.3 (bench discretisation). Compared with order 3 split once or twice at the footprint
+# (known to 0.2 %), order 2 on 16 x 8, 20 x 8 and 24 x 10 at 2, 4 and 12 mm: 0.7 to 2.0 in
+# magnitude, with the wrong sign in two of the nine cases, where the two parts nearly cancel.
+REMAINS = 0.7
+ENOUGH = 1e-4  # of the load: residual allowed in a companion
+UNKNOWN = "these elements strain the cords too much between their integration points; take smaller elements"
+CANCELS = 0.5  # of the larger part: sums below this have an unknown sign
 
 
 def locate(
@@ -94,9 +109,6 @@ def interpolation(
     rows = np.repeat(np.arange(len(cell)), shape.shape[1])
     entries = shape.ravel(), (rows, cells[cell].ravel())
     return sparse.csr_matrix(entries, shape=(len(cell), count))
-
-
-_MERGED = 1e-7  # of the section's size: nodes of two cells closer than this are merged
 
 
 def split_ring(ring: Ring, around: np.ndarray, along: np.ndarray) -> Ring:
@@ -245,10 +257,6 @@ def sampled(lattice: NodeGrid, values: np.ndarray, target: NodeGrid) -> np.ndarr
     return np.stack([across @ ring for ring in around]).reshape(-1, 3)
 
 
-_ROUNDING = 1e-9  # rad
-_SAME = 1e-6  # of the wall: the change that a half turn may cause
-
-
 @dataclass(frozen=True, kw_only=True)
 class Balance:
     """A tire with the elements of `ring`, in static equilibrium on the road at `height` (m) under
@@ -357,8 +365,7 @@ class Balance:
         return half if _has_all_of(half, field_lattice(ring), displacement) else None
 
     def _touching(self, lattice: NodeGrid) -> np.ndarray:
-        """A positive force (n,) N on those nodes of another lattice that lie between loaded nodes
-        of this one."""
+        """Initial contact forces (n,) N on a finer mesh: positive at nodes between loaded nodes of the coarse one."""
         pressed = self.face_force > 0
         around = _between(np.append(self.lattice.ring, 2 * np.pi), lattice.ring) % len(pressed)
         along = _between(self.lattice.arc, lattice.arc)
@@ -387,20 +394,6 @@ def _nodes(solved: Equilibrium, lattice: NodeGrid) -> tuple[np.ndarray, np.ndarr
     if isinstance(solved, HalfModelEquilibrium):
         return solved.on(lattice)
     return solved.body.displacement(), solved.body.everywhere(solved.contact_force())
-
-
-HIGHEST = 3  # highest element order available
-CUBIC = 0.1  # ratio of the errors of order 3 and order 2 on the same mesh
-# Fraction of the bulk error that remains: the rest comes from the elements at the footprint, which
-# the first companion refines. Estimated over true error of the soft torus at 4 and 12 mm
-# deflection, order 2 on 16 x 8, 20 x 8 and 24 x 10 elements and order 3 on 16 x 6 and 30 x 14 (4
-# mm): 0.6 to 1.3 (bench discretisation). Compared with order 3 split once or twice at the footprint
-# (known to 0.2 %), order 2 on 16 x 8, 20 x 8 and 24 x 10 at 2, 4 and 12 mm: 0.7 to 2.0 in
-# magnitude, with the wrong sign in two of the nine cases, where the two parts nearly cancel.
-REMAINS = 0.7
-ENOUGH = 1e-4  # of the load: residual allowed in a companion
-UNKNOWN = "these elements strain the cords too much between their integration points; take smaller elements"
-CANCELS = 0.5  # of the larger part: sums below this have an unknown sign
 
 
 @dataclass(frozen=True)
@@ -480,8 +473,8 @@ def _bulk(given: Balance) -> float | None:
     near = given.near(other)
     if cords_strained(near, load):
         return None
-    sinks, compliance = given.near(ring).sinking(weights, load)
-    further = near.sinking(others, load)[0]
+    sinks, compliance = given.near(ring).uniform_traction_step(weights, load)
+    further = near.uniform_traction_step(others, load)[0]
     share = REMAINS * (further - sinks) / compliance / load
     return share if order > ring.order else -CUBIC * share
 

@@ -31,6 +31,22 @@ _DRAGGED = 1.0  # of the load: residual after the steps with springs
 _FIRST = 1e-2  # of the typical stiffness of an unknown
 _EASED, _RAISED = 0.1, 10.0
 _MOST = 6  # steps with springs
+_FIRST_DRAG = 1e-2  # of an unknown's typical stiffness: a step then moves the tread by < 1 mm
+_LAST = 1e-5  # of the first: the tire is at rest
+_MOST_FALLS = 80  # steps; a section that folds at a tenth of a metre takes 20 to 30
+_DRAG_EASED, _DRAG_RAISED = 0.25, 8.0
+_SMALLEST = 1e-4  # of the first step: smaller load steps are abandoned
+# Of a rolling tire: one that needs smaller steps is at its critical speed. At 160 rad/s a radial
+# tire (critical at 157) was given up after ten minutes.
+_SMALLEST_ROLLING = 2e-2
+_LARGEST = 4  # times the first step
+_STUCK = 3  # consecutive failures after which a fall is tried, once
+_EASY = 6  # tangents up to which the next load step may grow
+Attempt = Callable[[float], SolveOutcome]
+LOAD_TOLERANCE = 1e-9  # of the requested load; a tenth of the tolerance of other comparisons
+_REACH = 2.2  # times the largest deflection so far: limit of the next trial
+_NEAR = 0.1  # of a requested load: residual allowed in intermediate states
+_CLOSED, _JUMP = 1e-6, 0.01  # of a deflection: bracket, across which that part of a load is a jump
 
 
 def cords_strained(equilibrium: Equilibrium, load: float) -> bool:
@@ -52,7 +68,7 @@ def balance_near(
     long elements stretches a belt that it bends. On another mesh this appears as stress (radial
     tire, 16 x 12 elements, 4000 N, elements half as long: 9 kN per node at the shoulder, all
     around), which makes the first tangent useless: its step moves a sidewall by 35 mm, and Newton's
-    method does not recover. Springs to the current position (as in path.snap) hold the body while
+    method does not recover. Springs to the current position hold the body while
     the cords relax by some 0.1 mm,
 
         k (u - u_0) + F(u) = f,  k in proportion to the nodes' mass,
@@ -70,7 +86,7 @@ def _balance_with_springs(
     equilibrium: Equilibrium, road_height: float, load: float, allowed: float
 ) -> SolveOutcome:
     body, road, field = equilibrium.body, equilibrium.road, equilibrium.body.u.x
-    kept = field.array.copy(), road.kept(), equilibrium.road_height
+    kept = field.array.copy(), road.snapshot(), equilibrium.road_height
     typical = equilibrium.force_scale / body.ring.thickness
     springs, tangents = RestoringSprings(body, _FIRST * typical), 0
     share = _FIRST
@@ -91,14 +107,8 @@ def _balance_with_springs(
         share *= factor
         springs.stiffness *= factor
     field.array[:], equilibrium.road_height = kept[0], kept[2]
-    road.put_back(kept[1])
+    road.restore(kept[1])
     return replace(step, iterations=tangents)
-
-
-_FIRST_DRAG = 1e-2  # of an unknown's typical stiffness: a step then moves the tread by < 1 mm
-_LAST = 1e-5  # of the first: the tire is at rest
-_MOST_FALLS = 80  # steps; a section that folds at a tenth of a metre takes 20 to 30
-_DRAG_EASED, _DRAG_RAISED = 0.25, 8.0
 
 
 def pseudo_transient(
@@ -120,7 +130,7 @@ def pseudo_transient(
     solved for without it.
     """
     field, road = equilibrium.body.u.x, equilibrium.road
-    kept = field.array.copy(), road.kept(), equilibrium.road_height
+    kept = field.array.copy(), road.snapshot(), equilibrium.road_height
     typical = equilibrium.force_scale / equilibrium.body.ring.thickness
     equilibrium.springs = springs = RestoringSprings(equilibrium.body, _FIRST_DRAG * typical)
     share, tangents = 1.0, 0
@@ -136,26 +146,15 @@ def pseudo_transient(
         equilibrium.springs = springs if share > _LAST else None
     equilibrium.springs = None
     field.array[:], equilibrium.road_height = kept[0], kept[2]
-    road.put_back(kept[1])
+    road.restore(kept[1])
     return SolveOutcome(
         False, tangents, step.residual, "pseudo-transient continuation does not converge either"
     )
 
 
-_SMALLEST = 1e-4  # of the first step: smaller load steps are abandoned
-# Of a rolling tire: one that needs smaller steps is at its critical speed. At 160 rad/s a radial
-# tire (critical at 157) was given up after ten minutes.
-_SMALLEST_ROLLING = 2e-2
-_LARGEST = 4  # times the first step
-_STUCK = 3  # consecutive failures after which a fall is tried, once
-_EASY = 6  # tangents up to which the next load step may grow
-
-Attempt = Callable[[float], SolveOutcome]
-
-
 @dataclass(frozen=True)
 class Show:
-    """What is stepped, for display: its name, and its value `scale` at 1 in `unit`."""
+    """The quantity that is stepped, for display: its name, and its value `scale` at 1 in `unit`."""
 
     what: str
     scale: float
@@ -202,12 +201,6 @@ def march(
                 f"static: {show.what} stops at {done * scale:.6g} {unit} of {end * scale:.6g} {unit}; "
                 f"a further step of {size * scale:.2g} {unit} does not converge ({step.reason})"
             )
-
-
-LOAD_TOLERANCE = 1e-9  # of the requested load; a tenth of the tolerance of other comparisons
-_REACH = 2.2  # times the largest deflection so far: limit of the next trial
-_NEAR = 0.1  # of a requested load: residual allowed in intermediate states
-_CLOSED, _JUMP = 1e-6, 0.01  # of a deflection: bracket, across which that part of a load is a jump
 
 
 @dataclass(frozen=True)
@@ -376,12 +369,12 @@ class LoadPath:
 
         def attempt(deflection: float) -> SolveOutcome:
             height = self._loader.touch + deflection
-            kept = field.array.copy(), road.kept()
+            kept = field.array.copy(), road.snapshot()
             self._equilibrium.predict(height)
             step = self._equilibrium.solve(height, allowed=allowed)
             if not step.converged:  # restore the state before the prediction
                 field.array[:] = kept[0]
-                road.put_back(kept[1])
+                road.restore(kept[1])
             return self._learnt(step, deflection)
 
         def let_go(deflection: float) -> SolveOutcome:
@@ -654,8 +647,8 @@ def with_cause(
     except ConvergenceError:
         return error
     return ConvergenceError(
-        f"static: rotation.speed = {rolling.speed:g} rad/s lies beyond the critical speed, up to which the tire has "
-        f"a steady rolling shape: at rest it converges, at this speed it does not ({error.fact.removeprefix('static: ')}). "
+        f"static: no steady rolling shape at rotation.speed = {rolling.speed:g} rad/s: it is probably "
+        f"above the critical speed, since the tire at rest converges ({error.fact.removeprefix('static: ')}). "
         "The rolling shape has the moduli at rest and no losses, which carry a real tire further. Lower the speed, raise the inflation or stiffen the material; static.steady_rolling = false takes the "
         "shape at rest, whose rotating stage reports the critical speed."
     )

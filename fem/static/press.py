@@ -73,7 +73,7 @@ class InitialState:
         old state. Collective."""
         assert self.height is not None, "there is no road"
         equilibrium, field = loader.equilibrium, loader.body.u.x.array
-        kept = field.copy(), equilibrium.road.kept()
+        kept = field.copy(), equilibrium.road.snapshot()
         field[:] = self.pressed
         equilibrium.road.take(self.force, self.height)
         step = equilibrium.solve(self.height if rise is None else loader.touch + rise, load)
@@ -82,7 +82,7 @@ class InitialState:
             loader.tell("deflection", loader.deflection, "m", step)
         else:
             field[:] = kept[0]
-            equilibrium.road.put_back(kept[1])
+            equilibrium.road.restore(kept[1])
         return step.converged
 
 

@@ -173,11 +173,11 @@ class RoadContact:
         """Motion (m) of the held unknowns to the road, and their motion per metre of rise."""
         return -self.gap()[self.active], np.ones(int(self.active.sum()))
 
-    def weigh(self, diagonal: np.ndarray) -> None:
+    def set_stiffness(self, diagonal: np.ndarray) -> None:
         """Set the stiffness (N/m) from the diagonal over the owned unknowns."""
         self.stiffness = diagonal[self.dofs].copy()
 
-    def take_off(self, out: np.ndarray) -> None:
+    def subtract_forces(self, out: np.ndarray) -> None:
         """Subtract the road's forces from the forces (N) at the owned unknowns."""
         out[self.dofs] -= self.force
 
@@ -185,19 +185,19 @@ class RoadContact:
         """The residual (N) in the unknowns that Newton's method solves for."""
         return out
 
-    def upward(self, reaction: np.ndarray) -> float:
+    def vertical_force(self, reaction: np.ndarray) -> float:
         """Sum of those reactions (N) at held unknowns that carry the load. Not collective."""
         return float(reaction.sum())
 
-    def react(self, reaction: np.ndarray) -> None:
+    def set_reactions(self, reaction: np.ndarray) -> None:
         """Take the reactions (N) at the held unknowns as the road's forces. Collective."""
         self.force[self.active] = reaction
 
-    def kept(self) -> tuple[Any, ...]:
-        """The state for `put_back`."""
+    def snapshot(self) -> tuple[Any, ...]:
+        """The state for `restore`."""
         return self.active.copy(), self.force.copy(), self.height
 
-    def put_back(self, state: tuple[Any, ...]) -> None:
+    def restore(self, state: tuple[Any, ...]) -> None:
         """Restore a state from `state`."""
         self.active, self.force, self.height = state
 
@@ -209,7 +209,7 @@ class RoadContact:
         self.force[~wanted] = 0.0
         return self._body.comm.allreduce(changed, op=MPI.LOR)
 
-    def lay_on(self) -> None:
+    def project(self) -> None:
         """Place active nodes exactly on the road, without gaps by rounding. Collective."""
         field, level = self._body.u.x, np.full(len(self.dofs), self.height)
         if not self.shape.flat:
@@ -221,7 +221,7 @@ class RoadContact:
         """Start from forces (N) of the owned nodes on a road at `height` (m). Collective."""
         self.force, self.height = force[self._body.tread], height
         self.active = self.force > 0
-        self.lay_on()
+        self.project()
 
     def at_nodes(self) -> np.ndarray:
         """Normal force on all owned nodes, its component along the wheel's z, N; not negative."""

@@ -51,13 +51,13 @@ class CordForce:
 def cord_forces(body: Body) -> dict[str, CordForce]:
     """Cord forces by ply at the present displacement, on every process. Collective."""
     found = {}
-    for number, one in enumerate(body.plies.cords):
-        chain = body.ring.section.plies[one.name]
+    for number, cord in enumerate(body.plies.cords):
+        chain = body.ring.section.plies[cord.name]
         values = np.zeros((2, *_grid(body, chain)))
         for sheet in body.plies.sheets:
             _read(body, sheet, number, chain, values)
         body.comm.Allreduce(MPI.IN_PLACE, values)
-        found[one.name] = CordForce(_points(body, chain), values[0], values[1])
+        found[cord.name] = CordForce(_points(body, chain), values[0], values[1])
     return found
 
 

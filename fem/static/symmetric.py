@@ -19,6 +19,9 @@ from tireroad.fem.timing import Timing
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.mesh import NodeGrid
 
+TURN = np.array([-1.0, -1.0, 1.0])  # of x, y, z under a half turn about the vertical
+_SAME = 1e-9  # of the section's size: distance of a cell's centre from another's image
+
 
 class AxisymmetricEquilibrium(Equilibrium):
     """Equilibrium of a ring's axisymmetric shape, on the shortest of its elements around.
@@ -109,9 +112,6 @@ def _turned(body: Body) -> sparse.csr_matrix:
     columns = np.broadcast_to((3 * number[node[own]] + np.arange(3)[:, None])[None], axes.shape)
     size = 3 * body.nodes, 3 * int((~held).sum())
     return sparse.csr_matrix((axes.ravel(), (rows.ravel(), columns.ravel())), size)
-
-
-TURN = np.array([-1.0, -1.0, 1.0])  # of x, y, z under a half turn about the vertical
 
 
 @dataclass(frozen=True)
@@ -300,9 +300,6 @@ class _Folding:
         self.matrix.assemble()
 
 
-_SAME = 1e-9  # of the section's size: distance of a cell's centre from another's image
-
-
 def looks_the_same(ring: Ring, rolling: Rolling) -> bool:
     """Whether a half turn maps the ring of elements and its loads to themselves.
 
@@ -381,13 +378,13 @@ class HalfModelEquilibrium(Equilibrium):
         self.road.active[:], self.road.force[:] = False, 0.0
         self.pressure.value = float(whole.pressure.value)
 
-    def sinking(self, weights: np.ndarray, load: float) -> tuple[float, float]:
+    def uniform_traction_step(self, weights: np.ndarray, load: float) -> tuple[float, float]:
         """As for the whole tire, for a traction that the half turn preserves. Leaders take the
         weights of their followers, and each half takes half of those on the axis."""
         face, own = self.body.surface, weights.copy()
         own[face.place[np.isin(face.local, self._cut.follower)]] = 0.0
         own[face.place[np.isin(face.local, self._cut.axis)]] /= 2
-        further, compliance = super().sinking(own, load)
+        further, compliance = super().uniform_traction_step(own, load)
         return 2 * further, 2 * compliance
 
     def on(self, lattice: NodeGrid) -> tuple[np.ndarray, np.ndarray]:

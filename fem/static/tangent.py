@@ -1,8 +1,6 @@
-"""The tangent with dofs held by the road, and its linear contact problem.
+"""The tangent with nodes held by the road, and the contact of a linearised step.
 
-Contact within a linearised step: a linear complementarity problem on the tread nodes.
-
-K du = right is solved with the nodes held that were held when K was factorised. Each node held
+That contact is a linear complementarity problem on the tread nodes. K du = right is solved with the nodes held that were held when K was factorised. Each node held
 since then adds a force, each node released since then a motion, both times a column of K's inverse:
 
     gap = gap_0 + C z + gap_l rise,    force = force_0 + D z + force_l rise,
@@ -30,6 +28,10 @@ from tireroad.fem.timing import Timing
 
 _CHUNK = 64  # right-hand sides per solve
 _SINGULAR = (-6, -10)  # MUMPS's INFOG(1): structurally, numerically
+_ROUNDS = 10  # updates of the sets in one step
+_MOST = 400  # columns per factorisation
+_OFF = 1e-12  # m from the road: rounding leaves less
+Array = np.ndarray
 
 
 @dataclass(frozen=True)
@@ -255,13 +257,6 @@ def _solver(comm: MPI.Comm, matrix: PETSc.Mat, factorisation: str) -> PETSc.KSP:
     return ksp
 
 
-_ROUNDS = 10  # updates of the sets in one step
-_MOST = 400  # columns per factorisation
-_OFF = 1e-12  # m from the road: rounding leaves less
-
-Array = np.ndarray
-
-
 def held_step(
     comm: MPI.Comm,
     system: System,
@@ -281,7 +276,7 @@ def held_step(
     if load is None:
         return change, force
     further, more = system.solve(np.zeros_like(out), system.road_rise)
-    sums = np.array([road.upward(part) for part in (force, more)])
+    sums = np.array([road.vertical_force(part) for part in (force, more)])
     total, rate = comm.allreduce(sums)
     if not rate > 0:
         return None
@@ -427,8 +422,8 @@ class LinearContact:
         pressed = ~self._base[self._own][mine]
         force[mine[pressed], order[pressed]] = 1.0
         added = motion, self._gathered(motion[self._road.dofs]), self._gathered(force)
-        kept = self._columns
-        parts = zip((kept.motion, kept.gap, kept.force), added, strict=True)
+        columns = self._columns
+        parts = zip((columns.motion, columns.gap, columns.force), added, strict=True)
         self._columns = _Answer(*(np.hstack(pair) for pair in parts))
         self._number[new] = np.arange(len(new)) + (self._number.max() + 1)
 

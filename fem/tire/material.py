@@ -1,10 +1,8 @@
-"""Interface of a material law: its parameters and strain energy.
+"""A rubber: strain energy, density, and dynamic properties for small motions.
 
-A new law is one file in fem.tire.laws, or a class in a user's script, with its parameters (unit and
+A `MaterialLaw` gives the strain energy. A new law is one file in fem.tire.laws, or a class in a user's script, with its parameters (unit and
 range), the energy, and the two moduli at zero strain. The scene's keys, `check`, the key reference
 and the range tests follow from it.
-
-A rubber: strain energy, density, and dynamic properties for small motions.
 
 The storage modulus of a filled rubber grows by a third to two thirds from 10 Hz to 1 kHz, its loss
 factor by less. A `Spectrum` gives both relative to those at DYNAMIC_FREQUENCY: a power law (a
@@ -27,6 +25,12 @@ from tireroad.fem.parameters import Parameters, Registry, keys, plain
 
 if TYPE_CHECKING:
     from ufl.core.expr import Expr
+
+DYNAMIC_FREQUENCY = (
+    100.0  # Hz, at which `dynamic` and `loss_factor` hold, in the middle of 10 Hz to 1 kHz
+)
+_SAMPLED = 0.1, 1e5, 20  # Hz, Hz, samples in a decade of a Prony series
+_TURNS, _SETTLED = 50, 1e-12  # of the own frequencies; relative change of their squares
 
 
 class MaterialLaw(Parameters):
@@ -85,12 +89,6 @@ class MaterialLaw(Parameters):
 
 MATERIALS: Registry[MaterialLaw] = Registry("material model", "tireroad.fem.tire.laws", MaterialLaw)
 material_law = MATERIALS.register
-
-
-DYNAMIC_FREQUENCY = (
-    100.0  # Hz, at which `dynamic` and `loss_factor` hold, in the middle of 10 Hz to 1 kHz
-)
-_SAMPLED = 0.1, 1e5, 20  # Hz, Hz, samples in a decade of a Prony series
 
 
 @dataclass(frozen=True)
@@ -229,13 +227,10 @@ def kinds(compounds: Sequence[tuple[Spectrum, float, float]]) -> dict[Kind, list
     return found
 
 
-_TURNS, _SETTLED = 50, 1e-12  # of the own frequencies; relative change of their squares
-
-
 def own_moduli(
     squares: np.ndarray, stored: np.ndarray, kinds: Sequence[Kind], at: float | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """What moduli at their own frequencies add to the `squares` (m,) 1/s2 of modes, and their loss factors.
+    """The addition of moduli at their own frequencies to the `squares` (m,) 1/s2 of modes, and their loss factors.
 
     `stored` (c, m) 1/s2: phi_k . K_c phi_k of the kinds' part of the stiffness, for unit modal mass.
 

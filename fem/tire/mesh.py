@@ -24,6 +24,10 @@ __all__ = ["INNER", "RIM", "TREAD", "NodeGrid", "TireMesh", "Torus", "build", "f
 
 INNER, TREAD, RIM = 1, 2, 3  # facet tags
 
+# Facet of the reference hexahedron where coordinate 0, 1, 2 is 0 or 1 (basix: z = 0, y = 0, x = 0,
+# x = 1, ...).
+_HEX_FACE = np.array([[2, 3], [1, 4], [0, 5]])
+
 
 class NodeGrid:
     """The nodes of a ring as a tensor product of angles around the axle and nodes of the section.
@@ -171,11 +175,6 @@ def _tag(mesh: dmesh.Mesh, ring: Ring, section_cell: np.ndarray) -> dmesh.MeshTa
             found |= dict.fromkeys(facets.tolist(), tag)
     entities = np.array(sorted(found), dtype=int)
     return compat.meshtags(mesh, 2, entities, np.array([found[e] for e in entities.tolist()], int))
-
-
-# Facet of the reference hexahedron where coordinate 0, 1, 2 is 0 or 1 (basix: z = 0, y = 0, x = 0,
-# x = 1, ...).
-_HEX_FACE = np.array([[2, 3], [1, 4], [0, 5]])
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,6 +1,6 @@
-"""The plies of a body: the cell faces that they lie on, and their forms.
+"""The plies of a body: the cell faces that they lie on, and the integrals over these.
 
-Integrals over one face of each cell as cell integrals whose quadrature points lie on the face.
+An integral over one face of each cell is a cell integral whose quadrature points lie on the face:
 
     int_face f dA = int_cell-rule f |J^-T n| |det J|,   n the reference normal (Nanson's formula)
 
@@ -33,6 +33,7 @@ from tireroad.fem.tire.cords import Cords
 from tireroad.fem.tire.mesh import TireMesh
 
 AXES = 3
+RULE = "reduced"
 
 
 def edge_rule(order: int, kind: str) -> tuple[np.ndarray, np.ndarray]:
@@ -184,11 +185,11 @@ class Plies:
         def correction(sheet: Sheet) -> ufl.Form:
             line, last = self._lines(sheet, u, before)[0], self._lines(sheet, before, v)[0]
             change = ufl.dot(ufl.grad(u - before), sheet.direction)
-            given = sheet.stiffness, sheet.slack
+            arguments = sheet.stiffness, sheet.slack
             was = ufl.dot(last, last)
-            predicted = law.tension_over_stretch(was, *given)
-            predicted += law.tension_over_stretch_rate(was, *given) * 2 * ufl.dot(last, change)
-            excess = predicted - law.tension_over_stretch(ufl.dot(line, line), *given)
+            predicted = law.tension_over_stretch(was, *arguments)
+            predicted += law.tension_over_stretch_rate(was, *arguments) * 2 * ufl.dot(last, change)
+            excess = predicted - law.tension_over_stretch(ufl.dot(line, line), *arguments)
             bending = ufl.dot(
                 ufl.dot(ufl.grad(du), sheet.direction), ufl.dot(ufl.grad(v), sheet.direction)
             )
@@ -198,12 +199,9 @@ class Plies:
 
     def inertia(self, integrand: Expr, kind: str = "full") -> ufl.Form | int:
         """int (mass per area) integrand over all plies that have mass, in UFL."""
-        if not any(one.density for one in self.cords):
+        if not any(cord.density for cord in self.cords):
             return 0
         return _sum(sheet.face.integral(sheet.mass * integrand, kind) for sheet in self.sheets)
-
-
-RULE = "reduced"
 
 
 def _sum(forms: Iterable[ufl.Form]) -> ufl.Form | int:
@@ -235,7 +233,7 @@ def laid_on(tire: TireMesh, cords: Sequence[Cords]) -> list[Laid]:
     Raises InputError for cords without a ply or a ply without cords.
     """
     section = tire.ring.section
-    names = [one.name for one in cords]
+    names = [cord.name for cord in cords]
     for name in section.plies:
         if name not in names:
             raise InputError(f"section: ply {name!r} has no cords")

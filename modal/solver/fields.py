@@ -1,6 +1,4 @@
-"""Fields over all unknowns, distributed by rows: sums, products, and one order, sign and basis of the modes.
-
-One order, one sign and one basis of each repeated frequency for the modes, by rule.
+"""Fields over all unknowns, distributed by rows: products, and the order, sign and basis of the modes.
 
 An eigensolver leaves the sign undetermined, and for a repeated eigenvalue the whole basis V (n, k).
 Here
@@ -25,6 +23,13 @@ from scipy import sparse
 from tireroad.fem.collective import from_local_rows, summed
 from tireroad.fem.matrices.operators import Compound
 from tireroad.modal.solver.slicing import ProcessGroup, Slice, SymmetricPart
+
+_AT_ONCE = 16  # vectors that one process holds whole
+CHUNK = 64  # columns per matrix product, to avoid a second copy of all vectors
+_BETWEEN = 4 * CHUNK  # per product with all vectors: with 64, BLAS packs them half of the time
+# Defect above which a correction pays: neighbouring slices are orthogonal to about 1e-11.
+_REPAIR = 1e-12
+_SAME_LENGTH = 1e-3  # relative
 
 
 def congruent(matrix: PETSc.Mat, basis: sparse.csr_matrix) -> PETSc.Mat:
@@ -72,13 +77,6 @@ def less(matrix: PETSc.Mat, other: PETSc.Mat) -> PETSc.Mat:
     difference = matrix.copy()
     difference.axpy(-1.0, other, structure=PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
     return difference
-
-
-_AT_ONCE = 16  # vectors that one process holds whole
-CHUNK = 64  # columns per matrix product, to avoid a second copy of all vectors
-_BETWEEN = 4 * CHUNK  # per product with all vectors: with 64, BLAS packs them half of the time
-# Defect above which a correction pays: neighbouring slices are orthogonal to about 1e-11.
-_REPAIR = 1e-12
 
 
 def scaled_by(stiffness: PETSc.Mat, mass: np.ndarray) -> PETSc.Mat:
@@ -228,9 +226,6 @@ def strain_energies(
         for row, compound in zip(stored, compounds, strict=True):
             row[start : start + CHUNK] = (some * multiply(compound.stiffness, some)).sum(axis=0)
     return summed(comm, stored)
-
-
-_SAME_LENGTH = 1e-3  # relative
 
 
 def ordered(values: np.ndarray, family: np.ndarray, same: float) -> tuple[np.ndarray, np.ndarray]:

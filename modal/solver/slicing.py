@@ -17,6 +17,34 @@ from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.matrices.compliance import RIGID
 from tireroad.fem.static.checkpoint import Entry, Journal
 
+BLOCK = 8
+# Longest basis: this many vectors for each wanted one, and this many blocks more.
+_LENGTH, _MORE = 6, 30
+_EVERY = 3  # blocks between two checks of convergence
+_CLEAN = 1e-9  # of the largest: components after whose removal a block is orthogonal to rounding
+_LOST = 1e-8  # of the largest: a direction of a new block shorter than this is rounding
+
+# Residual of a Ritz pair relative to theta: as small as the vectors of neighbouring slices must be
+# orthogonal to each other, a few digits above rounding.
+TOLERANCE = 1e-12
+# With deflation: each search finds at least a block of each repeated eigenvalue.
+_SEARCHES = 40
+_SOFT = 1e-3  # of the matrix norm: noise of a hundred roundings is 1e-11 of an eigenvalue there
+_DENSE = 200  # unknowns below which LAPACK takes no longer than one factorisation and its overhead
+_MANY = 0.25  # share of all eigenvalues from which on LAPACK takes no longer
+_LARGEST_DENSE = 3000
+_LONGEST = 1.5  # of the wanted eigenvalues: the basis of Krylov-Schur before it restarts
+AUTO = "lanczos"
+
+# Eigenvalues per slice and matrix: fewest, where teams wait for work, and most. The more, the fewer vectors
+# each takes (61,071 unknowns: 3.2 of 171, 2.6 of 326) and the fewer factors there are; but the basis grows.
+_SLICE = 64, 320
+_BASIS = 5e8  # bytes of it on one process, as far as half of that many eigenvalues allow
+_VECTORS = 2.6  # of the basis for each eigenvalue
+_PROBES = 8
+_FINEST = 1e-9  # relative width below which a crowded interval counts as one cluster
+_CROWDED = 1.6  # times the wanted number in a step: above, a boundary in between costs less
+
 
 @dataclass(frozen=True)
 class ProcessGroup:
@@ -226,14 +254,6 @@ class Shifted:
         self._pc.destroy()
 
 
-BLOCK = 8
-# Longest basis: this many vectors for each wanted one, and this many blocks more.
-_LENGTH, _MORE = 6, 30
-_EVERY = 3  # blocks between two checks of convergence
-_CLEAN = 1e-9  # of the largest: components after whose removal a block is orthogonal to rounding
-_LOST = 1e-8  # of the largest: a direction of a new block shorter than this is rounding
-
-
 class KrylovBasis:
     """Orthonormal vectors (n, m), own rows, orthogonal to `known` (n, k), grown by blocks."""
 
@@ -341,9 +361,9 @@ def merged(steps: list[tuple[float, np.ndarray]], most: float) -> list[tuple[flo
     The first steps are narrow, because the density of eigenvalues is not known yet.
     """
     kept = steps[:1]
-    for one, following in zip(steps[1:], [*steps[2:], None], strict=True):
+    for step, following in zip(steps[1:], [*steps[2:], None], strict=True):
         if following is None or (following[1] - kept[-1][1]).sum() > most:
-            kept.append(one)
+            kept.append(step)
     return kept
 
 
@@ -361,17 +381,6 @@ def between(low: float, known: int, high: float, crowd: int, goal: float) -> flo
     share = np.clip(goal / (crowd - known), 0.05, 0.9)
     root = np.sqrt(max(low, 0.0))
     return (root + share * (np.sqrt(high) - root)) ** 2
-
-
-# Residual of a Ritz pair relative to theta: as small as the vectors of neighbouring slices must be
-# orthogonal to each other, a few digits above rounding.
-TOLERANCE = 1e-12
-# With deflation: each search finds at least a block of each repeated eigenvalue.
-_SEARCHES = 40
-_SOFT = 1e-3  # of the matrix norm: noise of a hundred roundings is 1e-11 of an eigenvalue there
-_DENSE = 200  # unknowns below which LAPACK takes no longer than one factorisation and its overhead
-_MANY = 0.25  # share of all eigenvalues from which on LAPACK takes no longer
-_LARGEST_DENSE = 3000
 
 
 @dataclass(frozen=True)
@@ -486,11 +495,9 @@ def krylov_schur(
     return values[inside], vectors[:, inside]
 
 
-_LONGEST = 1.5  # of the wanted eigenvalues: the basis of Krylov-Schur before it restarts
 Search = Callable[[Shifted, float, float, int, np.ndarray, float], tuple[np.ndarray, np.ndarray]]
 SOLVERS: dict[str, Search] = {"lanczos": nearest, "slepc": krylov_schur}
 """What searches eigenpairs near the shift of a slice."""
-AUTO = "lanczos"
 
 
 def _check_count(found: int, interval: Interval) -> None:
@@ -549,16 +556,6 @@ def _regular_shift(matrix: sparse.csr_matrix, interval: Interval, team: ProcessG
         f"modes: K - sigma M is singular all around {_hertz(shift):.3f} Hz: the mesh has nodes "
         "without stiffness."
     )
-
-
-# Eigenvalues per slice and matrix: fewest, where teams wait for work, and most. The more, the fewer vectors
-# each takes (61,071 unknowns: 3.2 of 171, 2.6 of 326) and the fewer factors there are; but the basis grows.
-_SLICE = 64, 320
-_BASIS = 5e8  # bytes of it on one process, as far as half of that many eigenvalues allow
-_VECTORS = 2.6  # of the basis for each eigenvalue
-_PROBES = 8
-_FINEST = 1e-9  # relative width below which a crowded interval counts as one cluster
-_CROWDED = 1.6  # times the wanted number in a step: above, a boundary in between costs less
 
 
 class SymmetricPart(Protocol):
@@ -724,8 +721,8 @@ class SymmetricProblem:
         """The eigenpairs of a part, or the journal's copy of them. Collective in the team."""
 
         def solve() -> Entry:
-            given = self.parts[part].matrix, interval, self.team
-            values, vectors = eigenpairs(*given, SOLVERS[self._solver])
+            arguments = self.parts[part].matrix, interval, self.team
+            values, vectors = eigenpairs(*arguments, SOLVERS[self._solver])
             return {"values": values, "vectors": vectors}
 
         entry = self._journal.step(self.team.comm, solve)

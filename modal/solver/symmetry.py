@@ -31,6 +31,7 @@ _PROBES = 8  # random fields that tell whether an isometry leaves the matrix unc
 _PIECES = 8  # of a part, formed one by one to save memory
 _NEAR = 1e-6  # of the body's size: distance within which nodes are images of each other
 _OFF_CENTER = 0.37  # of a cell of that size: zero and the mesh's round numbers lie inside of cells
+_LONGEST = 4  # most nodes of a segment along the ring
 
 
 @dataclass(frozen=True)
@@ -225,9 +226,6 @@ def _halves(basis: sparse.csr_matrix, image: sparse.csr_matrix) -> list[sparse.c
         values = np.concatenate([root, np.ones(len(fixed)), parity * sign[pairs] * root])
         halves.append((basis @ sparse.csr_matrix((values, (rows, columns)), (size, count))).tocsr())
     return [half for half in halves if half.shape[1]]
-
-
-_LONGEST = 4  # most nodes of a segment along the ring
 
 
 @dataclass(frozen=True)

@@ -58,7 +58,7 @@ class _Split:
 
 @dataclass(frozen=True)
 class _Proof:
-    """What inertia proves: the eigenvalues next to zero, and how many lie below `top`."""
+    """Proof by inertia: the eigenvalues next to zero, and how many lie below `top`."""
 
     bottom: LowestEigenvalues
     top: float

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import fcntl
 import json
+import logging
 import os
 import shutil
 import time
@@ -25,7 +26,6 @@ import h5py
 from tireroad.fem.form_cache import user_folder
 from tireroad.runs.files import store
 from tireroad.runs.files.disk import Refused, replacing, write_text
-from tireroad.runs.process import console
 
 VARIABLE, OFF = "TIREROAD_CACHE", "off"
 SHARED = (
@@ -36,6 +36,7 @@ SHARED = (
     "greens",
     "stiffness",
 )  # stages kept in the user's own cache
+_LOG = logging.getLogger(__name__)
 LARGEST = 10e9  # bytes: largest size of the user's own cache
 
 
@@ -111,7 +112,7 @@ class Cache:
 
     def clear(self, unused_for: float) -> str:
         """Remove the stages unused for that many days; returns a report."""
-        old = [one for one in self.entries() if time.time() - one.used >= 86400 * unused_for]
+        old = [entry for entry in self.entries() if time.time() - entry.used >= 86400 * unused_for]
         for one in old:
             one.remove()
         for lock in self.folder.glob("*.lock") if self.folder and not unused_for else ():
@@ -163,7 +164,7 @@ class Cache:
             _link(path, self.place(stage, key))
             self._prune()
         except (OSError, Refused) as error:
-            console.say(f"  not kept for other runs, {VARIABLE} = {self.folder}: {error}")
+            _LOG.warning(f"  not kept for other runs, {VARIABLE} = {self.folder}: {error}")
 
     def _figures(self, stage: str, key: str) -> Path:
         return self.place(stage, key).with_suffix(".json")
@@ -184,7 +185,7 @@ class Cache:
                 try:
                     fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 except BlockingIOError:
-                    console.say(f"{stage:9s} waits for another run that computes the same stage")
+                    _LOG.warning(f"{stage:9s} waits for another run that computes the same stage")
                     fcntl.flock(lock, fcntl.LOCK_EX)
             yield
 

@@ -1,6 +1,4 @@
-"""Atomic file writes, and messages for a disk that is full or read-only.
-
-Checksums in result files, verified before their content is read.
+"""Files written whole or not at all, with a checksum; messages for a disk that is full or read-only.
 
 HDF5 files may begin with a user block. Ours holds the SHA-256 of all bytes after it, so that data,
 shapes, attributes and HDF5's own structures are covered, the checksum moves with a copied file, and
@@ -24,6 +22,14 @@ from tireroad.fem.errors import InputError
 _SLACK = 1.0  # s: tolerance between file and process clocks
 FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 REFUSED = {errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR, errno.EISDIR, errno.ENAMETOOLONG}
+FACTORS = ".factors"  # subfolder of a result folder for factors that do not fit into memory
+BLOCK = 512  # bytes, the minimum in HDF5
+_TITLE = b"tireroad result (HDF5). SHA-256 of all bytes from 512 on:\n"
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+_SIGNATURE = "# SHA-256 of the lines above: "
+_ENTRY = "checksum"
+_known: dict[str, tuple[int, ...]] = {}
+"""Files that this process found intact, with file attributes that change on writing."""
 
 
 class Refused(InputError):
@@ -61,9 +67,6 @@ class Removed(FileNotFoundError):
 def part_of(path: Path) -> Path:
     """The temporary name that this process uses beside `path`."""
     return path.with_name(f".{path.name}.{socket.gethostname()}.{os.getpid()}.part")
-
-
-FACTORS = ".factors"  # subfolder of a result folder for factors that do not fit into memory
 
 
 def remove_factors(directory: Path) -> None:
@@ -130,17 +133,6 @@ def write_text(path: Path, text: str) -> None:
     """Write a small text file atomically."""
     with replacing(path) as part:
         part.write_text(text, encoding="utf-8")
-
-
-BLOCK = 512  # bytes, the minimum in HDF5
-_TITLE = b"tireroad result (HDF5). SHA-256 of all bytes from 512 on:\n"
-_HDF5 = b"\x89HDF\r\n\x1a\n"
-
-_SIGNATURE = "# SHA-256 of the lines above: "
-_ENTRY = "checksum"
-
-_known: dict[str, tuple[int, ...]] = {}
-"""Files that this process found intact, with file attributes that change on writing."""
 
 
 class NoChecksum(Exception):

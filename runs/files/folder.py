@@ -23,12 +23,16 @@ from tireroad.runs.files.disk import (
     text_digest,
     write_text,
 )
+from tireroad.runs.files.names import MARK, STAGES, scene_name
 from tireroad.runs.files.store import opened, plain
-from tireroad.runs.scene.plan import STAGES
-from tireroad.runs.scene.resolved import MARK, scene_name
 from tireroad.runs.version import PROGRAM, RESULT_FORMAT, VERSION
 
 OTHER = "choose another folder with --out, or remove this one; nothing was written"
+MADE_OF = "made_of.txt"
+CHOSEN = "chosen.toml"
+"""The scene with the settings that a search has found."""
+UNFINISHED = ("checkpoint.h5", "static_last.h5")
+"""Files of a stage that has not ended: no entry of the summary tells of them."""
 
 
 def earlier_summary(directory: Path) -> dict[str, Any] | None:
@@ -115,9 +119,6 @@ def make_folder(directory: Path) -> None:
         raise _unusable(directory, error) from None
 
 
-MADE_OF = "made_of.txt"
-
-
 def folder_of(file: Path, of: Path = Path("results")) -> Path:
     """The folder for what is made from a file that is no scene: results/NAME, results/NAME-2, …
 
@@ -194,12 +195,6 @@ def _unusable(directory: Path, error: OSError) -> InputError:
         f"{directory}: cannot be written: {error.strerror}; choose another with --out"
     )
     return InputError(str(clear))
-
-
-CHOSEN = "chosen.toml"
-"""The scene with the settings that a search has found."""
-UNFINISHED = ("checkpoint.h5", "static_last.h5")
-"""Files of a stage that has not ended: no entry of the summary tells of them."""
 
 
 def has_result(entry: Mapping[str, Any] | None) -> bool:

@@ -1,12 +1,10 @@
-"""Result files, written under a temporary name and renamed, so that an existing file is complete.
+"""Result files: provenance, hash of the inputs, and the datasets that a product declares.
 
-What a result depends on besides its inputs: the program's sources and the libraries.
-
-Part of every stage's hash, so that no result is reused after the code or a library has changed.
-
-Only the root process writes; callers gather the arrays. Every HDF5 file carries the resolved scene,
-the hash of its inputs, program and library versions, the number of processes, and a checksum that
-`opened` verifies before the file is read.
+A file is written under a temporary name and renamed, so that an existing one is complete. Only the
+root process writes; callers gather the arrays. Every HDF5 file carries the resolved scene, the hash
+of its inputs, program and library versions, the number of processes, and a checksum that `opened`
+verifies before the file is read. The program's sources and the libraries are part of every stage's
+hash, so that no result is reused after one of them has changed.
 """
 
 import functools
@@ -36,10 +34,10 @@ ROOT = Path(__file__).resolve().parents[2]
 # includes all packages of an earlier one: whatever changes an earlier result changes its hash too.
 # Damping affects the static state of a rolling tire; with a moving axle, the modes depend on the
 # time loop.
-_TIRE = ("fem", "runs/stages", "modal")
+_TIRE = ("fem", "runs/scene/physics.py", "runs/stages", "modal")
 _ALL = (*_TIRE, "greens", "contact")
 PACKAGES: Mapping[str, tuple[str, ...]] = {"static": _TIRE}
-"""Source folders that a stage depends on; all five packages if it is not listed here."""
+"""Sources that a stage depends on; all that compute if it is not listed here."""
 
 WHEEL = "dolfinx-solver-real"  # dolfinx, PETSc and SLEPc without distributions of their own
 LIBRARIES = {
@@ -54,6 +52,11 @@ LIBRARIES = {
 }
 """Libraries whose version can change a result, with the distributions that may hold them."""
 
+LOADED = ("mpi4py", "h5py")
+"""Libraries named in result files besides those in `identity`."""
+
+AGAIN = "run its scene again, which computes it anew"
+
 
 @dataclass(frozen=True)
 class Identity:
@@ -63,7 +66,7 @@ class Identity:
     libraries: Mapping[str, str]
 
     def differs(self, code: str, libraries: Mapping[str, str]) -> str:
-        """What has changed since a result was computed by `code` with `libraries`; "" if none."""
+        """Changes since a result was computed by `code` with `libraries`; "" if none."""
         if code != self.code:
             return "the program's code has changed since"
         changed = [
@@ -83,10 +86,9 @@ def identity(stage: str) -> Identity:
 def _code(folders: tuple[str, ...]) -> str:
     digest = hashlib.sha256()
     for folder in folders:
-        sources = (
-            path for path in (ROOT / folder).rglob("*") if path.suffix in (".py", ".c", ".h")
-        )
-        for path in sorted(sources):
+        place = ROOT / folder
+        inside = (path for path in place.rglob("*") if path.suffix in (".py", ".c", ".h"))
+        for path in [place] if place.is_file() else sorted(inside):
             digest.update(f"{path.relative_to(ROOT)}\0".encode())
             digest.update(path.read_bytes() + b"\0")
     return digest.hexdigest()
@@ -177,12 +179,6 @@ class Disk(io.RawIOBase):
     def close(self) -> None:
         self._file.close()
         super().close()
-
-
-LOADED = ("mpi4py", "h5py")
-"""Libraries named in result files besides those in `identity`."""
-
-AGAIN = "run its scene again, which computes it anew"
 
 
 @dataclass(frozen=True)
@@ -334,7 +330,7 @@ def why_not(path: Path, wanted: str, stage: str) -> str:
 
 
 def _changed(found: Mapping[str, Any], now: Identity) -> str:
-    """What has changed since a file with these attributes was written."""
+    """Changes since a file with these attributes was written."""
     if "code" not in found:
         return "it is of an earlier version"
     libraries = json.loads(found["libraries"])

@@ -1,4 +1,4 @@
-"""What the launcher asks of a python: which packages it lacks, and an environment made of wheels.
+"""Questions of the launcher to a python: which packages it lacks, and an environment made of wheels.
 
 Run by the launcher as a script on whatever python3 there is, before any package is known to be
 installed: standard library only, and no syntax later than Python 3.11.

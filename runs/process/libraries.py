@@ -1,4 +1,4 @@
-"""What must be settled before shared libraries are loaded: BLAS kernels, MPI in a Slurm step, MPI and compiler of wheels."""
+"""Settings that must be made before shared libraries are loaded: BLAS kernels, MPI in a Slurm step, MPI and compiler of wheels."""
 
 import _ctypes
 import ctypes

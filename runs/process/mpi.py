@@ -30,6 +30,8 @@ T = TypeVar("T")
 TOGETHER = 3.0
 """Seconds that a failing process waits for the others to fail as well before it ends them all."""
 
+KEPT = "completed stages are kept; run the same command or `resume` to continue"
+
 
 def start_petsc(options: list[str]) -> None:
     """Initialise PETSc with the user's options; must be the first use of PETSc.
@@ -45,9 +47,6 @@ def start_petsc(options: list[str]) -> None:
 def on_root(comm: Any, function: Callable[[], T]) -> T:
     """Like fem.parallel.on_root; a removed result folder is raised on all processes. Collective."""
     return parallel.on_root(comm, function, (InputError, ConvergenceError, Removed))
-
-
-KEPT = "completed stages are kept; run the same command or `resume` to continue"
 
 
 @dataclass

@@ -13,6 +13,21 @@ from typing import Any
 
 DONE, BUG, INPUT, GAVE_UP, STOPPED = 0, 1, 2, 3, 4
 
+# Variables of what starts a process with MPI: Open MPI's mpirun, and PMI or PMIx of any launcher.
+_OF_MPI = "OMPI_COMM_WORLD_SIZE", "PMIX_NAMESPACE", "PMIX_RANK", "PMI_RANK", "PMI_FD", "PMI_PORT"
+_UNDER_NOHUP = signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1) + (
+    () if _UNDER_NOHUP else (signal.SIGHUP,)
+)
+"""mpirun forwards SIGUSR1 to every process; the launcher uses it. Under nohup SIGHUP is ignored."""
+
+TOGETHER = 1.0
+"""Seconds within which signals count as one request: a terminal, a batch system or `timeout` may
+send one to a process, its group and its parent, which forwards it."""
+
+DEFERRED = b"d"
+"""Message to the supervisor: the loop has noted the request and will end by itself."""
+
 
 def rank_before_mpi() -> int:
     """The rank according to the process manager, for commands that never start MPI."""
@@ -20,10 +35,6 @@ def rank_before_mpi() -> int:
         if os.environ.get(name, "").isdigit():
             return int(os.environ[name])
     return 0
-
-
-# Variables of what starts a process with MPI: Open MPI's mpirun, and PMI or PMIx of any launcher.
-_OF_MPI = "OMPI_COMM_WORLD_SIZE", "PMIX_NAMESPACE", "PMIX_RANK", "PMI_RANK", "PMI_FD", "PMI_PORT"
 
 
 def without_mpi(variables: Mapping[str, str]) -> int:
@@ -74,17 +85,6 @@ def handed_over(status: int, for_all: bool = True) -> int:
     return DONE
 
 
-_UNDER_NOHUP = signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
-STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1) + (
-    () if _UNDER_NOHUP else (signal.SIGHUP,)
-)
-"""mpirun forwards SIGUSR1 to every process; the launcher uses it. Under nohup SIGHUP is ignored."""
-
-TOGETHER = 1.0
-"""Seconds within which signals count as one request: a terminal, a batch system or `timeout` may
-send one to a process, its group and its parent, which forwards it."""
-
-
 class Stopped(BaseException):
     """The user or the batch system requested a stop: exit status 4.
 
@@ -122,10 +122,6 @@ class _Heard:
 
     at: float = -1e9
     supervisor: int | None = None
-
-
-DEFERRED = b"d"
-"""Message to the supervisor: the loop has noted the request and will end by itself."""
 
 
 def tell_when_deferred(descriptor: int) -> None:

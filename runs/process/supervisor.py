@@ -1,6 +1,4 @@
-"""Standard streams that may be closed, or get closed, while the program runs.
-
-The supervisor process of a run, which ensures that the computing process ends properly.
+"""The supervisor process of a run ensures that the computing process ends properly.
 
 Python handles a signal only between two of its own instructions, so a process inside a library's
 eigensolver or factorisation does not react for minutes, and one that is killed cannot report it.
@@ -26,6 +24,14 @@ from tireroad.runs.process.signals import (
     in_parallel,
     rank_before_mpi,
 )
+
+PATIENCE = 8.0
+"""Seconds from a stop request to killing the worker. A loop that has noted the request writes its
+checkpoint first, however long that takes; elsewhere files are complete or absent, so nothing is
+lost."""
+
+_AGAIN = "completed stages are kept; run the same command or `resume` to continue"
+_PR_SET_PDEATHSIG = 1
 
 
 class _Sink(io.RawIOBase):
@@ -99,15 +105,6 @@ def refused() -> OSError | None:
     sink = getattr(getattr(sys.stdout, "buffer", None), "raw", None)
     error = sink.error if isinstance(sink, _Sink) else None
     return None if isinstance(error, BrokenPipeError) else error
-
-
-PATIENCE = 8.0
-"""Seconds from a stop request to killing the worker. A loop that has noted the request writes its
-checkpoint first, however long that takes; elsewhere files are complete or absent, so nothing is
-lost."""
-
-_AGAIN = "completed stages are kept; run the same command or `resume` to continue"
-_PR_SET_PDEATHSIG = 1
 
 
 def supervise() -> None:
@@ -185,14 +182,14 @@ def _killed(worker: int, asked: str) -> int:
 
 def _parts(worker: int) -> list[Path]:
     """Temporary result files that the worker has open."""
-    found = []
+    parts = []
     with suppress(OSError):
         for entry in os.scandir(f"/proc/{worker}/fd"):
             with suppress(OSError):
                 target = Path(os.readlink(entry.path))
                 if target.name.startswith(".") and target.name.endswith(f".{worker}.part"):
-                    found.append(target)
-    return found
+                    parts.append(target)
+    return parts
 
 
 def _verdict(worker: int, state: int, asked: str) -> int:

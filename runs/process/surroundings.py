@@ -10,6 +10,13 @@ from pathlib import Path
 
 from tireroad.fem.errors import InputError
 
+# Option prefixes of the PETSc objects that factorise: modes and responses, static state, full
+# states of a rotating tire.
+_PREFIXES = "", "static_", "rotating_st_"
+LEAST_ADDRESSES = 2e9  # bytes; the libraries reserve 1 GB, and OpenBLAS waits forever for more
+LEAST_FILE = 64e6  # bytes of a file: MPI's shared memory, results
+LEAST_TEMPORARY = 16e6  # bytes free for MPI's session and shared memory
+
 
 def forget_peak() -> None:
     """Reset the maximum of `peak_memory`, if the kernel supports it (/proc/self/clear_refs)."""
@@ -28,11 +35,6 @@ def peak_memory() -> float:
         return 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     (own,) = (line.split()[1] for line in lines if line.startswith("VmHWM:"))
     return 1024.0 * float(own)
-
-
-# Option prefixes of the PETSc objects that factorise: modes and responses, static state, full
-# states of a rotating tire.
-_PREFIXES = "", "static_", "rotating_st_"
 
 
 @contextmanager
@@ -71,11 +73,6 @@ def available_memory() -> float:
         used = float(Path("/sys/fs/cgroup/memory.current").read_text(encoding="ascii"))
         free = min(free, limit - used)
     return free
-
-
-LEAST_ADDRESSES = 2e9  # bytes; the libraries reserve 1 GB, and OpenBLAS waits forever for more
-LEAST_FILE = 64e6  # bytes of a file: MPI's shared memory, results
-LEAST_TEMPORARY = 16e6  # bytes free for MPI's session and shared memory
 
 
 def check_surroundings() -> None:

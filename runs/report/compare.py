@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
@@ -23,7 +22,6 @@ from tireroad.contact.results.spectra import in_band
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.disk import write_text
 from tireroad.runs.files.folder import UNFINISHED
-from tireroad.runs.files.reader import RunResults
 from tireroad.runs.report.figures import (
     CYCLE,
     FEWEST_BANDS,
@@ -35,15 +33,18 @@ from tireroad.runs.report.figures import (
     envelope,
     styled,
 )
+from tireroad.runs.report.kit import page_of
 from tireroad.runs.report.levels import BandLevels, band_levels, is_drawn
-from tireroad.runs.report.read import quantity, shown_unit
+from tireroad.runs.report.read import shown_unit
 from tireroad.runs.report.scene_keys import scene_keys
 from tireroad.runs.report.surface_figures import PRESSURE, frame
-from tireroad.runs.version import PROGRAM, VERSION
+from tireroad.runs.results.reader import RunResults
 
 Array = NDArray[np.float64]
 _ROUNDING = 1e-9  # relative: a load that is given comes out so near
 MATCHED = 24  # lowest modes of the first run that are matched in the others
+DASHES = ("-", "--")
+MOST = 12
 
 
 @dataclass(frozen=True)
@@ -166,9 +167,6 @@ def assurance(first: Array, second: Array) -> Array:
     return (a @ b.T) ** 2 / np.maximum(square, 1e-300)
 
 
-DASHES = ("-", "--")
-
-
 def pen(number: int) -> dict[str, str]:
     """Colour and dashes for the curve of run `number`."""
     return {"color": CYCLE[number % len(CYCLE)], "ls": DASHES[number // len(CYCLE) % 2]}
@@ -238,9 +236,6 @@ def footprints(runs: Mapping[str, tuple[Array, Array]], width: float) -> str:
     return encode(figure, "png")
 
 
-MOST = 12
-
-
 def compare(directories: Sequence[Path], out: Path) -> Path:
     """Write out/compare.html and out/compare.csv; returns the page. Not collective.
 
@@ -298,15 +293,10 @@ def _table(names: Sequence[str], groups: dict[str, list[Row]]) -> str:
 
 
 def _page(runs: Sequence[RunResults], names: Sequence[str], groups: dict[str, list[Row]]) -> str:
-    pages = Environment(
-        loader=FileSystemLoader(Path(__file__).parent / "pages"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-    )
-    pages.filters |= {"quantity": quantity, "change": _change}
-    return pages.get_template("compare.html.j2").render(
-        program=f"{PROGRAM} {VERSION}",
+    return page_of(
+        "compare",
+        f"{len(names)} runs compared",
+        filters={"change": _change},
         names=names,
         tables=_tables(groups),
         scene=groups["scene"],
@@ -355,13 +345,13 @@ def _figures(
     runs: Sequence[RunResults], names: Sequence[str], levels: Sequence[Row]
 ) -> list[Drawing]:
     """Charts of the third octaves that several runs have, of histories and of footprints."""
-    found = []
+    figures = []
     for group in dict.fromkeys(row.group for row in levels if is_drawn(row.group)):
         rows = [row for row in levels if row.group == group]
         several = sum(any(row.values[k] is not None for row in rows) for k in range(len(runs))) > 1
         if len(rows) >= FEWEST_BANDS and several:  # fewer are in the table
             text = f"Third octaves: {group}."
-            found.append(drawing(partial(levels_figure, rows, names), text))
+            figures.append(drawing(partial(levels_figure, rows, names), text))
     histories = {
         name: _valid(run)
         for name, run in zip(names, runs, strict=True)
@@ -369,7 +359,7 @@ def _figures(
     }
     if len(histories) > 1:
         text = "Vertical contact force over time, below the limit of each run's spectra."
-        found.append(drawing(partial(histories_figure, histories), text))
+        figures.append(drawing(partial(histories_figure, histories), text))
     prints = {
         name: (run["static/contact/points"], run["static/contact/pressure"])
         for name, run in zip(names, runs, strict=True)
@@ -377,8 +367,8 @@ def _figures(
     }
     if len(prints) > 1:
         text = "Contact pressure at rest, one scale for all."
-        found.append(drawing(partial(footprints, prints), text))
-    return found
+        figures.append(drawing(partial(footprints, prints), text))
+    return figures
 
 
 def _valid(run: RunResults) -> tuple[Array, Array]:

@@ -47,8 +47,8 @@ class ElementSurface:
         length = np.linalg.norm(np.diff(line, axis=0), axis=1)
         across = np.maximum(np.ceil(ALONG * length / length.sum()).astype(int), order)
         rows, columns = _fine(edge, parts, around), _fine(edge, across, along)
-        made = ElementSurface(points, quads, rows, columns)
-        fine = made.field(points)
+        surface = ElementSurface(points, quads, rows, columns)
+        fine = surface.field(points)
         return ElementSurface(fine, _quads(len(rows), len(columns)), rows, columns)
 
     def field(self, values: NDArray) -> NDArray:

@@ -19,6 +19,33 @@ from numpy.typing import NDArray
 from tireroad.contact.results.spectra import SILENT, nominal
 
 DRAWN = 600  # bins of a long series; each keeps its minimum and maximum
+COMPONENTS = ("x, forward", "y, along the axle", "z, up")
+# Okabe and Ito's colours, distinguishable for colour-blind readers.
+CYCLE = ("#0072b2", "#009e73", "#d55e00", "#cc79a7", "#e69f00", "#56b4e9")
+COLOURS = CYCLE[:3]
+MUTED = "#9aa5b1"
+STYLE = {
+    "font.size": 9,
+    "axes.titlesize": 9,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#7b8794",
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#e4e7eb",
+    "legend.frameon": False,
+    "lines.linewidth": 1.0,
+    "svg.hashsalt": "tireroad",
+    "path.simplify_threshold": 0.5,
+}
+styled = matplotlib.rc_context(STYLE)  # decorator for every figure
+WIDE = 6.3  # inches: widest figure whose text is still readable when a phone shows it in full
+NARROW = 4.2  # inches: of the same on a phone, where pages have room for both
+RANGE_DB = 100.0  # dB: lines further below the highest one of a spectrum are not drawn
+LEAST_RANGE_DB = 20.0  # dB: on a smaller range, tiny differences between bars look large
+FEWEST_BANDS = 3  # of a chart: fewer are said in numbers
 
 
 def envelope(x: NDArray, y: NDArray, bins: int = DRAWN) -> tuple[NDArray, NDArray]:
@@ -46,37 +73,6 @@ def peak_hold(frequency: NDArray, level: NDArray, bins: int = DRAWN) -> tuple[ND
     first = np.unique(np.searchsorted(np.log(frequency), edges[:-1]))
     highest = np.maximum.reduceat(level, first)
     return frequency[first], highest
-
-
-COMPONENTS = ("x, forward", "y, along the axle", "z, up")
-# Okabe and Ito's colours, distinguishable for colour-blind readers.
-CYCLE = ("#0072b2", "#009e73", "#d55e00", "#cc79a7", "#e69f00", "#56b4e9")
-COLOURS = CYCLE[:3]
-MUTED = "#9aa5b1"
-STYLE = {
-    "font.size": 9,
-    "axes.titlesize": 9,
-    "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.edgecolor": "#7b8794",
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "grid.color": "#e4e7eb",
-    "legend.frameon": False,
-    "lines.linewidth": 1.0,
-    "svg.hashsalt": "tireroad",
-    "path.simplify_threshold": 0.5,
-}
-styled = matplotlib.rc_context(STYLE)  # decorator for every figure
-WIDE = 6.3  # inches: widest figure whose text is still readable when a phone shows it in full
-NARROW = 4.2  # inches: of the same on a phone, where pages have room for both
-RANGE_DB = 100.0  # dB: lines further below the highest one of a spectrum are not drawn
-LEAST_RANGE_DB = 20.0  # dB: on a smaller range, tiny differences between bars look large
-
-
-FEWEST_BANDS = 3  # of a chart: fewer are said in numbers
 
 
 @dataclass(frozen=True)

@@ -20,18 +20,32 @@ from tireroad.contact.roads.under_tire import REFERENCE, Texture, texture_of
 from tireroad.fem.decks.compounds import SYSTEMS, Rubber
 from tireroad.fem.decks.deck import Deck
 from tireroad.fem.decks.history import DeckHistory, history
-from tireroad.fem.decks.own import MESHES, Wishes, no_solids, section_of
+from tireroad.fem.decks.user_section import MESHES, Wishes, no_solids, section_of
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections.construction import INFLATION, RADII
+from tireroad.runs.files.names import scene_name
 from tireroad.runs.report.figures import COLOURS, WIDE, canvas, styled
 from tireroad.runs.report.section_figure import NAME, save_section
-from tireroad.runs.scene.resolved import literal, scene_name
+from tireroad.runs.scene.resolved import literal
 from tireroad.runs.scene.sections.file import FileSection, own_section
 from tireroad.runs.scene.tables.tire import TireTable
 
 _RIM = re.compile(r"RIM|BEAD|FLANGE|WHEEL")
 _INNER = re.compile(r"INNER|INSIDE|LINER|CAVITY|INFLAT|PRESS|_IN\b|^IN\b")
 _TREAD = re.compile(r"TREAD|OUTSIDE|OUTER|GROUND|ROAD|CONTACT|_OUT\b|^OUT\b")
+KINDS = {
+    ".crg": ("crg",),
+    ".npz": ("grid",),
+    ".h5": ("grid",),
+    ".hdf5": ("grid",),
+    ".csv": ("grid", "laser"),
+    ".nc": ("grid",),
+    **dict.fromkeys((".txt", ".tsv", ".xyz"), ("grid", "laser")),
+    **dict.fromkeys((".dat", ".asc", ".prn"), ("laser",)),
+}
+"""Kinds of road by ending, in the order in which they are tried."""
+_LONG = 0.35  # m: shortest wave of the fit of ISO 8608, 2.83 cycles a metre
+_MOST = 400_000  # heights of the middle line that are evaluated
 
 
 def is_tire_file(path: Path) -> bool:
@@ -40,7 +54,7 @@ def is_tire_file(path: Path) -> bool:
 
 
 def describe_tire(path: Path, out: Path) -> str:
-    """What a deck or mesh holds, with a scene to start from, which is out/scene.toml, too.
+    """Describe the content of a deck or mesh, with a scene to start from, which is out/scene.toml, too.
 
     Draws out/section.png and, of rubbers fitted to test data, out/test_data.png. Raises InputError
     where no section can be made of the file, after writing the scene as far as it is known.
@@ -257,28 +271,13 @@ def draw_fits(rubbers: list[Rubber]) -> Figure:
     return figure
 
 
-KINDS = {
-    ".crg": ("crg",),
-    ".npz": ("grid",),
-    ".h5": ("grid",),
-    ".hdf5": ("grid",),
-    ".csv": ("grid", "laser"),
-    ".nc": ("grid",),
-    **dict.fromkeys((".txt", ".tsv", ".xyz"), ("grid", "laser")),
-    **dict.fromkeys((".dat", ".asc", ".prn"), ("laser",)),
-}
-"""Kinds of road by ending, in the order in which they are tried."""
-_LONG = 0.35  # m: shortest wave of the fit of ISO 8608, 2.83 cycles a metre
-_MOST = 400_000  # heights of the middle line that are evaluated
-
-
 def is_road_file(path: Path) -> bool:
     """Whether a file's ending is that of a road."""
     return path.suffix.lower() in KINDS
 
 
 def describe_road(path: Path, out: Path) -> str:
-    """What a road file holds, and a [road] to paste; draws out/road.png. InputError where it is none."""
+    """Describe the content of a road file, and a [road] to paste; draws out/road.png. InputError where it is none."""
     if not path.is_file():
         raise InputError(f"{path}: no such file")
     kind, road, more = _read(path)
@@ -288,7 +287,7 @@ def describe_road(path: Path, out: Path) -> str:
     lines = [
         f'{path}: a road of kind "{kind}"',
         f"  {length:.6g} m long every {1e3 * along:.4g} mm, {width:.4g} m wide every {1e3 * across:.4g} mm",
-        *(f"  {_reading(one)}" for one in road.readings),
+        *(f"  {_reading(reading)}" for reading in road.readings),
         *(f"  {note}" for note in road.notes),
         f"  along its middle: heights from {1e3 * z.min():.4g} to {1e3 * z.max():.4g} mm, standard deviation {1e3 * z.std():.3g} mm",
     ]
@@ -314,7 +313,7 @@ def describe_road(path: Path, out: Path) -> str:
 
 
 def _reading(one: ReadAs) -> str:
-    """What was read of the file as what."""
+    """Lines on the quantities that were read of the file, with places and units."""
     return f"{one.quantity}: {one.place}, {one.unit}" + (f", {one.remark}" if one.remark else "")
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.contact.results.spectra import SILENT, nominal
-from tireroad.runs.files.reader import RunResults
+from tireroad.runs.results.reader import RunResults
 
 Array = NDArray[np.float64]
 AXES = ("x", "y", "z")

@@ -1,7 +1,4 @@
-"""report.html: one self-contained page about a result folder, with a summary on top.
-
-Rates error indicators: limits, and a word for the reader.
-"""
+"""report.html: one self-contained page about a result folder, with a summary on top."""
 
 from __future__ import annotations
 
@@ -9,18 +6,19 @@ import json
 import tomllib
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
-from math import inf
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from tireroad.contact.results.spectra import SILENT, deviation
 from tireroad.fem.errors import InputError
 from tireroad.runs.files import folder
 from tireroad.runs.files.disk import is_as_signed, is_table_as_signed, write_text
+from tireroad.runs.files.names import STAGES
 from tireroad.runs.report import live
+from tireroad.runs.report.kit import page_of
+from tireroad.runs.report.ratings import FAIR, GOOD, POOR, verdict
 from tireroad.runs.report.read import (
     Absent,
     Results,
@@ -36,13 +34,26 @@ from tireroad.runs.report.scene_keys import scene_keys
 from tireroad.runs.report.sections import forces, modes, sound, spectra, tire
 from tireroad.runs.report.sections.speeds import speeds
 from tireroad.runs.scene.parts import Listing, listed
-from tireroad.runs.scene.plan import STAGES
 from tireroad.runs.version import PROGRAM
 
 Fact = tuple[str, str]
 _MODES = 4
 _HEARD = 3  # microphones among the first figures
 _SPREAD = "error of the deviation of the"
+Given = Callable[[str, str], float | None]
+_KNOWN = 0.9  # least part of a total that lies in bands of known error
+
+SECTIONS: Mapping[str, Callable[[Results], Section]] = {
+    "static.h5": tire.static,
+    "contact.h5": forces.contact,
+    "spectra.h5": spectra.spectra,
+    "sound.h5": sound.sound,
+    "vibration.h5": modes.vibration,
+    "response.h5": forces.response,
+    "stiffness.h5": tire.stiffness,
+    "modes.h5": tire.modes,
+    "rotating.h5": modes.rotating,
+}
 
 
 def answer(results: Results, stages: Mapping[str, Any]) -> list[Fact]:
@@ -68,9 +79,6 @@ class _Headlines:
         ]
         value = (groups[0].get(name) or groups[1].get(name) or {}).get("value")
         return float(value) if isinstance(value, int | float) else None
-
-
-Given = Callable[[str, str], float | None]
 
 
 def _standing(results: Results, given: Given) -> list[Fact]:
@@ -129,7 +137,7 @@ def _of_spectra(results: Results, name: str) -> Any:
 def _levels(results: Results, given: Given) -> list[Fact]:
     """Levels of the vertical forces over all lines up to the frequency limit, and their errors."""
     end = results.attribute("spectra.h5", "limit")
-    found = []
+    levels = []
     held = str(results.attribute("spectra.h5", "axle_force_is") or "")
     axle = "hub force" if held.startswith("force on the hub") else "blocked axle force"
     upto = f", to {quantity(end, 'Hz')}" if end else ""
@@ -144,13 +152,10 @@ def _levels(results: Results, given: Given) -> list[Fact]:
             text = f"{total:.1f} dB re 1 N, error {about(_error_of(total, level, error))}"
             weighted = given("spectra", f"A-weighted level of the vertical {name}")
             text += f"; {weighted:.1f} dB(A) re 1 N" if weighted is not None else ""
-            found.append((f"{what} z{upto}", text.replace("-", "−")))
+            levels.append((f"{what} z{upto}", text.replace("-", "−")))
         elif level is not None and level[:, 2].max(initial=-np.inf) <= SILENT:
-            found.append((f"{what} z", "constant: no level"))
-    return [*found, ("valid up to", quantity(end, "Hz"))] if end else found
-
-
-_KNOWN = 0.9  # least part of a total that lies in bands of known error
+            levels.append((f"{what} z", "constant: no level"))
+    return [*levels, ("valid up to", quantity(end, "Hz"))] if end else levels
 
 
 def _error_of(total: float, level: np.ndarray | None, error: np.ndarray | None) -> float:
@@ -190,64 +195,15 @@ def _modes(results: Results, _: Given) -> list[Fact]:
     return [("lowest modes, undamped", told)] if len(lowest) else []
 
 
-# (part of the indicator's name, largest good value, largest usable value); the first match counts.
-# At these limits a figure of the report would begin to change: 1e-6 of an eigenvector is 1e-12 of
-# its frequency; 1 % of the load is 1 % of the forces.
-LIMITS: tuple[tuple[str, float, float], ...] = (
-    ("least contact force", 0.0, 0.0),  # no point may pull; see `verdict`
-    ("largest penetration", 1e-9, 1e-6),
-    ("estimated error of the load", 1.0, 3.0),
-    ("residual in the static flexibility", 0.5, 1.0),
-    ("worst complementarity residual", 1e-9, 1e-6),
-    ("energy", inf, inf),  # in joules: rated by the other energy figures
-    ("residual states", inf, inf),  # a count
-    ("residual", 1e-8, 1e-5),
-    ("orthonormality", 1e-9, 1e-6),
-    ("identity", 1e-9, 1e-6),
-    ("biorthogonality", 1e-9, 1e-6),
-    ("basis condition", 1e4, 1e6),
-    ("near-defective", 0.0, 10.0),
-    ("truncation error", 0.05, 0.2),
-)
-GOOD, FAIR, POOR = "good", "fair", "poor"
-
-
-def verdict(name: str, value: Any) -> str:
-    """ "good", "fair", "poor", or "" for a figure without a rating."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return ""
-    if name == "least contact force":
-        return GOOD if value >= 0 else POOR
-    for part, good, fair in LIMITS:
-        if part in name:
-            if good == inf:
-                return ""
-            return GOOD if value <= good else FAIR if value <= fair else POOR
-    return ""
-
-
 def verdicts(stages: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str, Any, str, str]]:
     """(stage, indicator, value, unit, verdict) of every indicator in a summary; poor ones first."""
     rows = [
-        (stage, name, entry["value"], entry.get("unit", ""), verdict(name, entry["value"]))
+        (stage, name, entry["value"], entry.get("unit", ""), verdict(stage, name, entry["value"]))
         for stage, found in stages.items()
         for name, entry in (found.get("indicators") or {}).items()
     ]
     order = {POOR: 0, FAIR: 1, GOOD: 2, "": 3}
     return sorted(rows, key=lambda row: order[row[4]])
-
-
-SECTIONS: Mapping[str, Callable[[Results], Section]] = {
-    "static.h5": tire.static,
-    "contact.h5": forces.contact,
-    "spectra.h5": spectra.spectra,
-    "sound.h5": sound.sound,
-    "vibration.h5": modes.vibration,
-    "response.h5": forces.response,
-    "stiffness.h5": tire.stiffness,
-    "modes.h5": tire.modes,
-    "rotating.h5": modes.rotating,
-}
 
 
 def write_report(directory: Path) -> Path:
@@ -290,18 +246,18 @@ def render(directory: Path) -> str:
         if warning != short
     ]
     remarked += [(section.title, warning) for section in sections for warning in section.warnings]
-    loader = FileSystemLoader(Path(__file__).parent / "pages")
-    pages = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
-    pages.filters |= {"quantity": quantity, "in_script": in_script}
-    return pages.get_template("report.html.j2").render(
-        name=summary.get("scene") or scene.get("name") or directory.resolve().name,
-        program={"name": PROGRAM, "version": ""} | summary.get("program", {}),
+    program = {"name": PROGRAM, "version": ""} | summary.get("program", {})
+    return page_of(
+        "report",
+        summary.get("scene") or scene.get("name") or directory.resolve().name,
+        filters={"in_script": in_script},
+        program=f"{program['name']} {program['version']}",
         processes=summary.get("processes"),
         computed=computed(directory),
         too_short=short,
         answer=facts,
         script=live.script(),
-        style=live.style(),
+        uplot=live.style(),
         warnings=ended + [("report", problem) for problem in problems] + remarked,
         stages=stages,
         judged=judged,
@@ -316,7 +272,7 @@ def render(directory: Path) -> str:
 
 
 def too_short(results: Results) -> str:
-    """What the spectra say of a run without its low third octaves, for the head of the page."""
+    """The remark of the spectra on a run without its low third octaves, for the head of the page."""
     try:
         return str(results.attribute("spectra.h5", "too_short") or "")
     except (Absent, InputError):

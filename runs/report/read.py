@@ -32,7 +32,8 @@ def quantity(value: object, unit: str = "") -> str:
     if isinstance(value, (list, tuple)):
         return ", ".join(quantity(part, unit) for part in value)
     if not isinstance(value, (int, float)):
-        return f"{value} {shown_unit(unit)}".rstrip()
+        text = str(value)  # with the unit of the numbers in it; "auto" has none
+        return f"{text} {shown_unit(unit)}".rstrip() if any(map(str.isdigit, text)) else text
     factor, symbol = _prefix(value, unit)
     return f"{digits(value / factor)} {symbol}".rstrip()
 

@@ -210,7 +210,7 @@ def _reason(scene: Mapping) -> str:
 
 
 def _by_road(scene: Mapping, reason: str, keeps: str) -> str:
-    """`reason` with what the road adds to it, and what `keeps` the load."""
+    """The reason, extended by the share of the road and by what limits the load."""
     road = scene.get("road", {})
     if road.get("kind", "flat") == "flat":
         return f"{reason}; {_of_flat(scene)}."
@@ -223,7 +223,7 @@ def _by_road(scene: Mapping, reason: str, keeps: str) -> str:
 
 
 def _of_flat(scene: Mapping) -> str:
-    """What changes the load on a flat road."""
+    """The cause of a load that varies on a flat road."""
     road = scene.get("road", {})
     moved = {
         "its motion (road.motion)": road.get("motion", {}).get("kind", "none") != "none",

@@ -20,6 +20,7 @@ from tireroad.runs.scene.tables.scene import Scene
 
 _CURVE = np.linspace(0, 1, 7)  # positions along a side at which it is drawn
 _FACES = {"inner": "#2f6db5", "tread": "#3e4c59", "rim": "#c8502d"}
+NAME = "section.png"
 
 
 @styled
@@ -100,9 +101,6 @@ def _faces(axes: Axes, mesh: SectionMesh) -> list[Line2D]:
         axes.add_collection(LineCollection(_curves(mesh, edges), **style))
         handles.append(Line2D([], [], color=colour, lw=3, label=f"{name}, {len(edges)} sides"))
     return handles
-
-
-NAME = "section.png"
 
 
 def write_section(scene: Scene, directory: Path) -> str:

@@ -25,6 +25,13 @@ P = ParamSpec("P")
 
 MOST = 16  # figures, each up to some hundred kB
 _drawn: OrderedDict[bytes, str] = OrderedDict()
+PRESSURE = LinearSegmentedColormap.from_list(
+    "pressure", ("#ffffff", "#fdd9a0", "#f59053", "#d4402f", "#7f1d3f", "#2b0a2e")
+)
+VIEW = (np.radians(-55.0), np.radians(18.0))  # azimuth of the viewer from +x, elevation
+BULGE = 0.14  # largest drawn displacement of a mode over the tire's radius
+COLUMNS = 64  # most cells along x in the space-time map
+DARKEST = 0.99  # of the touching points lie below the end of the colour scale
 
 
 def once(draw: Callable[P, str]) -> Callable[P, str]:
@@ -55,14 +62,6 @@ def _digest(*given: Any) -> bytes:
             digest.update(repr(one).encode())
         digest.update(b"\0")
     return digest.digest()
-
-
-PRESSURE = LinearSegmentedColormap.from_list(
-    "pressure", ("#ffffff", "#fdd9a0", "#f59053", "#d4402f", "#7f1d3f", "#2b0a2e")
-)
-VIEW = (np.radians(-55.0), np.radians(18.0))  # azimuth of the viewer from +x, elevation
-BULGE = 0.14  # largest drawn displacement of a mode over the tire's radius
-COLUMNS = 64  # most cells along x in the space-time map
 
 
 def camera(azimuth: float, elevation: float) -> NDArray:
@@ -214,9 +213,6 @@ def outward(points: NDArray, quads: NDArray) -> NDArray:
     side = np.einsum("si,si->s", normal, points - ring)
     length = np.linalg.norm(normal, axis=1)
     return normal * (np.where(side < 0, -1.0, 1.0) / np.maximum(length, 1e-300))[:, None]
-
-
-DARKEST = 0.99  # of the touching points lie below the end of the colour scale
 
 
 def darkest(values: NDArray) -> float:

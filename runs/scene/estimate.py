@@ -1,12 +1,9 @@
 """Estimates of a scene's memory, disk and time before anything is computed, and what the machine has."""
 
-import shutil
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 from tireroad.contact.choices import DENSE_POINTS, MOST_TOUCHING, USABLE
-from tireroad.fem.errors import InputError
-from tireroad.runs.process.surroundings import available_memory
+from tireroad.greens.residuals import residual_of
 from tireroad.runs.scene.plan import meets_road, skipped
 from tireroad.runs.scene.sizes import (
     Sizes,
@@ -40,6 +37,100 @@ _WEAK = 0.5  # as in fem.static.equilibrium, which is not imported just to estim
 # tire takes 7 or 8 with its friction, 13 or 14 to find its free travel and 8 with its slip; a
 # standing one 6 or 7 a step, and 4 for its load.
 _ROLLING, _TRAVEL, _SLIP, _STEP, _LOAD = 8, 13, 8, 7, 4
+
+# Error bars, of the time of all else: 0.49 in torus.toml and 0.35 in passenger.toml
+# (2026-11-24); the stage bounds its window to keep them below a half.
+_BARS = 0.42
+# The load's error by finer meshes, of the time of the static state: 1.8 of 9,828 and of 29,700
+# unknowns (2026-11-25). The companion runs of error bars go without it.
+_LOAD_ERROR = 1.8
+# s a step of the horizontal forces: some turns of Newton steps with products between all points that touch.
+# Measured with a tread that shears (2026-11-28): 0.3 ms with 81 points that touch, a torus, 0.7 ms with 100, 7 ms with
+# 550, passenger tires; with a brush alone 0.3 ms with 81.
+_SHEARED, _SHEARED_PAIR, _BRISTLES = 3e-4, 2.2e-8, 3e-4
+# One tangent with friction, of the frictionless static state: its factor has two triangles, and is
+# of the whole ring. Measured on the built-in tire (2026-11-25): 0.2 standing, 0.24 and 0.26 rolling.
+_RUBBING = 0.25
+PACKED = 0.3
+"""Size of contact.h5 relative to its raw numbers: most forces are 0 (measured: 0.24 on stones, 0.29
+on texture)."""
+REPORT = 1.6e6
+"""Bytes of report.html and the text files: 0.9 to 2.1 MB in twenty runs (2026-11-25)."""
+HEADER = 3e4
+"""Bytes of a file's scene, settings and empty datasets."""
+INSTANTS = 400
+"""Instants of the outer face in motion.h5 at most (runs.stages.vibration)."""
+MOST_OF_VIBRATION = 2e8
+"""Bytes of the outer face's spectra in vibration.h5 at most (runs.stages.vibration)."""
+
+PROGRAM = 2.1e8
+"""Bytes of one process with all libraries loaded and the mesh made (measured)."""
+MATRICES = 5
+"""Sparse matrices held at peak: K, its scaled copy and parts, those of rotation (measured,
+including the rest: 0.6 to 0.83 GB for torus.toml, 1.1 to 1.4 GB for passenger.toml, 2.3 to 2.8
+GB for a passenger tire of 102,060 unknowns on one process, 1.6 to 1.8 GB on each of two)."""
+BASES = 3
+"""Copies of all modes held at peak: slices, the sorted vectors, their products."""
+ANSWERS = 6 * 64
+"""Columns held while solving for the flexibility of the patch (fem.matrices.compliance.solve_parts):
+loads, solutions, copies."""
+SHAPES = 3
+"""Full-length columns per force on the patch held at peak, with attachment modes; other residuals
+hold only values at the patch."""
+BLOCK = 512
+"""Steps of contact results held between two writes (runs.stages.contact_file)."""
+PIECE = 64
+"""Steps of which the work is computed at a time (contact.results.energy)."""
+PIVOT, PIVOTED, USUAL = 5, 2, 3
+"""Copies of the matrix of the usual set during pivoting and afterwards (contact.solver.active_set), and its
+size over the number of points that touch at rest: 3,094 of 958 (2026-11-25)."""
+SLIPPING = 16
+"""Copies of the matrix of the touching points while the largest unique friction is found: the tread's
+kernels and their indices 7, the normal forces' 1, of twice its width the lifts 2, the coupling 1, its
+singular values 1 (contact.solver.stick_slip). Not during pivoting."""
+
+FOOTPRINT = "columns of the footprint"
+FACTOR = "factor of the stiffness"
+
+# Keys that determine the size of each part.
+KEYS = {
+    "matrices": "tire.segments, tire.elements_arc, tire.elements_thickness, tire.order",
+    FACTOR: "tire.segments, tire.elements_arc, tire.elements_thickness, tire.order",
+    LOAD_ERROR: "static.error_estimate, and the mesh",
+    FRICTION: "static.friction, and the mesh",
+    DAMPING: "damping.stiffness, and the mesh",
+    "modes": "modal.count or modal.up_to, and the mesh",
+    FOOTPRINT: "tire.segments, tire.elements_arc, tire.elements_thickness, tire.order",
+    "rotating pencil": "modal.count or modal.up_to",
+    "flexibility of the patch": "greens.residual, the mesh, contact.reach, the road's height",
+    "contact": "contact.points, contact.reach, the road's height",
+    "receptances": "output.receptance.step, output.receptance.to, the number of forces",
+    "time series": "time.duration, time.step",
+    "contact.h5": "time.duration, time.step, contact.points",
+    "contact loop": "time.duration, time.step, contact.points",
+    "modes.h5": "modal.count, and the mesh",
+    "vibration.h5": "output.vibration, time.duration, and the mesh",
+    "motion.h5": "output.fields, and the mesh",
+    "radiation.h5": "sound.up_to",
+    "radiation": "sound.up_to",
+    "air around": "sound.up_to",
+    "error bars": "accuracy.estimate",
+}
+
+# Parts that the processes of a run share by rows; of everything else each process has its own.
+SPREAD = (
+    "matrices",
+    FACTOR,
+    FOOTPRINT,
+    LOAD_ERROR,
+    FRICTION,
+    DAMPING,
+    "modes",
+    "flexibility of the patch",
+)
+# Share of a factor that MUMPS keeps on disk out of core: with 54,000 and 108,000 unknowns, 26 and
+# 22 % of the memory were still taken.
+ON_DISK = 0.7
 
 
 def turning(scene: Scene) -> bool:
@@ -116,21 +207,6 @@ def _companions(free: float, through: int, order: int) -> float:
     )
 
 
-# Error bars, of the time of all else: 0.49 in torus.toml and 0.35 in passenger.toml
-# (2026-11-24); the stage bounds its window to keep them below a half.
-_BARS = 0.42
-# The load's error by finer meshes, of the time of the static state: 1.8 of 9,828 and of 29,700
-# unknowns (2026-11-25). The companion runs of error bars go without it.
-_LOAD_ERROR = 1.8
-# s a step of the horizontal forces: some turns of Newton steps with products between all points that touch.
-# Measured with a tread that shears (2026-11-28): 0.3 ms with 81 points that touch, a torus, 0.7 ms with 100, 7 ms with
-# 550, passenger tires; with a brush alone 0.3 ms with 81.
-_SHEARED, _SHEARED_PAIR, _BRISTLES = 3e-4, 2.2e-8, 3e-4
-# One tangent with friction, of the frictionless static state: its factor has two triangles, and is
-# of the whole ring. Measured on the built-in tire (2026-11-25): 0.2 standing, 0.24 and 0.26 rolling.
-_RUBBING = 0.25
-
-
 def seconds(
     work: dict[str, float],
     size: Sizes,
@@ -184,7 +260,9 @@ def operations(
     if "contact" not in left_out:
         loads = size.nodes * (3 if scene.contact.has_friction else 1)
         parts["greens"] = 3.0 * mesh * loads / 277
-        if scene.greens.residual == "attachment":  # solved for both sides, and joined to the modes
+        if residual_of(
+            scene.greens.residual
+        ).joins:  # solved for both sides, and joined to the modes
             parts["greens"] *= 1.6
         # Conjugate gradients: 12 ms for 3,041 points.
         points = size.points**2 if dense else 4000 * size.points
@@ -208,19 +286,6 @@ def boundary_elements(scene: Scene) -> tuple[float, float]:
     up_to = scene.heard_up_to
     size = min(max(343.0 / (8 * up_to), 0.02), 0.06)
     return 1000 + 1.75 / size**2, 2 + up_to / 60
-
-
-PACKED = 0.3
-"""Size of contact.h5 relative to its raw numbers: most forces are 0 (measured: 0.24 on stones, 0.29
-on texture)."""
-REPORT = 1.6e6
-"""Bytes of report.html and the text files: 0.9 to 2.1 MB in twenty runs (2026-11-25)."""
-HEADER = 3e4
-"""Bytes of a file's scene, settings and empty datasets."""
-INSTANTS = 400
-"""Instants of the outer face in motion.h5 at most (runs.stages.vibration)."""
-MOST_OF_VIBRATION = 2e8
-"""Bytes of the outer face's spectra in vibration.h5 at most (runs.stages.vibration)."""
 
 
 def disk(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, float]:
@@ -273,61 +338,6 @@ def _in_frequency(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[s
         # Eight instants a period of the highest line, the last ones of the run.
         parts["motion.h5"] = HEADER + 4.0 * min(8 * lines, INSTANTS) * outer
     return parts
-
-
-PROGRAM = 2.1e8
-"""Bytes of one process with all libraries loaded and the mesh made (measured)."""
-MATRICES = 5
-"""Sparse matrices held at peak: K, its scaled copy and parts, those of rotation (measured,
-including the rest: 0.6 to 0.83 GB for torus.toml, 1.1 to 1.4 GB for passenger.toml, 2.3 to 2.8
-GB for a passenger tire of 102,060 unknowns on one process, 1.6 to 1.8 GB on each of two)."""
-BASES = 3
-"""Copies of all modes held at peak: slices, the sorted vectors, their products."""
-ANSWERS = 6 * 64
-"""Columns held while solving for the flexibility of the patch (fem.matrices.compliance.solve_parts):
-loads, solutions, copies."""
-SHAPES = 3
-"""Full-length columns per force on the patch held at peak, with attachment modes; other residuals
-hold only values at the patch."""
-BLOCK = 512
-"""Steps of contact results held between two writes (runs.stages.contact_file)."""
-PIECE = 64
-"""Steps of which the work is computed at a time (contact.results.energy)."""
-PIVOT, PIVOTED, USUAL = 5, 2, 3
-"""Copies of the matrix of the usual set during pivoting and afterwards (contact.solver.active_set), and its
-size over the number of points that touch at rest: 3,094 of 958 (2026-11-25)."""
-SLIPPING = 16
-"""Copies of the matrix of the touching points while the largest unique friction is found: the tread's
-kernels and their indices 7, the normal forces' 1, of twice its width the lifts 2, the coupling 1, its
-singular values 1 (contact.solver.stick_slip). Not during pivoting."""
-
-FOOTPRINT = "columns of the footprint"
-FACTOR = "factor of the stiffness"
-
-# Keys that determine the size of each part.
-KEYS = {
-    "matrices": "tire.segments, tire.elements_arc, tire.elements_thickness, tire.order",
-    FACTOR: "tire.segments, tire.elements_arc, tire.elements_thickness, tire.order",
-    LOAD_ERROR: "static.error_estimate, and the mesh",
-    FRICTION: "static.friction, and the mesh",
-    DAMPING: "damping.stiffness, and the mesh",
-    "modes": "modal.count or modal.up_to, and the mesh",
-    FOOTPRINT: "tire.segments, tire.elements_arc, tire.elements_thickness, tire.order",
-    "rotating pencil": "modal.count or modal.up_to",
-    "flexibility of the patch": "greens.residual, the mesh, contact.reach, the road's height",
-    "contact": "contact.points, contact.reach, the road's height",
-    "receptances": "output.receptance.step, output.receptance.to, the number of forces",
-    "time series": "time.duration, time.step",
-    "contact.h5": "time.duration, time.step, contact.points",
-    "contact loop": "time.duration, time.step, contact.points",
-    "modes.h5": "modal.count, and the mesh",
-    "vibration.h5": "output.vibration, time.duration, and the mesh",
-    "motion.h5": "output.fields, and the mesh",
-    "radiation.h5": "sound.up_to",
-    "radiation": "sound.up_to",
-    "air around": "sound.up_to",
-    "error bars": "accuracy.estimate",
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -412,7 +422,7 @@ def _each_step(scene: Scene, points: int) -> int:
 def _contact_memory(scene: Scene, size: Sizes) -> dict[str, float]:
     directions = 3 if scene.contact.has_friction else 1
     loads = directions * size.nodes
-    shapes = SHAPES if scene.greens.residual == "attachment" else 0
+    shapes = SHAPES if residual_of(scene.greens.residual).joins else 0
     parts = {
         "flexibility of the patch": 8.0 * size.free * (ANSWERS + shapes * loads),
         "contact": 16.0 * 4 * loads * 2 * size.coordinates
@@ -452,85 +462,12 @@ def _matrices_of_points(scene: Scene, size: Sizes) -> int:
     return 0 if by_product else PIVOT * usual**2
 
 
-# The estimate is within a factor of 1.5: above CERTAIN a run cannot succeed, above DOUBTFUL it may
-# not.
-CERTAIN, DOUBTFUL = 1.5, 0.8
-# Parts that the processes of a run share by rows; of everything else each process has its own.
-SPREAD = (
-    "matrices",
-    FACTOR,
-    FOOTPRINT,
-    LOAD_ERROR,
-    FRICTION,
-    DAMPING,
-    "modes",
-    "flexibility of the patch",
-)
-# Share of a factor that MUMPS keeps on disk out of core: with 54,000 and 108,000 unknowns, 26 and
-# 22 % of the memory were still taken.
-ON_DISK = 0.7
-LONG = 3600.0  # s: runs estimated to take longer cause a warning
-
-
-def check_demand(wanted: Estimate, directory: Path, processes: int = 1) -> list[str]:
-    """Warnings about memory, disk and time. Raises InputError if they cannot suffice.
-
-    `directory`: result folder, which need not exist yet. If memory is short, factors are kept on
-    disk.
-    """
-    on_disk = out_of_core(wanted, processes)
-    taken = memory_of(wanted, processes, on_disk)
-    memory, free = sum(taken.values()), available_memory()
-    room = shutil.disk_usage(_existing(directory)).free
-    warnings = []
-    if on_disk:
-        warnings.append(
-            f"memory is short: factors are kept on disk in {directory} (MUMPS out of core), which takes longer"
-        )
-    for what, where, parts, needed, there in (
-        ("memory", "", taken, memory, free),
-        ("disk", f" in {directory}", wanted.disk, sum(wanted.disk.values()), float(room)),
-    ):
-        if needed < DOUBTFUL * there:
-            continue
-        text = (
-            f"the run takes about {needed / 1e9:.3g} GB of {what}{where}, and "
-            f"{there / 1e9:.3g} GB are free; most of it for {_largest(parts)}"
-        )
-        if needed > CERTAIN * there:
-            raise InputError(text)
-        warnings.append(text)
-    seconds = sum(wanted.seconds.values())
-    if seconds > LONG:
-        warnings.append(
-            f"the run takes about {duration(seconds)} of one core, most of it for "
-            f"{_largest(wanted.seconds)}"
-        )
-    return warnings
-
-
 def memory_of(wanted: Estimate, processes: int, on_disk: bool = False) -> dict[str, float]:
     """Bytes by part, all processes of a run together, with factors in memory or `on_disk`."""
     parts = {
         name: size if name in SPREAD else processes * size for name, size in wanted.memory.items()
     }
     return parts | {FACTOR: parts[FACTOR] * (1 - ON_DISK)} if on_disk else parts
-
-
-def out_of_core(wanted: Estimate, processes: int) -> bool:
-    """Whether factors must be kept on disk because this machine's memory is too small for them."""
-    return sum(memory_of(wanted, processes).values()) > DOUBTFUL * available_memory()
-
-
-def _largest(parts: dict[str, float]) -> str:
-    """The largest part, with the keys that determine its size."""
-    name = max(parts, key=parts.__getitem__)
-    return f"{name} ({KEYS[name]})" if name in KEYS else name
-
-
-def _existing(directory: Path) -> Path:
-    directory = directory.absolute()
-    return next(one for one in (directory, *directory.parents) if one.exists())
 
 
 def duration(seconds: float) -> str:

@@ -1,4 +1,4 @@
-"""What is read of the files of a scene, and as what: one table for the log and for `check`."""
+"""Quantities read from the files of a scene, with places and units: one table for the log and for `check`."""
 
 from __future__ import annotations
 

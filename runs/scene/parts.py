@@ -29,6 +29,30 @@ from tireroad.runs.scene.tables.tire import (
 
 _SERIES = {"prony_shares", "prony_times"}  # states what the others state, and takes their place
 _SMALL_MOTIONS = {"dynamic", "loss_factor", "exponent"}
+BELTS = "belt"  # in [tire.scale]: all lines whose names begin so
+_OF_COMPOUND = ("modulus", "poisson ratio", "density", "dynamic", "loss factor", "exponent")
+_OF_CORDS = ("modulus", "angle", "area", "spacing", "density", "compression")
+Listing = tuple[str, tuple[str, ...], list[tuple[str, ...]]]  # title, heads, rows
+
+_COMPOUND_HEAD = (
+    "compound",
+    "law",
+    "E, MPa",
+    "Poisson's ratio",
+    "density, kg/m³",
+    "dynamic over static",
+    "loss factor",
+    "exponent",
+)
+_CORDS_HEAD = (
+    "cords",
+    "angle, deg",
+    "E, GPa",
+    "area, mm²",
+    "spacing, mm",
+    "density, kg/m³",
+    "compression over tension",
+)
 
 
 def with_parts(
@@ -197,11 +221,6 @@ def _names(model: str) -> set[str]:
     return {item.name for item, _ in keys(MATERIALS[model])}
 
 
-BELTS = "belt"  # in [tire.scale]: all lines whose names begin so
-_OF_COMPOUND = ("modulus", "poisson ratio", "density", "dynamic", "loss factor", "exponent")
-_OF_CORDS = ("modulus", "angle", "area", "spacing", "density", "compression")
-
-
 def _scale(merged: Raw, built: Parts, key: str, factor: float, source: Source) -> Iterator[str]:
     """Multiply a quantity of the parts of a name, in place; yields each change in words."""
     path = ("tire", "scale", key)
@@ -280,9 +299,6 @@ def _shown(value: Any) -> str:
     )
 
 
-Listing = tuple[str, tuple[str, ...], list[tuple[str, ...]]]  # title, heads, rows
-
-
 def listed(tire: Mapping[str, Any]) -> list[Listing]:
     """Tables of the compounds and the cords of a resolved [tire] whose parts are all in it, as in TOML.
 
@@ -291,44 +307,23 @@ def listed(tire: Mapping[str, Any]) -> list[Listing]:
     if tire.get("section") != "radial":
         return []
     regions, lines = tire.get("region", []), tire.get("cords", [])
-    compounds = [_compound_row(one) for one in regions if "material" in one]
+    compounds = [_compound_row(region) for region in regions if "material" in region]
     cords: list[tuple[str, ...]] = [
         (
-            str(one["name"]),
-            f"{one['angle']:.4g}",
-            f"{1e-9 * one['youngs_modulus']:.4g}",
-            f"{1e6 * one['area']:.4g}",
-            f"{1e3 * one['spacing']:.4g}",
-            f"{one['density']:.4g}",
-            f"{one['compression']:.4g}",
+            str(line["name"]),
+            f"{line['angle']:.4g}",
+            f"{1e-9 * line['youngs_modulus']:.4g}",
+            f"{1e6 * line['area']:.4g}",
+            f"{1e3 * line['spacing']:.4g}",
+            f"{line['density']:.4g}",
+            f"{line['compression']:.4g}",
         )
-        for one in lines
+        for line in lines
     ]
     return [
         ("compounds of the tire", _COMPOUND_HEAD, compounds),
         ("cords of the tire", _CORDS_HEAD, cords),
     ]
-
-
-_COMPOUND_HEAD = (
-    "compound",
-    "law",
-    "E, MPa",
-    "Poisson's ratio",
-    "density, kg/m³",
-    "dynamic over static",
-    "loss factor",
-    "exponent",
-)
-_CORDS_HEAD = (
-    "cords",
-    "angle, deg",
-    "E, GPa",
-    "area, mm²",
-    "spacing, mm",
-    "density, kg/m³",
-    "compression over tension",
-)
 
 
 def _compound_row(region: Mapping[str, Any]) -> tuple[str, ...]:

@@ -1,25 +1,9 @@
-"""Which stages a scene needs, and why the others are skipped."""
+"""The stages that a scene needs, and reasons why the others are skipped."""
 
 from dataclasses import fields
 
+from tireroad.runs.files.names import STAGES
 from tireroad.runs.scene.tables.scene import Scene
-
-STAGES = (
-    "static",
-    "radiation",
-    "stiffness",
-    "modes",
-    "rotating",
-    "greens",
-    "contact",
-    "accuracy",
-    "response",
-    "spectra",
-    "vibration",
-    "sound",
-    "motion",
-    "report",
-)
 
 
 def skipped(scene: Scene, until: str | None = None) -> dict[str, str]:

@@ -1,23 +1,14 @@
 """The resolved scene as text: every default written out, with unit and meaning of each key."""
 
 import json
-import re
 import tomllib
 from math import isfinite
 from typing import Any
 
 from tireroad.fem.parameters import Key
+from tireroad.runs.files.names import HEADER
 from tireroad.runs.scene.schema import Pitch, applies, entries, key_of, table_of
 from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.version import PROGRAM, RESULT_FORMAT, VERSION
-
-MARK = f"# {PROGRAM} "
-HEADER = f"{MARK}{VERSION}, format {RESULT_FORMAT}: the resolved scene, every default written back"
-
-
-def scene_name(text: str) -> str:
-    """The name of a scene made of a file's or folder's: letters, digits, dots and dashes."""
-    return re.sub(r"[^A-Za-z0-9._-]", "-", text).lstrip(".-") or "scene"
 
 
 def literal(value: Any) -> str:

@@ -11,6 +11,7 @@ from tireroad.contact.roads.kinds.shapes import Edges
 from tireroad.contact.roads.road import RoadKind, placed
 from tireroad.contact.roads.under_tire import Road, begun_at, is_level, moved_start, shown
 from tireroad.fem.errors import InputError
+from tireroad.greens.residuals import names, residual_of
 from tireroad.runs.scene.outputs import Output, check_steps
 from tireroad.runs.scene.schema import Source
 from tireroad.runs.scene.tables.contact import check_tread
@@ -34,6 +35,8 @@ Where = Callable[[tuple[str, ...], str], InputError]
 
 # Least ratio of an inside drum's radius to the tire's outer radius that leaves room to press it.
 _ROOM = 1.15
+_MADE: dict[tuple, Road] = {}  # only the last road
+MOST_SPEEDS = 10_000
 
 
 def check_shape(scene: Scene, raw: dict[str, Any], error: Where) -> None:
@@ -67,7 +70,7 @@ def check_road(scene: Scene) -> None:
 
 
 def remarks(scene: Scene) -> list[str]:
-    """What `check` says of a road that can be driven on."""
+    """Remarks of `check` on a road that can be driven on."""
     if scene.road is None or scene.contact is None:
         return []
     road = made(scene.road.surface)
@@ -128,9 +131,6 @@ def without_relief(road: RoadTable, first: float, last: float) -> str:
         f'the road (kind = "{road.kind}") has no relief under the run, which passes over x = {shown(first)} to '
         f"{shown(last)} m: nothing on it moves the tire; change {key} or time.duration"
     )
-
-
-_MADE: dict[tuple, Road] = {}  # only the last road
 
 
 def made(surface: RoadKind) -> Road:
@@ -194,9 +194,6 @@ def full_matrices(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     if scene.tire.shape.varies(scene.tire):
         advice = "needs moduli that do not depend on frequency: set exponent = 0 in [[tire.region]]"
         raise error(("rotation", "method"), f'= "full" {advice}')
-
-
-MOST_SPEEDS = 10_000
 
 
 def check_outputs(scene: Scene, raw: dict[str, Any], error: Where) -> Iterator[InputError]:
@@ -328,11 +325,11 @@ def _modal(scene: Scene, raw: dict[str, Any], error: Where) -> None:
             f"= {scene.damping.mass:g} 1/s acts against a wheel that turns about a fixed axle; a free one"
             " would be driven round by it: take 0, and damping.stiffness (s) instead",
         )
-    if scene.greens.residual not in ("none", "attachment"):
+    if not residual_of(scene.greens.residual).of_free_rim:
         raise error(
             ("greens", "residual"),
             f'= "{scene.greens.residual}" needs the static answer of the turning tire, which with a'
-            ' free rim does not exist: take "attachment" or "none"',
+            f" free rim does not exist: take {names(static=False)}",
         )
 
 
@@ -368,10 +365,10 @@ def _force(scene: Scene, raw: dict[str, Any], error: Where) -> Iterator[InputErr
 def _greens(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     rotation, residual = scene.rotation, scene.greens.residual
     full = rotation is not None and rotation.speed > 0 and rotation.method == "full"
-    if full and residual == "attachment":
+    if full and residual_of(residual).joins:
         raise error(
             ("greens", "residual"),
-            '= "attachment" completes the modes: it needs rotation.method = "projected"',
+            f'= "{residual}" completes the modes: it needs rotation.method = "projected"',
         )
 
 
@@ -424,18 +421,18 @@ def _time(scene: Scene, raw: dict[str, Any], error: Where) -> None:
 
 def check_pattern(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     """Raise an error for an invalid pattern, or for one without a grid that resolves it."""
-    wanted = scene.pattern
-    if wanted is None:
+    pattern = scene.pattern
+    if pattern is None:
         return
     if scene.contact is None or scene.contact.on_nodes:
         raise error(
             ("pattern",), "needs [contact] on a grid that sees it: contact.points = { dx, dy } (m)"
         )
-    if bool(wanted.groove) == (wanted.file is not None):
+    if bool(pattern.groove) == (pattern.file is not None):
         raise error(("pattern",), "needs either [[pattern.groove]] or file")
-    if not wanted.pitch_lengths:
+    if not pattern.pitch_lengths:
         raise error(("pattern", "pitch_lengths"), "must have one number at least")
-    for number_, groove in enumerate(wanted.groove):
+    for number_, groove in enumerate(pattern.groove):
         if groove.span[0] >= groove.span[1]:
             raise error(("pattern", "groove", str(number_), "span"), "must ascend")
 
@@ -451,10 +448,10 @@ def check_cavity(scene: Scene, raw: dict[str, Any], error: Where) -> None:
             '= "full" knows no air: take "projected", or tire.cavity.gas = "none"',
         )
     used = bool(scene.force) or scene.contact is not None
-    if used and scene.modes.rim == "free" and residual not in ("none", "attachment"):
+    if used and scene.modes.rim == "free" and not residual_of(residual).of_free_rim:
         raise error(
             ("greens", "residual"),
-            f'= "{residual}" of a free rim knows no air: take "attachment" or "none", or '
+            f'= "{residual}" of a free rim knows no air: take {names(static=False)}, or '
             'tire.cavity.gas = "none"',
         )
 

@@ -40,6 +40,35 @@ from tireroad.fem.parameters import (
 
 HEADER = re.compile(r"^\s*(\[\[?)\s*([^\[\]]+?)\s*\]\]?\s*(?:#.*)?$")
 ASSIGNMENT = re.compile(r"""^\s*((?:[A-Za-z0-9_-]+|"[^"]*"|'[^']*')(?:\s*\.\s*[^\s=.]+)*)\s*=""")
+Path_ = tuple[str, ...]
+_SHOWN = 30
+P = TypeVar("P", bound=Parameters)
+
+__all__ = [
+    "Collection",
+    "Collects",
+    "Pitch",
+    "Table",
+    "Variant",
+    "Variants",
+    "choice",
+    "collection",
+    "fields_of",
+    "flag",
+    "gathered",
+    "integer",
+    "key_of",
+    "number",
+    "points",
+    "registered",
+    "table",
+    "table_of",
+    "tables",
+    "text",
+    "variant",
+    "variant_of",
+    "vector",
+]
 
 
 def parts(dotted: str) -> tuple[str, ...]:
@@ -49,7 +78,7 @@ def parts(dotted: str) -> tuple[str, ...]:
 
 def _paths(text: str) -> list[tuple[int, tuple[str, ...]]]:
     """Every header and assignment with its line number (from 1) and full path."""
-    found: list[tuple[int, tuple[str, ...]]] = []
+    paths: list[tuple[int, tuple[str, ...]]] = []
     here: tuple[str, ...] = ()
     counts: dict[tuple[str, ...], int] = {}
     quoted = ""
@@ -62,12 +91,12 @@ def _paths(text: str) -> list[tuple[int, tuple[str, ...]]]:
             if match[1] == "[[":
                 counts[here] = counts.get(here, -1) + 1
                 here = (*here, str(counts[here]))
-            found.append((line_number, here))
+            paths.append((line_number, here))
         elif match := ASSIGNMENT.match(line):
-            found.append((line_number, here + parts(match[1])))
+            paths.append((line_number, here + parts(match[1])))
             opened = [mark for mark in ('"""', "'''") if line.count(mark) == 1]
             quoted = opened[0] if opened else ""
-    return found
+    return paths
 
 
 def line_of(text: str, path: tuple[str, ...]) -> int | None:
@@ -82,9 +111,6 @@ def line_of(text: str, path: tuple[str, ...]) -> int | None:
         if path[: len(found)] == found and (best is None or len(found) > best[1]):
             best = (line_number, len(found))
     return best[0] if best else None
-
-
-Path_ = tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -137,15 +163,9 @@ class Source:
             raise InputError(f"{len(messages)} errors in the scene\n{listed}{rest}")
 
 
-_SHOWN = 30
-
-
 def shortened(path: Path_) -> str:
     """A dotted key; parts too long to be valid keys are truncated."""
     return ".".join(part if len(part) <= 60 else f"{part[:57]}..." for part in path[:12])
-
-
-P = TypeVar("P", bound=Parameters)
 
 
 @dataclass(frozen=True)
@@ -322,33 +342,6 @@ def table_of(item: Field) -> Table | None:
 def variant_of(item: Field) -> Variant | None:
     """The variant of a field, or None."""
     return item.metadata.get("variant")
-
-
-__all__ = [
-    "Collection",
-    "Collects",
-    "Pitch",
-    "Table",
-    "Variant",
-    "Variants",
-    "choice",
-    "collection",
-    "fields_of",
-    "flag",
-    "gathered",
-    "integer",
-    "key_of",
-    "number",
-    "points",
-    "registered",
-    "table",
-    "table_of",
-    "tables",
-    "text",
-    "variant",
-    "variant_of",
-    "vector",
-]
 
 
 def names(of: type) -> list[str]:

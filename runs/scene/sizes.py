@@ -22,6 +22,17 @@ from tireroad.runs.scene.tables.scene import Scene
 
 DIRECTIONS = 16  # of waves, over a quarter turn
 
+# Rotation shapes of a tire with cords: 28 of 60 modes, 55 of 120, 133 of 268, 455 of 1813 with the default
+# tolerance, 240 of 1813 with five times that; and per mode of one without.
+CORDED, PLAIN = 1.2, 0.1
+# The fastest state with rotation shapes, over the highest mode: 1.3 to 2.5, on average 1.75, in 35
+# runs of tori with 8 to 300 modes at 20 to 100 rad/s and of a belted tire (2026-11-25).
+FASTEST_SHAPE = 1.75
+# Footprint over what a membrane with the same load would flatten: 0.58 in a torus, 0.66 in the radial
+# tire of passenger.toml.
+PRESSED = 0.6
+MARGIN = 5e-3  # m: reach of the patch beyond the road's height (stages.greens)
+
 
 @dataclass(frozen=True)
 class ModeDensity:
@@ -125,18 +136,6 @@ def _layers_coupled(through: int, order: int) -> float:
     """Nodes of one column that share an element with a given one, on average."""
     inside = through * (order - 1) * (order + 1)
     return (inside + 2 * (order + 1) + (through - 1) * (2 * order + 1)) / (through * order + 1)
-
-
-# Rotation shapes of a tire with cords: 28 of 60 modes, 55 of 120, 133 of 268, 455 of 1813 with the default
-# tolerance, 240 of 1813 with five times that; and per mode of one without.
-CORDED, PLAIN = 1.2, 0.1
-# The fastest state with rotation shapes, over the highest mode: 1.3 to 2.5, on average 1.75, in 35
-# runs of tori with 8 to 300 modes at 20 to 100 rad/s and of a belted tire (2026-11-25).
-FASTEST_SHAPE = 1.75
-# Footprint over what a membrane with the same load would flatten: 0.58 in a torus, 0.66 in the radial
-# tire of passenger.toml.
-PRESSED = 0.6
-MARGIN = 5e-3  # m: reach of the patch beyond the road's height (stages.greens)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,9 +1,8 @@
-"""search.json: the trials of a search with their estimated errors, so that it can be resumed, and is not repeated.
+"""The journal of a search: its trials with their estimated errors, in search.json.
 
-What a search keeps in its result folder until it has found settings.
-
-`search/scene.toml` is the scene as given, with which `resume` goes on; `scene.toml` is always that
-of the results beside it. `search/cache` holds the stages of the trials.
+From it a search is resumed, and not repeated. `search/scene.toml` is the scene as given, with which
+`resume` goes on; `scene.toml` is always that of the results beside it. `search/cache` holds the
+stages of the trials.
 """
 
 from __future__ import annotations
@@ -11,11 +10,10 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
-from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,64 +22,40 @@ from tireroad.runs.files import store
 from tireroad.runs.files.disk import signed, write_text
 from tireroad.runs.files.folder import CHOSEN, make_folder
 from tireroad.runs.files.store import identity
+from tireroad.runs.files.trials import (
+    NAME,
+    VERTICAL,
+    ErrorsByCause,
+    Settings,
+    Trial,
+    trial_of,
+    worst,
+)
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.tables.scene import AccuracyTable, Scene
-from tireroad.runs.search.settings import Settings
 
-if TYPE_CHECKING:  # a report reads the journal without finite elements
+if TYPE_CHECKING:
     from tireroad.runs.stages.accuracy import Accuracy
 
-VERTICAL = 2
+FOLDER = "search"
+_SCENE = "scene.toml"
 
 
-@dataclass(frozen=True)
-class ErrorsByCause:
-    """Estimated errors of a run's vertical force by cause; NaN where unknown.
-
-    `history` and `mean`: relative; `level` dB of each third octave at `centre` Hz, up to the
-    highest frequency of interest.
-    """
-
-    history: Mapping[str, float]
-    mean: Mapping[str, float]
-    centre: tuple[float, ...]
-    level: Mapping[str, tuple[float, ...]]
-
-    @classmethod
-    def of(cls, product: Accuracy, wanted: AccuracyTable) -> ErrorsByCause:
-        """Errors of the force that the target applies to."""
-        bars = product.by_cause.get(wanted.of, {})
-        below = np.flatnonzero(product.centre <= product.up_to)
-        unknown = (float("nan"),) * len(below)
-        mean = abs(float(product.mean[wanted.of][VERTICAL])) if wanted.of in product.mean else 0.0
-        return cls(
-            {c: float(bar.history[VERTICAL]) for c, bar in bars.items()},
-            {c: float(bar.mean[VERTICAL]) / mean if mean else 0.0 for c, bar in bars.items()},
-            tuple(map(float, product.centre[below])),
-            {
-                c: tuple(map(float, bars[c].level[below, VERTICAL])) if c in bars else unknown
-                for c in CAUSES
-            },
-        )
-
-    def over(self, wanted: AccuracyTable) -> np.ndarray:
-        """Errors (causes, figures) over their targets; infinite where unknown."""
-        columns = []
-        if wanted.target is not None:
-            for values in (self.history, self.mean):
-                columns.append([values.get(cause, np.nan) / wanted.target for cause in CAUSES])
-        if wanted.target_db is not None:
-            levels = np.array([self.level[cause] for cause in CAUSES]).reshape(len(CAUSES), -1)
-            # Without a band below that frequency, nothing is known.
-            columns += list((levels / wanted.target_db).T) or [[np.nan] * len(CAUSES)]
-        return np.nan_to_num(np.array(columns, float).T, nan=np.inf)
-
-
-def worst(over: np.ndarray) -> tuple[float, int]:
-    """The largest total error over its target, and the index of that figure; 1 or less meets it."""
-    totals = np.sqrt((over**2).sum(axis=0))
-    figure = int(totals.argmax())
-    return float(totals[figure]), figure
+def errors_of(product: Accuracy, wanted: AccuracyTable) -> ErrorsByCause:
+    """Errors of the force that the target applies to."""
+    bars = product.by_cause.get(wanted.of, {})
+    below = np.flatnonzero(product.centre <= product.up_to)
+    unknown = (float("nan"),) * len(below)
+    mean = abs(float(product.mean[wanted.of][VERTICAL])) if wanted.of in product.mean else 0.0
+    return ErrorsByCause(
+        {c: float(bar.history[VERTICAL]) for c, bar in bars.items()},
+        {c: float(bar.mean[VERTICAL]) / mean if mean else 0.0 for c, bar in bars.items()},
+        tuple(map(float, product.centre[below])),
+        {
+            c: tuple(map(float, bars[c].level[below, VERTICAL])) if c in bars else unknown
+            for c in CAUSES
+        },
+    )
 
 
 def shown(over: np.ndarray, wanted: AccuracyTable) -> str:
@@ -100,10 +74,6 @@ def shown(over: np.ndarray, wanted: AccuracyTable) -> str:
 
 def _number(value: float) -> str:
     return f"{value:.2g}" if np.isfinite(value) else "unknown"
-
-
-FOLDER = "search"
-_SCENE = "scene.toml"
 
 
 def begin(directory: Path, scene_text: str) -> None:
@@ -134,25 +104,6 @@ def forget(directory: Path) -> None:
     shutil.rmtree(directory / FOLDER, ignore_errors=True)
 
 
-NAME = "search.json"
-
-
-@dataclass(frozen=True)
-class Trial:
-    """Settings and their result: `found` errors, or the reason (`failed`) why there are none.
-
-    `seconds` by stage of a run with these settings, reused stages at their original cost; `spent` s
-    by this trial alone; `scheme` of its time loop.
-    """
-
-    settings: Settings
-    seconds: Mapping[str, float]
-    spent: float
-    found: ErrorsByCause | None = None
-    scheme: str = ""
-    failed: str = ""
-
-
 class SearchJournal:
     """The trials of a search in a folder; the file is rewritten after each. Root process only."""
 
@@ -181,22 +132,8 @@ class SearchJournal:
         with suppress(OSError, ValueError, KeyError, TypeError):
             data = json.loads(self.path.read_text(encoding="utf-8"))
             if data["of"] == self._of:
-                return [_trial(one) for one in data["trials"]]
+                return [trial_of(one) for one in data["trials"]]
         return []
-
-
-def read_trials(path: Path) -> list[Trial]:
-    """All trials in a file, of any scene. Raises OSError, ValueError or KeyError without any."""
-    return [_trial(one) for one in json.loads(path.read_text(encoding="utf-8"))["trials"]]
-
-
-def _trial(data: dict[str, Any]) -> Trial:
-    settings = data["settings"] | {"mesh": tuple(data["settings"]["mesh"])}
-    found = data["found"]
-    if found is not None:
-        level = {cause: tuple(values) for cause, values in found["level"].items()}
-        found = ErrorsByCause(found["history"], found["mean"], tuple(found["centre"]), level)
-    return Trial(**data | {"settings": Settings(**settings), "found": found})
 
 
 def _origin(scene: Scene) -> str:

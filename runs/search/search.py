@@ -1,8 +1,6 @@
 """The search for settings: trials from coarse to fine until the estimated error meets the target.
 
-Chooses the next settings: those predicted to meet the target at the lowest cost.
-
-Starts from a trial's errors by cause, each with a known order in its size
+The next settings are those predicted to meet the target at the lowest cost. The prediction starts from a trial's errors by cause, each with a known order in its size
 (contact.results.error_bars.orders), and its measured seconds by stage, scaled with the sizes of the
 stages (scene.estimate). Rungs are climbed one at a time, each time the one that removes most
 squared error per cost, until the target is predicted to be met; then those that it is clearly met
@@ -26,25 +24,19 @@ from tireroad.fem.errors import ConvergenceError, InputError, UnsuitedSettings
 from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.files.disk import signed, write_text
 from tireroad.runs.files.folder import CHOSEN
+from tireroad.runs.files.names import STAGES
+from tireroad.runs.files.trials import MARGIN, Settings, Trial, worst
+from tireroad.runs.pipeline import Finished, run_scene
 from tireroad.runs.process import console
+from tireroad.runs.process.demand import DOUBTFUL
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.process.surroundings import available_memory
-from tireroad.runs.scene.estimate import DOUBTFUL, estimate
-from tireroad.runs.scene.plan import STAGES
+from tireroad.runs.scene.estimate import estimate
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.search import journal
-from tireroad.runs.search.journal import ErrorsByCause, SearchJournal, Trial, shown, worst
-from tireroad.runs.search.settings import (
-    MARGIN,
-    MARGINAL,
-    Ladders,
-    Settings,
-    aim,
-    applied,
-    size_ratio,
-)
-from tireroad.runs.stages.pipeline import Finished, run_scene
+from tireroad.runs.search.journal import SearchJournal, errors_of, shown
+from tireroad.runs.search.settings import MARGINAL, Ladders, applied, size_ratio
 
 AIM = 0.9 / MARGIN  # of the target; 0.9: the orders hold only asymptotically
 AT_ONCE = {"mesh": 2, "modes": 2, "points": 1, "step": 1}  # most rungs per plan: same reason
@@ -79,7 +71,9 @@ def planned(ladders: Ladders, trial: Trial, processes: int) -> Settings | None:
         choices = _worthwhile(over, choices)
         if not choices:
             break
-        cause, finer = max(choices, key=lambda one: _worth(over, one[0], one[1], now, costs, rates))
+        cause, finer = max(
+            choices, key=lambda choice: _worth(over, choice[0], choice[1], now, costs, rates)
+        )
         over, now = _finer(over, cause, now, finer, rates), finer
     now = _without_excess(ladders, trial, now, costs, rates)
     return now if now != trial.settings else None
@@ -122,12 +116,12 @@ def _worthwhile(
     """The choices whose cause matters for the error; if any is unknown, only unknown ones."""
     errors = over[:, worst(over)[1]]
     known = dict(zip(CAUSES, errors, strict=True))
-    unknown = [one for one in choices if not np.isfinite(known[one[0]])]
+    unknown = [choice for choice in choices if not np.isfinite(known[choice[0]])]
     if not np.isfinite(errors).all():
         return unknown  # its companion run fails: the coarse setting behind it is refined first
     climbing = {cause for cause, _ in choices}
     stuck = any(error > AIM for cause, error in known.items() if cause not in climbing)
-    return [one for one in choices if known[one[0]] > AIM * (1.0 if stuck else SMALL)]
+    return [choice for choice in choices if known[choice[0]] > AIM * (1.0 if stuck else SMALL)]
 
 
 def fits(scene: Scene, settings: Settings, processes: int) -> bool:
@@ -215,7 +209,7 @@ class Search:
         ConvergenceError if not; the results are then those of that trial. Collective.
         """
         on_root(self.comm, lambda: self._begin())
-        console.say(f"search    for {aim(self.scene.accuracy)}, {MARGINAL}")
+        console.say(f"search    for {self.scene.accuracy.aim()}, {MARGINAL}")
         tried: list[Trial] = []
         why = ""
         settings: Settings | None = self._ladders.first()
@@ -303,7 +297,7 @@ class Search:
             raise
         cost = on_root(self.comm, lambda: seconds(folder))
         spent = self.comm.bcast(time.perf_counter() - began)
-        return Trial(settings, cost, spent, ErrorsByCause.of(product, self.scene.accuracy), scheme)
+        return Trial(settings, cost, spent, errors_of(product, self.scene.accuracy), scheme)
 
     def _over(self, trial: Trial) -> float:
         """The estimated error over the target; infinite for a failed trial."""
@@ -311,12 +305,12 @@ class Search:
 
     def _limit(self, tried: list[Trial]) -> str:
         """The limit of the search that is reached; "" if none."""
-        wanted = self.scene.accuracy
+        accuracy = self.scene.accuracy
         spent = sum(trial.spent for trial in tried)
-        if len(tried) >= wanted.trials:
-            return f"accuracy.trials = {wanted.trials} are done"
-        if wanted.budget is not None and spent >= wanted.budget:
-            return f"accuracy.budget = {wanted.budget:g} s is spent ({spent:.0f} s)"
+        if len(tried) >= accuracy.trials:
+            return f"accuracy.trials = {accuracy.trials} are done"
+        if accuracy.budget is not None and spent >= accuracy.budget:
+            return f"accuracy.budget = {accuracy.budget:g} s is spent ({spent:.0f} s)"
         return ""
 
     def _keep(self, trial: Trial) -> None:
@@ -341,16 +335,16 @@ class Search:
 
     def _give_up(self, tried: list[Trial], best: Trial, why: str) -> None:
         """Compute the best trial's results, then raise ConvergenceError. Collective."""
-        wanted = self.scene.accuracy
+        accuracy = self.scene.accuracy
         if best.found is None:
             raise ConvergenceError(
                 f"accuracy: no trial finished ({why}); the last: {tried[-1].failed}"
             )
-        over = best.found.over(wanted)
+        over = best.found.over(accuracy)
         largest = CAUSES[int(over[:, worst(over)[1]].argmax())]
         self._final(applied(self.scene, best.settings))
         raise ConvergenceError(
-            f"accuracy: the target is not met: {why}. Reached {shown(over, wanted)} with {best.settings}; largest part: "
+            f"accuracy: the target is not met: {why}. Reached {shown(over, accuracy)} with {best.settings}; largest part: "
             f"{largest}. Its results are in {self.directory}; take a larger target, or raise accuracy.trials or "
             "accuracy.budget and run again: what was tried is kept"
         )
@@ -395,7 +389,7 @@ def tell_error(scene: Scene, done: Finished) -> None:
     """Report whether the target error is met, if it was estimated. Collective."""
     if not scene.accuracy.aimed or "accuracy" not in done.done:
         return
-    over = ErrorsByCause.of(done.done["accuracy"].product, scene.accuracy).over(scene.accuracy)
+    over = errors_of(done.done["accuracy"].product, scene.accuracy).over(scene.accuracy)
     text = f"estimated error of the {scene.accuracy.of.replace('_', ' ')}: {shown(over, scene.accuracy)}"
     if worst(over)[0] <= 1:
         console.say(f"{text}, within the target")

@@ -7,8 +7,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from tireroad.contact.results.error_bars import CAUSES
+from tireroad.runs.files.trials import MARGIN, Settings
 from tireroad.runs.scene.schema import Pitch
-from tireroad.runs.scene.tables.scene import AccuracyTable, Scene
+from tireroad.runs.scene.tables.scene import Scene
 
 FINER = 2**0.5  # factor per rung of modes; step and spacing of the points are halved
 # A grid of points that is no part of the next one places their errors anew: on cobblestones a radial
@@ -22,34 +23,7 @@ PASSING = 2.25  # contact points that pass per period of it, at least
 # radial tire still have a companion with half the spacing (contact.grid_patch): with 7 mm they missed
 # the joints of cobblestones (25 % off, estimated as 12 %), with 10 mm a run was 44 % off there.
 POINTS = 1 / 40
-# An estimate can be smaller than the true error by this factor, and seldom by more
-# (docs/verification/accuracy-on-demand.md): searches aim at the target over it.
-MARGIN = 1.2
 MARGINAL = f"estimated at {100 / MARGIN:.0f} % of that, because estimates can be too small"
-
-
-@dataclass(frozen=True)
-class Settings:
-    """One choice of settings.
-
-    `mesh`: elements around and from bead to bead, of an `order`; modes `up_to` Hz; `residual`;
-    `pitch` m of the points; `step` s; `rungs`: position on the ladder of each cause.
-    """
-
-    mesh: tuple[int, int]
-    order: int
-    up_to: float
-    residual: str
-    pitch: float
-    step: float
-    rungs: dict[str, int]
-
-    def __str__(self) -> str:
-        around, along = self.mesh
-        return (
-            f"{around} x {along} elements of order {self.order}, modes up to {self.up_to:.4g} Hz, residual "
-            f"{self.residual}, points {1e3 * self.pitch:.3g} mm, step {1e3 * self.step:.3g} ms"
-        )
 
 
 @dataclass(frozen=True)
@@ -133,22 +107,15 @@ class Ladders:
 
 def bounds(scene: Scene) -> list[str]:
     """Lines for `check` about the search that the run begins with."""
-    ladders, wanted = Ladders.of(scene), scene.accuracy
-    limit = f" or {wanted.budget:g} s" if wanted.budget is not None else ""
+    ladders, accuracy = Ladders.of(scene), scene.accuracy
+    limit = f" or {accuracy.budget:g} s" if accuracy.budget is not None else ""
     return [
-        f"search for {aim(wanted)}: mesh, modes, residual, points and step as given are not used",
+        f"search for {accuracy.aim()}: mesh, modes, residual, points and step as given are not used",
         f"  from  {ladders.first()}",
         f"  to    {ladders.finest()}, as far as the memory holds it",
         f"  until {MARGINAL}",
-        f"  in {wanted.trials} trials{limit} at most; sizes and costs below are those of the first",
+        f"  in {accuracy.trials} trials{limit} at most; sizes and costs below are those of the first",
     ]
-
-
-def aim(wanted: AccuracyTable) -> str:
-    """The target in words."""
-    asked = [f"{100 * wanted.target:.3g} %"] if wanted.target is not None else []
-    asked += [f"{wanted.target_db:.3g} dB"] if wanted.target_db is not None else []
-    return f"settings with {' and '.join(asked)} of the {wanted.of.replace('_', ' ')} up to {wanted.up_to:g} Hz"
 
 
 def size_ratio(cause: str, one: Settings, other: Settings) -> float:

@@ -57,13 +57,7 @@ from tireroad.runs.stages.modes import Fields, ModesStage, Motions
 from tireroad.runs.stages.rolling import ContactForces, first_step, forces, recursive
 from tireroad.runs.stages.rotating import FullMatrices, RotatingStage
 from tireroad.runs.stages.setup import Setup, points_of, tread_surface
-from tireroad.runs.stages.stage import (
-    Computed,
-    Job,
-    PipelinePart,
-    Record,
-    Result,
-)
+from tireroad.runs.stages.stage import Computed, Job, PipelinePart, Record, Result
 from tireroad.runs.stages.static import StaticStage
 
 _WHOLE = 0.9  # share of the wall from which a compound counts as all of it

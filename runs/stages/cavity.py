@@ -43,7 +43,7 @@ _STATES = {
 
 
 def inputs(job: Job) -> dict | None:
-    """What the air depends on besides the static state; None without air."""
+    """Inputs of the air besides the static state; None without air."""
     return asdict(job.scene.tire.cavity) if has_air(job.scene) else None
 
 
@@ -53,15 +53,15 @@ def make_air(job: Job, motions: SmallMotions) -> Column | None:
         return None
     from tireroad.fem.cavity import make_column
 
-    wanted, static = job.scene.tire.cavity, motions.static
+    cavity, static = job.scene.tire.cavity, motions.static
     return make_column(
         motions.body,
         motions.operators.unknowns,
         static.inflation,
-        wanted.temperature,
+        cavity.temperature,
         job.speed,
-        wanted.up_to,
-        wanted.loss_factor,
+        cavity.up_to,
+        cavity.loss_factor,
     )
 
 
@@ -140,5 +140,5 @@ def describe(record: Record, rolling: RollingModes) -> None:
     first = lowest[part[lowest] >= min(_MOSTLY, part[lowest].max())][:_SHOWN]
     record.headline |= {
         "states with most air": (_listed(frequency[first] / (2 * np.pi)), "Hz"),
-        "their share of air": (_listed(part[first]), "-"),
+        "share of air in these states": (_listed(part[first]), "-"),
     }

@@ -1,11 +1,8 @@
 """contact.h5, written during the time loop, and the checkpoint from which a loop continues.
 
-Compressed datasets whose rows a thread packs while the loop continues.
-
 HDF5's own filters hold Python's lock while they deflate; zlib does not. Whole chunks are therefore
-packed by zlib and written directly. HDF5 itself is only called from the caller's thread.
-
-How much of the road's relief the contact points of a run see.
+packed by zlib in a thread while the loop continues, and written directly. HDF5 itself is only
+called from the caller's thread.
 """
 
 from __future__ import annotations
@@ -39,6 +36,32 @@ from tireroad.runs.stages import setup as stages_setup
 from tireroad.runs.stages.stage import Job, Record
 
 LEVEL = 1  # higher levels take several times as long for a few percent
+
+# Share of the road's standard deviation that the points have to see.
+_SEEN = 0.5
+# Share of its height from which on an obstacle counts as whole.
+_WHOLE = 0.98
+_LONGEST = 1.0  # m of road that is sampled
+_MOST = 8000  # samples along
+_CHUNK = 512  # steps in a chunk of what is not one number a point
+CHECKPOINT = "checkpoint.h5"
+STATE = "state"  # the group that a checkpoint has in addition to those of contact.h5
+
+_LAYOUT: dict[str, tuple[tuple, str]] = {
+    "time": ((), "s"),
+    "normal_force": ((None,), "N"),
+    "horizontal_force": ((None, 2), "N"),
+    "total_force": ((3,), "N"),
+    "displacement": ((None,), "m"),
+    "gap": ((None,), "m"),
+    "axle_force": ((3,), "N"),
+    "active": ((), "-"),
+    "residual": ((), "-"),
+}
+_OF_BLOCK = (
+    "time", "gap", "displacement", "axle_force", "active", "residual", "penetration", "moved", "total_force",
+)  # fmt: skip
+DRIVEN = "driven_displacement"  # (nt, k, 3) m at the k prescribed forces, if the scene has them
 
 
 def create(file: h5py.File, name: str, rows: int, width: tuple[int, ...]) -> h5py.Dataset:
@@ -95,12 +118,6 @@ def _packed(values: np.ndarray, kind: np.dtype) -> bytes:
     return zlib.compress(np.ascontiguousarray(octets.T).data, LEVEL)
 
 
-# Share of the road's standard deviation that the points have to see.
-_SEEN = 0.5
-# Share of its height from which on an obstacle counts as whole.
-_WHOLE = 0.98
-
-
 def describe(record: Record, setup: ContactSetup, road: RoadTable) -> None:
     """Record the mean profile depth; report the processing of a measured road in words.
 
@@ -126,7 +143,7 @@ def describe(record: Record, setup: ContactSetup, road: RoadTable) -> None:
 def _describe_smoothing(record: Record, setup: ContactSetup, relief: Relief) -> None:
     """Record the road's relief and what the points see of it; warn if that is less than half."""
     record.indicators["standard deviation of the road"] = (relief.road, "m")
-    record.indicators["of the road as the points see it"] = (relief.points, "m")
+    record.indicators["standard deviation of the road as the points see it"] = (relief.points, "m")
     if relief.points < _SEEN * relief.road:
         along, across = 1e3 * setup.patch.spacing
         record.warnings.append(
@@ -148,10 +165,6 @@ def fill(file: h5py.File, setup: ContactSetup) -> None:
     put(file, "road/texture_level", road.texture.level, "dB re 1 um")
     if road.texture.depth is not None:
         file.attrs["mean_profile_depth"] = road.texture.depth
-
-
-_LONGEST = 1.0  # m of road that is sampled
-_MOST = 8000  # samples along
 
 
 class Relief(NamedTuple):
@@ -181,10 +194,10 @@ def relief_seen(setup: ContactSetup) -> Relief | None:
     order = held[np.argsort(patch.points[held, 1], kind="stable")]
     chosen = order[[0, len(order) // 2, -1]]
     y, half = patch.points[chosen, 1], patch.half_sizes[chosen]
-    given = np.repeat(x[:, None], 3, axis=1), np.broadcast_to(y, (len(x), 3))
-    raw, seen = road.height(*given), CellMean(road, y, half).height(*given)
-    found = Relief(float(raw.std(axis=0).max()), float(seen.std(axis=0).max()))
-    return found if found.road > NOTHING else None
+    arguments = np.repeat(x[:, None], 3, axis=1), np.broadcast_to(y, (len(x), 3))
+    raw, seen = road.height(*arguments), CellMean(road, y, half).height(*arguments)
+    relief = Relief(float(raw.std(axis=0).max()), float(seen.std(axis=0).max()))
+    return relief if relief.road > NOTHING else None
 
 
 def _places(setup: ContactSetup) -> np.ndarray:
@@ -195,27 +208,6 @@ def _places(setup: ContactSetup) -> np.ndarray:
     length = min(end - first, _LONGEST)
     count = int(np.clip(4 * length / setup.road.spacing, 0, _MOST))
     return first + length * (np.arange(count) + 0.5) / max(count, 1)
-
-
-_CHUNK = 512  # steps in a chunk of what is not one number a point
-CHECKPOINT = "checkpoint.h5"
-STATE = "state"  # the group that a checkpoint has in addition to those of contact.h5
-
-_LAYOUT: dict[str, tuple[tuple, str]] = {
-    "time": ((), "s"),
-    "normal_force": ((None,), "N"),
-    "horizontal_force": ((None, 2), "N"),
-    "total_force": ((3,), "N"),
-    "displacement": ((None,), "m"),
-    "gap": ((None,), "m"),
-    "axle_force": ((3,), "N"),
-    "active": ((), "-"),
-    "residual": ((), "-"),
-}
-_OF_BLOCK = (
-    "time", "gap", "displacement", "axle_force", "active", "residual", "penetration", "moved", "total_force",
-)  # fmt: skip
-DRIVEN = "driven_displacement"  # (nt, k, 3) m at the k prescribed forces, if the scene has them
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -260,9 +252,9 @@ def begun_with(job: Job, key: str) -> Chosen | None:
         if job.fresh or store.why_not(path, job.provenance("contact", key).input_hash, "contact"):
             return None
         with store.opened(path) as file:
-            given = file.attrs
-            reason, limit = str(given["scheme_reason"]), float(given["scheme_limit"])
-            return Chosen(str(given["scheme"]), reason, limit)
+            attrs = file.attrs
+            reason, limit = str(attrs["scheme_reason"]), float(attrs["scheme_limit"])
+            return Chosen(str(attrs["scheme"]), reason, limit)
 
     return on_root(job.comm, found)
 

@@ -6,19 +6,16 @@ from dataclasses import asdict
 
 import h5py
 import numpy as np
-from scipy import sparse
 
 from tireroad.contact.patch import Patch
 from tireroad.fem.wheel import Axle
 from tireroad.greens.basis import Basis
 from tireroad.greens.outputs import disagreement
-from tireroad.modal.corner import ARRAYS, SEEN, Corner
+from tireroad.modal.corner import ARRAYS, HUB_MOMENTS, READINGS, Corner
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
 from tireroad.runs.stages.stage import Job, Record
 
-MOMENTS = 3  # hub moments: the last readings of every wheel
-BESIDE = SEEN + MOMENTS  # columns of the probes after those of the outer face
 UNITS = {
     "wheel/translation": "m",
     "wheel/rotation": "rad",
@@ -46,14 +43,14 @@ def readings(job: Job) -> int:
     which then carries part of the moments.
     """
     if job.axle:
-        return BESIDE
+        return READINGS
     held = job.scene.modes.on_axle_alone and job.scene.output.axle_force
-    return MOMENTS if held else 0
+    return HUB_MOMENTS if held else 0
 
 
 def layout(job: Job) -> dict[str, tuple[tuple, str]]:
     """Shape per step and unit of each reading, by the names in contact.h5."""
-    names = {0: (), MOMENTS: ("hub_moment",)}.get(readings(job), tuple(UNITS))
+    names = {0: (), HUB_MOMENTS: ("hub_moment",)}.get(readings(job), tuple(UNITS))
     return {name: ((3,) if name != "body/height" else (), UNITS[name]) for name in names}
 
 
@@ -68,15 +65,6 @@ def read(file: h5py.File, axle: Axle | None) -> Corner | None:
     if "corner" not in file:
         return None
     return Corner(axle=axle or Axle.held(), **{name: file[f"corner/{name}"][:] for name in ARRAYS})
-
-
-def widened(probes: sparse.csr_matrix, count: int) -> sparse.csr_matrix:
-    """Probes (k, 3 s) of the outer face, plus the last `count` readings of wheel, body, hub.
-
-    Returns (k + count, 3 s + 10).
-    """
-    every = sparse.identity(BESIDE, format="csr")
-    return sparse.block_diag([probes, every[BESIDE - count :]], format="csr")
 
 
 def standing_moment(patch: Patch) -> np.ndarray:
@@ -95,8 +83,8 @@ def parts(readings: np.ndarray, static: np.ndarray) -> dict[str, np.ndarray]:
 
     `static` (3,) N m: the static moment, which is added.
     """
-    out = {"hub_moment": readings[:, -MOMENTS:] + static}
-    if readings.shape[1] > MOMENTS:
+    out = {"hub_moment": readings[:, -HUB_MOMENTS:] + static}
+    if readings.shape[1] > HUB_MOMENTS:
         out |= {name: readings[:, place] for name, place in _PLACES.items()}
         out["body/height"] = out["body/height"][:, 0]
     return out

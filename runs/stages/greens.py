@@ -13,16 +13,18 @@ from tireroad.contact.setup import ContactSetup
 from tireroad.fem.static.state import StaticState
 from tireroad.greens.basis import Basis
 from tireroad.greens.coupling import Wheel
+from tireroad.greens.residuals import residual_of
 from tireroad.greens.response import Response
 from tireroad.greens.responses import Made, Wanted, band, judged, make_response, selected
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
+from tireroad.runs.scene.physics import turning_of
 from tireroad.runs.scene.tables.scene import PointForceTable, has_air
 from tireroad.runs.stages import cavity, corner, rotating
 from tireroad.runs.stages.modes import fill_projection, read_projection
 from tireroad.runs.stages.setup import components, leaning, leaning_loads, points_of, probes
-from tireroad.runs.stages.stage import MUMPS, Computed, Record, Result, turning_of
+from tireroad.runs.stages.stage import MUMPS, Computed, Record, Result
 
 _UNITS = {
     "eigenvalue": "1/s",
@@ -37,6 +39,7 @@ _UNITS = {
 }
 # Of the rate of momentum, the last three rows of the slope, in s instead.
 _KNOWN = {"left_out": "kg m/N", "moments": "-", "slope": "m s"}
+_ATTACHED = "attached"
 
 
 def fill_response(file: h5py.File, name: str, response: Response, points: int) -> None:
@@ -70,9 +73,6 @@ def read_responses(file: h5py.File) -> dict[str, Response]:
     }
 
 
-_ATTACHED = "attached"
-
-
 @dataclass(frozen=True)
 class Responses:
     """The responses of a scene, each None if the scene has none.
@@ -100,6 +100,7 @@ class GreensStage(Computed[Responses]):
     """The Green's functions with their residual flexibility, and the choice of dynamic states."""
 
     name: ClassVar[str] = "greens"
+    reads: ClassVar[tuple[str, ...]] = ("greens",)
     static: Result[StaticState]
     wheel: Result[Wheel]
     fields: Result[ModalBasis]
@@ -109,21 +110,19 @@ class GreensStage(Computed[Responses]):
     def solver(self) -> str:
         """The solvers' settings, for the log."""
         scene = self.job.scene
-        if scene.greens.residual == "none":
+        if not residual_of(scene.greens.residual).solves:
             return "none: states alone"
         from tireroad.fem.matrices.compliance import RESIDUAL_TOLERANCE
 
         return f"static shapes by {MUMPS}; residual at most {RESIDUAL_TOLERANCE:g}"
 
     def inputs(self) -> dict:
-        """The states and what is driven; the road enters only through the reach of the patch."""
+        """Also what is driven; the road enters only through the reach of the patch."""
         scene, setup = self.job.scene, self.setup.product
-        return {
-            "modes": self.rotating.key,
+        return super().inputs() | {
             "axle": corner.inputs(self.job),
             "readings": corner.readings(self.job),
-            "damping": repr(turning_of(self.job).damping),
-            "greens": asdict(scene.greens),
+            "damping": repr(turning_of(self.job.scene, self.job.speed).damping),
             "forces": [_place(force) for force in scene.force],
             "points": setup.patch.index.tolist() if setup else [],
             "pitch": points_of(self.job, self.static.product) if setup else None,
@@ -153,8 +152,8 @@ class GreensStage(Computed[Responses]):
 
     @property
     def _wanted(self) -> Wanted:
-        given = self.job.scene.greens
-        return Wanted(residual=given.residual, dynamic=given.dynamic, band=given.band)
+        greens = self.job.scene.greens
+        return Wanted(residual=greens.residual, dynamic=greens.dynamic, band=greens.band)
 
     def compute(self, record: Record) -> Responses:
         """The responses between all probes. Collective."""
@@ -178,11 +177,11 @@ class GreensStage(Computed[Responses]):
 
     def _whole(self, record: Record, rolling: RollingModes, points, residual: str) -> Made:
         """The response with all states. Collective."""
-        if residual == "attachment":
+        if residual_of(residual).joins:
             with record.timing("modes once more"):
                 _ = self.fields.product
         with record.timing("residual flexibility"):
-            made = make_response(
+            response = make_response(
                 lambda: self.wheel.product,
                 rolling,
                 points.outputs,
@@ -191,12 +190,12 @@ class GreensStage(Computed[Responses]):
                 lambda: self.fields.product,
                 self._light(points.loads.shape[1]),
             )
-        record.indicators |= made.figures
-        record.warnings += made.warnings
-        return made
+        record.indicators |= response.figures
+        record.warnings += response.warnings
+        return response
 
     def _of_attached(self, attached: RollingModes) -> dict[str, Any]:
-        """What the contact needs of the modes with attachment modes: not their fields, which on
+        """The part that the contact needs of the modes with attachment modes: not their fields, which on
         fine meshes take gigabytes."""
         leaning = None
         if self._leaning:
@@ -272,7 +271,7 @@ class GreensStage(Computed[Responses]):
         attached = RollingModes(
             basis=ModalBasis(frequency=frequency, shape=shape, projection=projection),
             states=rotating.read(group["states"]),
-            turning=turning_of(self.job),
+            turning=turning_of(self.job.scene, self.job.speed),
         )
         leaning = group["leaning"][:] if "leaning" in group else None
         return replace(responses, attached=attached, leaning=leaning)

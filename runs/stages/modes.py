@@ -1,15 +1,14 @@
 """Stage modes: the lowest modes about the static state, and rotation matrices projected on them.
 
-The modes on all unknowns, in the shared cache beside modes.h5.
-
-A family with attachment modes thus solves them once. Not in the result folder: 38 MB for 157 modes
-of 30,240 unknowns. Those above LARGEST are solved again by each member.
+Their fields on all unknowns are kept in the shared cache beside modes.h5, so that a family with
+attachment modes solves them once. They are not in the result folder: 38 MB for 157 modes of 30,240
+unknowns. Those above LARGEST are solved again by each member.
 """
 
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -19,6 +18,7 @@ from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.static.state import StaticState
 from tireroad.fem.wheel import Axle
+from tireroad.greens.residuals import residual_of
 from tireroad.modal.basis import ModalBasis, Projection, same_fields
 from tireroad.modal.damping import Damping, StrainEnergy, ratios
 from tireroad.modal.rotation_shapes import up_to
@@ -30,20 +30,11 @@ from tireroad.runs.process import console
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.process.surroundings import available_memory
 from tireroad.runs.scene.estimate import estimate
+from tireroad.runs.scene.physics import damping_of, shapes_of
 from tireroad.runs.stages import cavity, corner
-from tireroad.runs.stages.stage import (
-    MUMPS,
-    Computed,
-    Job,
-    Record,
-    Result,
-    Shared,
-    checkpointed,
-    damping_of,
-    forget_checkpoint,
-    memoize,
-    shapes_of,
-)
+from tireroad.runs.stages.checkpoint import checkpointed, forget_checkpoint
+from tireroad.runs.stages.matrices import memoize
+from tireroad.runs.stages.stage import MUMPS, Computed, Job, Record, Result, Shared
 
 _UNITS = {
     "squares": "1/s2",
@@ -56,6 +47,10 @@ _UNITS = {
     "rise": "1/s2",
     "band_rise": "1/s2",
 }
+NAME = "fields"
+LARGEST = 300e6  # bytes: each process holds all of them while they are written or read
+_KEPT = ("orthonormality", "inertia_count", "counted_below", "rigid", "slices", "segments")
+_NAMED = 10  # modes shown by name
 
 
 def fill(file, basis: ModalBasis, points: np.ndarray, damping: np.ndarray) -> None:
@@ -120,11 +115,6 @@ def read(file, axle: Axle | None) -> ModalBasis:
     return ModalBasis(frequency=frequency, shape=shape, projection=projection)
 
 
-NAME = "fields"
-LARGEST = 300e6  # bytes: each process holds all of them while they are written or read
-_KEPT = ("orthonormality", "inertia_count", "counted_below", "rigid", "slices", "segments")
-
-
 def keep(job: Job, key: str, operators: Operators, modes: Modes) -> None:
     """Store the fields of the modes with the hash `key` in the cache, if any. Collective."""
     body = operators.body
@@ -178,18 +168,15 @@ def kept(job: Job, key: str, operators: Operators, basis: ModalBasis) -> Modes |
 
 
 def _read(file: Any) -> dict[str, Any]:
-    given = file.attrs
-    found = {name: given[name].item() for name in _KEPT}
+    attrs = file.attrs
+    found = {name: attrs[name].item() for name in _KEPT}
     found |= {"squares": file["square"][:], "residual": file["residual"][:]}
-    found |= {"sectors": tuple(int(n) for n in given["sectors"])}
-    return found | {"symmetries": tuple(map(str, given["symmetries"])), "field": file["field"][:]}
+    found |= {"sectors": tuple(int(n) for n in attrs["sectors"])}
+    return found | {"symmetries": tuple(map(str, attrs["symmetries"])), "field": file["field"][:]}
 
 
 def _size(operators: Operators, count: int) -> float:
     return 24.0 * operators.body.lattice.size * count
-
-
-_NAMED = 10  # modes shown by name
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -212,6 +199,7 @@ class ModesStage(Computed[ModalBasis]):
     """The modes of the non-rotating tire."""
 
     name: ClassVar[str] = "modes"
+    reads: ClassVar[tuple[str, ...]] = ("modes",)
     static: Result[StaticState]
     motions: Result[SmallMotions]
 
@@ -235,11 +223,9 @@ class ModesStage(Computed[ModalBasis]):
         )
 
     def inputs(self) -> dict:
-        """The static state, the modal table, viscous damping; rotation matrices if the wheel turns."""
-        damping = damping_of(self.job)
-        return {
-            "static": self.static.key,
-            "modal": asdict(self.job.scene.modes),
+        """Also viscous damping; whether the wheel turns, and the rotation shapes that join."""
+        damping = damping_of(self.job.scene)
+        return super().inputs() | {
             "rotating": self.job.speed != 0,
             "shapes": self._shapes,
             "cavity": cavity.inputs(self.job),
@@ -249,7 +235,7 @@ class ModesStage(Computed[ModalBasis]):
     @property
     def _shapes(self) -> tuple[float, str, float] | None:
         """The speed (rad/s) up to which rotation shapes join the modes, their inertia and tolerance."""
-        turning = shapes_of(self.job)
+        turning = shapes_of(self.job.scene, self.job.speed)
         return (up_to(turning.speed), turning.inertia, turning.shape_tolerance) if turning else None
 
     def compute(self, record: Record) -> ModalBasis:
@@ -266,13 +252,13 @@ class ModesStage(Computed[ModalBasis]):
         with record.timing("air"):
             air = cavity.make_air(self.job, motions)
         with record.timing("projection and rotation shapes"):
-            given = air, self.job.axle, shapes_of(self.job)
-            basis = projected(motions, modes, self.job.speed != 0, *given)
+            arguments = air, self.job.axle, shapes_of(self.job.scene, self.job.speed)
+            basis = projected(motions, modes, self.job.speed != 0, *arguments)
             basis = named(basis, motions.lattice)
         _describe(record, modes, basis)
         if self._shapes:
-            record.headline["rotation shapes that join them"] = (basis.projection.shapes, "-")
-        record.headline["damping"] = (_damping(damping_of(self.job), basis.projection), "-")
+            record.headline["rotation shapes"] = (basis.projection.shapes, "-")
+        record.headline["damping"] = (_damping(damping_of(self.job.scene), basis.projection), "-")
         if air is not None:
             cavity.describe_air(record, basis.projection.air)
         _say_names(basis)
@@ -280,7 +266,7 @@ class ModesStage(Computed[ModalBasis]):
 
     def end(self, key: str, product: ModalBasis) -> None:
         """Cache the fields for other members of a family. Collective."""
-        if self.job.scene.greens.residual == "attachment" and product.modes is not None:
+        if residual_of(self.job.scene.greens.residual).joins and product.modes is not None:
             keep(self.job, key, self.motions.product.operators, product.modes)
         forget_checkpoint(self.job, self.name)
 
@@ -302,7 +288,7 @@ class ModesStage(Computed[ModalBasis]):
 
     def write(self, file, product: ModalBasis) -> None:
         """Frequencies, traces and the small matrices; not the fields on all unknowns."""
-        damping = ratios(damping_of(self.job), product.projection)
+        damping = ratios(damping_of(self.job.scene), product.projection)
         fill(file, product, self.static.product.points, damping)
 
     def read(self, file) -> ModalBasis:
@@ -321,31 +307,31 @@ class Fields(Shared[ModalBasis]):
 
     def make(self) -> ModalBasis:
         """The basis with fields. Collective."""
-        wanted, basis = self.job.scene.modes, self.modes.product
+        modes, basis = self.job.scene.modes, self.modes.product
         if basis.modes is not None:
             return basis
         motions, air = self.motions.product, self.air.product
-        given = self.job, self.modes.key, motions.operators
-        if (known := kept(*given, basis)) is not None:
+        arguments = self.job, self.modes.key, motions.operators
+        if (known := kept(*arguments, basis)) is not None:
             return replace(basis, modes=known, column=air)
         again = with_fields(
             basis,
             motions,
-            **wanted.asked,
+            **modes.asked,
             air=air,
             axle=self.job.axle,
-            turning=shapes_of(self.job),
+            turning=shapes_of(self.job.scene, self.job.speed),
         )
         assert again.modes is not None, "they were solved just now"
-        keep(*given, again.modes)
+        keep(*arguments, again.modes)
         return again
 
 
 def _describe(record: Record, modes: Modes, basis: ModalBasis) -> None:
     record.headline |= {
         "modes": (modes.count, "-"),
-        "lowest": (float(basis.frequency[0]), "Hz"),
-        "highest": (float(basis.frequency[-1]), "Hz"),
+        "lowest mode": (float(basis.frequency[0]), "Hz"),
+        "highest mode": (float(basis.frequency[-1]), "Hz"),
     }
     if modes.segments > 1:
         record.headline["equal segments, solved by wave number"] = (modes.segments, "-")
@@ -356,7 +342,7 @@ def _describe(record: Record, modes: Modes, basis: ModalBasis) -> None:
         "worst residual": (float(modes.residual.max()), "-"),
         "orthonormality": (modes.orthonormality, "-"),
         "modes by inertia count": (modes.inertia_count, "-"),
-        "counted below": (float(np.sqrt(modes.counted_below) / (2 * np.pi)), "Hz"),
+        "modes are counted below": (float(np.sqrt(modes.counted_below) / (2 * np.pi)), "Hz"),
         "slices": (modes.slices, "-"),
         "rigid modes": (modes.rigid, "-"),
     }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -18,6 +18,7 @@ from tireroad.modal.standing import standing_modes
 from tireroad.runs.files.store import put
 from tireroad.runs.process import console
 from tireroad.runs.scene.outputs import Curves
+from tireroad.runs.scene.physics import turning_of
 from tireroad.runs.stages.contact_file import ContactHistory
 from tireroad.runs.stages.greens import Responses
 from tireroad.runs.stages.rolling import (
@@ -30,7 +31,7 @@ from tireroad.runs.stages.rolling import (
     shortest_period,
 )
 from tireroad.runs.stages.setup import driven_points
-from tireroad.runs.stages.stage import Computed, Job, Record, Result, turning_of
+from tireroad.runs.stages.stage import Computed, Job, Record, Result
 
 Array = np.ndarray
 
@@ -81,7 +82,7 @@ class Driven:
         From `count` modes of the same static state with its rim released; also returns the highest
         of them, Hz. Collective.
         """
-        turning = turning_of(self.job)
+        turning = turning_of(self.job.scene, self.job.speed)
         motions = SmallMotions(
             self.job.tire, self.static, rim="free", road=self.job.scene.modes.road
         )
@@ -120,23 +121,12 @@ class ResponseStage(Computed[PointResponse]):
     """The response to the prescribed forces, alone or together with contact."""
 
     name: ClassVar[str] = "response"
+    reads: ClassVar[tuple[str, ...]] = ("force", "time", "output.kinds", "output.axle_force")
     static: Result[StaticState]
     modes: Result[ModalBasis]
     wheel: Result[Wheel]
     greens: Result[Responses]
     contact: Result[ContactHistory] | None = None
-
-    def inputs(self) -> dict:
-        """The Green's functions, the forces, the time and the frequency outputs."""
-        scene, output = self.job.scene, self.job.scene.output
-        return {
-            "greens": self.greens.key,
-            "forces": [asdict(force) for force in scene.force],
-            "time": asdict(scene.time) if scene.time else None,
-            "outputs": {name: asdict(kind) for name, kind in output.kinds},
-            "contact": self.contact.key if self.contact else None,
-            "axle_force": output.axle_force,
-        }
 
     def compute(self, record: Record) -> PointResponse:
         """Integrate in time, then add the scene's outputs. Collective."""

@@ -14,16 +14,18 @@ from tireroad.contact.choices import LEAST_STEPS, TURN
 from tireroad.contact.loop import DrivenTire, LinearTire, equal_steps, steps_of
 from tireroad.contact.patch import Patch
 from tireroad.contact.results.chatter import Chosen, choose, oscillation
-from tireroad.contact.roads.under_tire import is_level
 from tireroad.contact.rolling import bristles, make_loop, rolling_steadily
 from tireroad.contact.setup import ContactSetup
 from tireroad.greens.recursion import Convolution, Recursion, sharers
 from tireroad.greens.response import Response
 from tireroad.runs.process import console
+from tireroad.runs.scene.physics import run_in_time
 from tireroad.runs.scene.tables.contact import TimeTable
 from tireroad.runs.scene.tables.scene import PointForceTable, RoadTable, Scene
 from tireroad.runs.stages import corner
 from tireroad.runs.stages.stage import Job, Record
+
+_PER_PERIOD = 16  # steps per shortest period of the excitation
 
 
 def directions(forces: Sequence[PointForceTable]) -> np.ndarray:
@@ -60,25 +62,13 @@ def run_in(setup: ContactSetup, road: RoadTable) -> float:
     There is none either where the road is level up to its end, as before a cleat: nothing grows,
     and the impact would be left out with it.
     """
-    return 0.0 if road.kind == "flat" else grown(setup, road.run_in)
-
-
-def grown(setup: ContactSetup, length: float) -> float:
-    """The same for a run-in of this length (m) on a road of any kind."""
-    speed, whole = setup.rolled.speed, setup.road.grown
-    x0, x1, y0, y1 = setup.patch.extent
-    if speed == 0 or is_level(setup.road, min(x0, whole), whole, y0, y1):
-        return 0.0
-    return (length + x1 - x0) / speed
+    return 0.0 if road.kind == "flat" else run_in_time(setup, road.run_in)
 
 
 def first_step(setup: ContactSetup, road: RoadTable, time: np.ndarray) -> int:
     """Index of the first step past the run-in; 0 if that is half the run or more."""
     start = int(np.searchsorted(time, run_in(setup, road)))
     return start if start < len(time) // 2 else 0
-
-
-_PER_PERIOD = 16  # steps per shortest period of the excitation
 
 
 def run_time(time: TimeTable) -> float:
@@ -112,24 +102,24 @@ def planned(job: Job, record: Record, response: Response, shortest: float) -> Pl
 
     `shortest` (s): shortest period of the excitation.
     """
-    wanted = job.scene.time
+    time = job.scene.time
     fastest = np.abs(response.every).max(initial=0.0)
-    if isinstance(wanted.step, str):
-        limits = [wanted.duration / LEAST_STEPS, shortest / _PER_PERIOD]
+    if isinstance(time.step, str):
+        limits = [time.duration / LEAST_STEPS, shortest / _PER_PERIOD]
         if fastest > 0:
             limits.append(TURN / fastest)
-        steps = equal_steps(wanted.duration, min(limits))
+        steps = equal_steps(time.duration, min(limits))
     else:
-        steps = steps_of(wanted.duration, wanted.step)
+        steps = steps_of(time.duration, time.step)
     kept = response.resolved(steps.size)
     moved = len(response.every) - len(kept.every)
     console.say(
         f"  step {steps.size:.4g} s, {steps.count} steps; fastest mode {fastest:.4g} 1/s, "
         f"{moved} states too fast for the step respond statically"
     )
-    if steps.duration > wanted.duration * (1 + 1e-9):
+    if steps.duration > time.duration * (1 + 1e-9):
         console.say(
-            f"  the run ends at {steps.duration:.6g} s: {wanted.duration:.6g} s is not a multiple of the step"
+            f"  the run ends at {steps.duration:.6g} s: {time.duration:.6g} s is not a multiple of the step"
         )
     record.indicators["states moved to the residual"] = (moved, "-")
     return Planned(kept, steps.size, steps.count)
@@ -224,13 +214,13 @@ def chosen_scheme(
 
     `begun`: the choice stored in the checkpoint that the loop continues from, or None.
     """
-    wanted = job.scene.time.scheme
+    scheme = job.scene.time.scheme
     spec, patch = job.scene.contact, setup.patch
     steps = oscillation(spec, patch, plan.response, plan.step, bristles(spec, patch))
     if math.isfinite(steps):
         record.indicators["steps in the fastest oscillation of the contact"] = (steps, "-")
-    given = Chosen(wanted, f'time.scheme = "{wanted}"')
-    return reported(record, begun or (choose(steps) if wanted == "auto" else given))
+    chosen = Chosen(scheme, f'time.scheme = "{scheme}"')
+    return reported(record, begun or (choose(steps) if scheme == "auto" else chosen))
 
 
 def reported(record: Record, chosen: Chosen) -> Chosen:

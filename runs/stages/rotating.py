@@ -1,16 +1,15 @@
 """Stage rotating: eigenproblem of the rotating tire, on the modal basis or the finite elements.
 
-The states in rotating.h5: those of the modes and, apart, those of the shapes that joined them.
-
-A state dominated by rotation shapes (modal.rotation_shapes) is not an eigenfrequency of the tire:
-it represents the coupling of its modes to faster ones. There are as many as shapes; `turning/place`
+In rotating.h5 the states of the modes stand apart from those of the shapes that joined them. A
+state dominated by rotation shapes (modal.rotation_shapes) is not an eigenfrequency of the tire: it
+represents the coupling of its modes to faster ones. There are as many as shapes; `turning/place`
 holds their indices among all states.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -34,13 +33,16 @@ from tireroad.modal.rolling import RollingModes, full_states, named_states, roll
 from tireroad.modal.states import StateModes
 from tireroad.modal.waves import FaceWaves, ModeNames
 from tireroad.runs.files.store import put
+from tireroad.runs.scene.physics import turning_of
 from tireroad.runs.stages import cavity, corner
 from tireroad.runs.stages.modes import fill_names
-from tireroad.runs.stages.stage import MUMPS, Computed, Job, Record, Result, Shared, turning_of
+from tireroad.runs.stages.stage import MUMPS, Computed, Job, Record, Result, Shared
 
 _STATES = {"eigenvalue": "1/s", "right": "-", "left": "s", "residual": "-", "left_residual": "-"}
 _BLOCK = {"block": "1/s", "block_right": "-", "block_left": "s"}
 _LAST = ("right",)  # the states lie along the last axis; for all others along the first
+LOWER = 0.7  # of the highest mode: the modes by which the critical speed is judged
+CONVERGED = 0.03  # largest relative change by the modes above
 
 
 def of_shapes(rolling: RollingModes) -> np.ndarray:
@@ -103,9 +105,12 @@ class FullMatrices(Shared[Wheel]):
 
     def make(self) -> Wheel:
         """Assemble them. Collective."""
-        turning, projection = turning_of(self.job), self.modes.product.projection
-        given = self.motions.product, turning, self.air.product, projection
-        return wheel_of(*given, self.job.axle)
+        turning, projection = (
+            turning_of(self.job.scene, self.job.speed),
+            self.modes.product.projection,
+        )
+        arguments = self.motions.product, turning, self.air.product, projection
+        return wheel_of(*arguments, self.job.axle)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,6 +118,7 @@ class RotatingStage(Computed[RollingModes]):
     """The states of the rolling tire; for a wheel at rest, those of the modes."""
 
     name: ClassVar[str] = "rotating"
+    reads: ClassVar[tuple[str, ...]] = ("rotation.campbell",)
     static: Result[StaticState]
     modes: Result[ModalBasis]
     wheel: Result[Wheel]
@@ -137,26 +143,27 @@ class RotatingStage(Computed[RollingModes]):
         if "modes" not in done or job.speed:
             return None
         modes = done["modes"]
-        return Result(modes.key, lambda: rolling_modes(modes.product, turning_of(job), job.comm))
+        return Result(
+            modes.key,
+            lambda: rolling_modes(modes.product, turning_of(job.scene, job.speed), job.comm),
+        )
 
     def inputs(self) -> dict:
-        """The modes, damping, speed and inertia; the number of states only for the full method."""
-        wanted, turning = self.job.scene.rotation, turning_of(self.job)
-        return {
-            "modes": self.modes.key,
+        """Also damping, speed and inertia; the number of states only for the full method."""
+        rotation, turning = self.job.scene.rotation, turning_of(self.job.scene, self.job.speed)
+        return super().inputs() | {
             "axle": corner.inputs(self.job),
             "damping": repr(turning.damping),
             "speed": turning.speed,
             "inertia": turning.inertia,
-            "campbell": asdict(wanted.campbell) if wanted.campbell else None,
-            "full": (wanted.count, wanted.window) if wanted.method == "full" else None,
+            "full": (rotation.count, rotation.window) if rotation.method == "full" else None,
         }
 
     def compute(self, record: Record) -> RollingModes:
         """Solve on the root process, share with all, check. Collective."""
         job, basis = self.job, self.modes.product
         with record.timing("eigensolver"):
-            rolling = rolling_modes(basis, turning_of(job), job.comm)
+            rolling = rolling_modes(basis, turning_of(job.scene, job.speed), job.comm)
         projected = {
             f"projected: {name}": (figure, "-") for name, figure in rolling.figures.items()
         }
@@ -177,9 +184,9 @@ class RotatingStage(Computed[RollingModes]):
         if rolling.states.unstable:
             record.warnings.append(_growth(job, rolling, basis))
         waves = FaceWaves(job.tire.lattice)
-        given = rolling.basis.shape, rolling.basis.projection, waves
+        arguments = rolling.basis.shape, rolling.basis.projection, waves
         with record.timing("names"):
-            names = on_root(job.comm, lambda: named_states(rolling.states, *given))
+            names = on_root(job.comm, lambda: named_states(rolling.states, *arguments))
         return replace(rolling, names=names, campbell=self._campbell(record, waves))
 
     def _where(self, basis: ModalBasis, wave: np.ndarray) -> tuple[int, float]:
@@ -199,22 +206,27 @@ class RotatingStage(Computed[RollingModes]):
 
     def _full(self, record: Record, projected: RollingModes) -> RollingModes:
         """The states of the finite elements, which replace the projected ones. Collective."""
-        wheel, wanted = self.wheel.product, self.job.scene.rotation
+        wheel, rotation = self.wheel.product, self.job.scene.rotation
         with record.timing("full eigensolver"):
             matrices = wheel.rotating_damping, wheel.rotating_stiffness
             rim = wheel.rim() if wheel.rim else None
-            given = wheel.operators, matrices, projected, rim
-            found, figures, warnings = full_states(*given, count=wanted.count, window=wanted.window)
+            arguments = wheel.operators, matrices, projected, rim
+            found, figures, warnings = full_states(
+                *arguments, count=rotation.count, window=rotation.window
+            )
         record.indicators |= figures
         record.warnings += warnings
         return found
 
     def _campbell(self, record: Record, waves: FaceWaves) -> Campbell | None:
         """Eigenvalue branches over speed, if the scene asks for them. Collective."""
-        wanted, turning = self.job.scene.rotation.campbell, turning_of(self.job)
-        if wanted is None:
+        campbell, turning = (
+            self.job.scene.rotation.campbell,
+            turning_of(self.job.scene, self.job.speed),
+        )
+        if campbell is None:
             return None
-        speeds = np.arange(0.0, wanted.to + wanted.step / 2, wanted.step)
+        speeds = np.arange(0.0, campbell.to + campbell.step / 2, campbell.step)
         basis = self.modes.product
         held = replace(basis.projection, corner=None)
 
@@ -222,9 +234,9 @@ class RotatingStage(Computed[RollingModes]):
             return named_states(states, basis.shape, held, waves)
 
         def both() -> Campbell:
-            given = turning.inertia, speeds, wanted.branches
-            free = sweep(held, Proportional(), *given)
-            return replace(sweep(held, turning.damping, *given, names), undamped=free.frequency)
+            arguments = turning.inertia, speeds, campbell.branches
+            free = sweep(held, Proportional(), *arguments)
+            return replace(sweep(held, turning.damping, *arguments, names), undamped=free.frequency)
 
         with record.timing("campbell"):
             lines = on_root(self.job.comm, both)
@@ -252,7 +264,7 @@ class RotatingStage(Computed[RollingModes]):
             kept = {name: own[name] for name in ("momentum", "corner")}
             projection = replace(basis.projection, **kept)
             basis = replace(basis, shape=own["shape"], projection=projection, modes=None)
-        turning = turning_of(self.job)
+        turning = turning_of(self.job.scene, self.job.speed)
         return RollingModes(basis=basis, states=states, turning=turning, full=bool(own))
 
 
@@ -263,10 +275,6 @@ def _beyond(speed: float, critical: float) -> str:
         "rad/s, at which a wave is stationary on the road and grows without bound: the results have "
         "little meaning; take a lower speed, a higher static.inflation or a stiffer material"
     )
-
-
-LOWER = 0.7  # of the highest mode: the modes by which the critical speed is judged
-CONVERGED = 0.03  # largest relative change by the modes above
 
 
 def _lower(projection: Projection) -> np.ndarray:
@@ -283,9 +291,12 @@ def _describe_wave(
 ) -> None:
     """The wave that stands at the critical speed, and whether modes enough are there to say so."""
     waves, y = where
-    record.headline["its standing wave"] = (f"{waves} around, largest at y = {1e3 * y:.0f} mm", "-")
+    record.headline["standing wave at the critical speed"] = (
+        f"{waves} around, largest at y = {1e3 * y:.0f} mm",
+        "-",
+    )
     if not before < (1 + CONVERGED) * critical:
-        record.headline["the critical speed is"] = (
+        record.headline["bound on the critical speed"] = (
             f"an upper bound, of the stiffness at the present speed: with modes to {LOWER:g} of the highest it was "
             f"{before:.4g} rad/s, and more modes lower it further",
             "-",
@@ -306,7 +317,7 @@ def _describe(record: Record, rolling: RollingModes, critical: float) -> None:
     if rolling.basis.projection.moves:
         corner.describe(record, rolling)
     if len(oscillating):
-        record.headline["lowest"] = (float(oscillating.imag.min() / (2 * np.pi)), "Hz")
+        record.headline["lowest frequency"] = (float(oscillating.imag.min() / (2 * np.pi)), "Hz")
     record.indicators |= {
         "worst residual": (float(states.residual.max(initial=0.0)), "-"),
         "worst left residual": (float(states.left_residual.max(initial=0.0)), "-"),
@@ -318,12 +329,12 @@ def _describe(record: Record, rolling: RollingModes, critical: float) -> None:
 def _growth(job: Job, rolling: RollingModes, basis: ModalBasis) -> str:
     """Warning of an unstable tire. Collective."""
     states, turning = rolling.states, rolling.turning
-    given = turning.damping, turning.inertia
+    arguments = turning.damping, turning.inertia
 
     def first() -> float:
-        if not growth(basis.projection, turning.speed, *given):
+        if not growth(basis.projection, turning.speed, *arguments):
             return turning.speed  # only the full problem is unstable
-        return onset(basis.projection, *given, turning.speed)
+        return onset(basis.projection, *arguments, turning.speed)
 
     return (
         f"{states.unstable} state(s) of the rolling tire are unstable, the fastest growing at "

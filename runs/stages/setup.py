@@ -27,15 +27,18 @@ from tireroad.contact.tread.pattern import Heights, Pattern, pitch_starts
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices import probe
 from tireroad.fem.static.state import StaticState
+from tireroad.modal.corner import HUB_MOMENTS, READINGS, widened
 from tireroad.runs.files import store
 from tireroad.runs.files.store import put
+from tireroad.runs.scene.physics import wheel_slip
 from tireroad.runs.scene.rules import made
 from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.scene.tables.contact import PatternTable
 from tireroad.runs.scene.tables.scene import rolls_freely
 from tireroad.runs.stages import corner
+from tireroad.runs.stages.matrices import memoize
 from tireroad.runs.stages.rolling import run_time
-from tireroad.runs.stages.stage import Job, Record, Result, Shared, memoize, wheel_slip
+from tireroad.runs.stages.stage import Job, Record, Result, Shared
 
 if TYPE_CHECKING:
     from tireroad.fem.static.footprint import TreadSurface
@@ -61,10 +64,10 @@ def make_pattern(wanted: PatternTable | None, rolling_radius: float) -> Pattern 
 
 def inputs(job: Job) -> list | None:
     """The pattern's inputs: its table, and its file by content; None for a slick."""
-    wanted = job.scene.pattern
-    if wanted is None:
+    pattern = job.scene.pattern
+    if pattern is None:
         return None
-    return [asdict(wanted), store.file_hash(wanted.file) if wanted.file else None]
+    return [asdict(pattern), store.file_hash(pattern.file) if pattern.file else None]
 
 
 def describe(record: Record, setup: ContactSetup) -> None:
@@ -263,7 +266,7 @@ class Probes:
         """The counted part, restricted to the outer face."""
         if self.counted == slice(None):
             return self
-        face = slice(self.outputs.shape[1] - corner.BESIDE)
+        face = slice(self.outputs.shape[1] - READINGS)
         outputs = self.outputs[self.counted][:, face].tocsr()
         if self.loads is self.outputs:  # saves half of the solutions
             return Probes(self.name, outputs, outputs)
@@ -275,14 +278,14 @@ def probes(job: Job, state: StaticState, setup: ContactSetup | None) -> Probes:
     loads, readings = driven_points(job) if job.scene.force else (None, None)
     more = corner.readings(job)
     if setup is None:
-        return _driven_alone(loads, readings, min(more, corner.MOMENTS))
+        return _driven_alone(loads, readings, min(more, HUB_MOMENTS))
     parts = [_on_nodes(state, setup, part) for part in components(job)]
     if job.scene.force:
         parts += [loads, readings]
     points = sparse.vstack(parts, format="csr")
     if not more:
         return Probes("contact", points, points)
-    points, last = corner.widened(points, more), points.shape[0]
+    points, last = widened(points, more), points.shape[0]
     return Probes("contact", points, points, slice(last))
 
 
@@ -290,7 +293,7 @@ def _driven_alone(loads: sparse.csr_matrix, readings: sparse.csr_matrix, more: i
     """Probes of prescribed forces, and `more` readings of the wheel."""
     if not more:
         return Probes("force", readings, loads)
-    wide, last = corner.widened(readings, more), readings.shape[0]
+    wide, last = widened(readings, more), readings.shape[0]
     loads = sparse.csr_matrix(
         (loads.data, loads.indices, loads.indptr), (len(loads.indptr) - 1, wide.shape[1])
     )

@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
-from functools import cached_property, partial
-from pathlib import Path
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar
 
 import h5py
 import numpy as np
-from mpi4py import MPI
 from scipy import sparse
 
 from tireroad.contact.results.spectra import a_weighting, band_sums
-from tireroad.fem.errors import InputError
-from tireroad.fem.parameters import key_of
 from tireroad.fem.static.state import StaticState
 from tireroad.greens.basis import Basis
 from tireroad.greens.tire_sound import (
@@ -32,10 +27,9 @@ from tireroad.greens.tire_sound import (
 )
 from tireroad.modal.corner import BODY, SEEN
 from tireroad.runs.files.store import dataset, put, read_fields, write_fields
-from tireroad.runs.scene.plan import skipped
 from tireroad.runs.scene.tables.sound import SoundTable
 from tireroad.runs.stages.spectra import Spectra
-from tireroad.runs.stages.stage import Computed, Job, Record, Result, Shared, Stage
+from tireroad.runs.stages.stage import Computed, Record, Result
 from tireroad.runs.stages.vibration import HANN, POWER, decibels
 from tireroad.runs.stages.whole_tire import Lines, WholeTire
 
@@ -47,6 +41,8 @@ WORST = 1.0  # dB: larger errors of the sources inside are warned of
 
 REGIONS = ("tread ahead", "tread behind", "tread above", "left sidewall", "right sidewall", "wheel")
 SIDE = 0.7  # |n_y| of a sidewall
+PASS_BY = 7.5  # m: distance of the directivity
+KNOWN = 0.9  # least part of a total that lies in bands of known error
 
 
 def microphones(given: tuple, state: StaticState) -> tuple[list[str], np.ndarray]:
@@ -98,22 +94,15 @@ class RadiationStage(Computed[Paths]):
     """Once for a tire, load and speed: the same on every road."""
 
     name: ClassVar[str] = "radiation"
+    reads: ClassVar[tuple[str, ...]] = ("sound", "heard_up_to")
     static: Result[StaticState]
 
     @property
     def table(self) -> SoundTable:
         """The table [sound]."""
-        found = self.job.scene.sound
-        assert found is not None, "the stage runs with [sound] only"
-        return found
-
-    def inputs(self) -> dict:
-        """The shape of the tire on the road, the air, and the microphones."""
-        return {
-            "static": self.static.key,
-            "sound": vars(self.table),
-            "up_to": self.job.scene.heard_up_to,
-        }
+        sound = self.job.scene.sound
+        assert sound is not None, "the stage runs with [sound] only"
+        return sound
 
     def compute(self, record: Record) -> Paths:
         """Two meshes, all microphones and directions at each frequency. Collective."""
@@ -140,7 +129,7 @@ class RadiationStage(Computed[Paths]):
         record.headline |= {
             "elements": (len(tire.body.area), "-"),
             "frequencies": (len(frequency), "-"),
-            "up to": (float(frequency[-1]), "Hz"),
+            "highest frequency": (float(frequency[-1]), "Hz"),
             "error of sources inside": (float(error.max()), "dB"),
         }
         record.indicators["largest element"] = (tire.body.edge, "m")
@@ -201,7 +190,7 @@ def sounding(
 
 @dataclass(frozen=True, kw_only=True)
 class SoundPressure:
-    """What k microphones hear of the vibrations of a run, up to the limit of the model.
+    """Sound pressure of the vibrations of a run at k microphones, up to the limit of the model.
 
     `names` and `places` (k, 3) m; `frequency` (f,) Hz, `pressure` (k, f) Pa: complex amplitudes
     for e^{+iwt}, from a Hann window; `centre` (b,) Hz with the third-octave `level` (k, b) dB re
@@ -243,9 +232,6 @@ class SoundPressure:
     outline: np.ndarray = dataset("deg, -", "contribution/outline")
 
 
-PASS_BY = 7.5  # m: distance of the directivity
-
-
 @dataclass(frozen=True, kw_only=True)
 class SoundStage(WholeTire[SoundPressure]):
     """Pressure from the coordinates of the run and the Green's functions of the air."""
@@ -254,13 +240,6 @@ class SoundStage(WholeTire[SoundPressure]):
     radiation: Result[Paths]
     lines: Result[Lines | None]
     spectra: Result[Spectra] | None = None
-
-    def inputs(self) -> dict[str, Any]:
-        """The forces and states, their limit and error bars, and the air."""
-        return super().inputs() | {
-            "spectra": self.spectra.key if self.spectra else None,
-            "radiation": self.radiation.key,
-        }
 
     def compute(self, record: Record) -> SoundPressure | None:
         """None but on the root process. Collective."""
@@ -292,9 +271,9 @@ class SoundStage(WholeTire[SoundPressure]):
             parts = _sound(heard, self._errors, volumes @ lines.spectrum[below].T, lines.duration)
             normal = _normal_velocity(tire, shape, lines.amplitude[below], heard.frequency)
             efficiency = heard.efficiency(normal)
-        found = SoundPressure(efficiency=efficiency, **parts)
-        _describe(record, found)
-        return found
+        pressure = SoundPressure(efficiency=efficiency, **parts)
+        _describe(record, pressure)
+        return pressure
 
     @cached_property
     def _errors(self) -> tuple[np.ndarray, np.ndarray]:
@@ -326,9 +305,11 @@ class SoundStage(WholeTire[SoundPressure]):
 
     def read(self, file: h5py.File) -> SoundPressure:
         """The same, read back."""
-        kept = read_fields(file, SoundPressure)
+        fields = read_fields(file, SoundPressure)
         names = [str(name) for name in file["microphones"].attrs["names"]]
-        return SoundPressure(names=names, rate=float(file["signal/pressure"].attrs["rate"]), **kept)
+        return SoundPressure(
+            names=names, rate=float(file["signal/pressure"].attrs["rate"]), **fields
+        )
 
 
 def angles() -> tuple[np.ndarray, np.ndarray]:
@@ -459,9 +440,6 @@ def _sound(
     }
 
 
-KNOWN = 0.9  # least part of a total that lies in bands of known error
-
-
 def _total_error(band: np.ndarray, every: np.ndarray, error: np.ndarray) -> np.ndarray:
     """Error (k,) dB of the sum `every` (k,) of all lines, from those of bands (k, b), Pa2.
 
@@ -588,62 +566,3 @@ def _describe(record: Record, found: SoundPressure) -> None:
     record.headline["sound power level"] = (float(found.total_power[0]), "dB re 1 pW")
     record.headline["A-weighted sound power level"] = (float(found.total_power[1]), "dB(A) re 1 pW")
     record.headline["band"] = (f"{found.frequency[0]:.3g} to {found.frequency[-1]:.4g} Hz", "-")
-
-
-def listen(
-    run: str | Path | Mapping[str, Any],
-    microphones: Any = ("cpx",),
-    *,
-    temperature: float = 293.15,
-    up_to: float | None = None,
-) -> SoundPressure:
-    """What microphones hear of a finished run: its folder, or tireroad.load of it. Not collective.
-
-    `microphones`: as sound.microphones in a scene, names or places (x, y, z) in m; `temperature` K of the
-    air; `up_to` Hz. Nothing is written. Raises InputError for a folder without the results of a
-    rolling contact, for places inside the tire or under the road, and values out of range.
-    """
-    from tireroad.runs.files.reader import RunResults
-    from tireroad.runs.scene.load import load
-    from tireroad.runs.stages.pipeline import PARTS
-
-    results = run if isinstance(run, RunResults) else RunResults(run)  # type: ignore[arg-type]
-    scene = load(results.directory / "scene.toml")
-    given = {"microphones": microphones, "temperature": temperature, "up_to": up_to}
-    table = SoundTable(
-        **{
-            item.name: _read(item, given[item.name])
-            for item in fields(SoundTable)
-            if item.name in given
-        }
-    )
-    job = Job(replace(scene, sound=table), results.directory, MPI.COMM_SELF)
-    done: dict[str, Result] = {}
-    for kind in PARTS:
-        part = kind.with_inputs(job, done)
-        if isinstance(part, RadiationStage | SoundStage):
-            done[kind.name] = Result("", partial(part.compute, Record()))
-        elif isinstance(part, Shared):
-            done[kind.name] = Result("", part.make)
-        elif isinstance(part, Stage) and kind.name not in skipped(scene):
-            if f"{kind.name}.h5" in results.left_out or not job.path(kind.name).is_file():
-                continue
-            done[kind.name] = Result("", part.stored)
-        job.settle(done)
-    if "sound" not in done:
-        raise InputError(
-            f"{results.directory}: listen needs the results of a tire that rolls or is driven over time: run "
-            "the scene with [time] and [contact] to its end"
-        )
-    return done["sound"].product
-
-
-def _read(item: Any, value: Any) -> Any:
-    key = key_of(item)
-    assert key is not None
-    if value is None and key.optional:
-        return None
-    try:
-        return key.read(value)
-    except ValueError as error:
-        raise InputError(f"listen: {item.name} {error}") from None

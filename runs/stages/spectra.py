@@ -71,6 +71,8 @@ UNITS = _ONE | {
         (f"density/{what}", per_hertz),
     )
 }
+_FEWEST = 32  # fewest steps for a meaningful spectrum
+ROUNDING = 1e-12  # relative to the largest line: anything below is rounding
 
 
 def series(history: ContactHistory, start: int) -> dict[str, np.ndarray]:
@@ -162,7 +164,7 @@ def _warn_of_window(record: Record, force: np.ndarray, what: str) -> None:
     if not _LOWER < off < _HIGHER and force.std() > _SLIGHT * np.abs(force).max():
         where, change = ("near an end", "lower") if off < 0 else ("in the middle", "higher")
         record.warnings.append(
-            f"most of what the {what} varies lies {where} of the record, where the Hann window of spectra and "
+            f"most of the variance of the {what} is {where} of the record, where the Hann window of spectra and "
             f"levels makes them {abs(off):.2g} dB {change} than its mean square: such levels depend on when an "
             "impact happens (road.position, time.duration); compare runs with equal ones only"
         )
@@ -183,11 +185,6 @@ def write(file: h5py.File, found: dict[str, np.ndarray]) -> None:
 def read(file: h5py.File) -> dict[str, np.ndarray]:
     """The same, read back."""
     return {name: file[name][()] for name in UNITS if name in file}
-
-
-_FEWEST = 32  # fewest steps for a meaningful spectrum
-
-ROUNDING = 1e-12  # relative to the largest line: anything below is rounding
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -227,10 +224,6 @@ class SpectraStage(Computed[Spectra]):
     rotating: Result[RollingModes]
     accuracy: Result[Accuracy] | None = None
 
-    def inputs(self) -> dict:
-        """The contact forces, whose key covers modes and run-in length, and the error bars."""
-        return {"contact": self.contact.key, "bars": self.accuracy.key if self.accuracy else None}
-
     def compute(self, record: Record) -> Spectra:
         """The spectra. Not collective."""
         history = self.contact.product
@@ -246,11 +239,11 @@ class SpectraStage(Computed[Spectra]):
         limit = self._limit(record, step)
         frequency, contact = amplitudes(total, step)
         below = frequency <= limit.frequency
-        found = levels_of(history, start, limit.frequency)
-        describe(record, found, history, start, limit.frequency)
+        levels = levels_of(history, start, limit.frequency)
+        describe(record, levels, history, start, limit.frequency)
         extremes(record, history, start, limit.frequency)
         grows = run_in(self.setup.product, self.job.scene.road)
-        short = too_short(found["third_octave/centre"], limit.frequency, grows)
+        short = too_short(levels["third_octave/centre"], limit.frequency, grows)
         record.warnings += [short] if short else []
         axle = {}
         if history.axle_force is not None:
@@ -259,7 +252,7 @@ class SpectraStage(Computed[Spectra]):
             axle["axle_force"] = amplitude
             _largest(record, frequency[below], amplitude)
         if self.accuracy is not None:
-            bars, centre = self.accuracy.product, found["third_octave/centre"]
+            bars, centre = self.accuracy.product, levels["third_octave/centre"]
             axle["level_error"] = bars.levels("axle_force", centre)
             axle["contact_level_error"] = bars.levels("contact_force", centre)
         wheel = {
@@ -272,7 +265,7 @@ class SpectraStage(Computed[Spectra]):
             left_out=start * step,
             limit=limit,
             wheel=wheel,
-            levels=found,
+            levels=levels,
             too_short=short,
             **axle,
         )
@@ -281,8 +274,8 @@ class SpectraStage(Computed[Spectra]):
         """The lowest frequency limit of the model, with its cause."""
         found = all_limits(self.setup.product, self.rotating.product, step)
         limit = lowest(found)
-        record.headline["an answer up to"] = (limit.frequency, "Hz")
-        record.headline["which is"] = (limit.cause, "-")
+        record.headline["valid up to"] = (limit.frequency, "Hz")
+        record.headline["limited by"] = (limit.cause, "-")
         others = ", ".join(
             f"{other.cause} would allow {other.frequency:.4g} Hz"
             for other in found
@@ -326,12 +319,12 @@ class SpectraStage(Computed[Spectra]):
         """The same, read back."""
         limit = Limit(float(file.attrs["limit"]), str(file.attrs["limit_cause"]))
         wheel = {name: file[name][:] for name in corner.UNITS if name in file}
-        kept = read_fields(file, Spectra)
-        return Spectra(limit=limit, levels=read(file), wheel=wheel, **kept)
+        fields = read_fields(file, Spectra)
+        return Spectra(limit=limit, levels=read(file), wheel=wheel, **fields)
 
 
 def too_short(centre: np.ndarray, up_to: float, grows: float) -> str:
-    """What a run without its low third octaves is told; empty if it has them.
+    """The remark on a run without its low third octaves; empty if it has them.
 
     `centre` (b,) Hz: the bands it has; `up_to` Hz: where the model ends; `grows` s: the run-in,
     which is left out of a run of more than twice its length only.
@@ -356,4 +349,4 @@ def _largest(record: Record, frequency: np.ndarray, axle: np.ndarray) -> None:
             float(np.abs(axle[peak, 2])),
             "N",
         )
-        record.headline["at"] = (float(frequency[peak]), "Hz")
+        record.headline["frequency of the largest line"] = (float(frequency[peak]), "Hz")

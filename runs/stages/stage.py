@@ -1,68 +1,45 @@
 """A stage: a function of typed inputs whose frozen product is written to a file and read back.
 
-A product comes from its own file, from the shared cache, or is computed. Matrices can be held in
-memory for a family's next run with the same static state.
-
-Checkpoints: in the stages static and modes each process stores its own results, part by part, in
-`<stage>_checkpoint/<rank>of<size>-<number>.h5`, where `number` is that of the part's first result.
-Parts carry a checksum and the key of the stage's inputs; reading ends at the first part that is
-absent, damaged or of other inputs.
-
-Failures are entered in the summary. Members of a sweep that share a stage do not repeat its
-failure: the environment variable TIREROAD_FAILURES names a folder with a file for each stage that
-has failed, by its name and the hash of its inputs. A sweep on this machine gives its workers an
-empty one. Without it nothing is remembered: a run by itself may be tried again.
+A product comes from its own file, from the shared cache, or is computed.
 """
 
 from __future__ import annotations
 
-import math
-import os
-import shutil
 import time
 from abc import ABC, abstractmethod
-from collections import OrderedDict
-from collections.abc import Callable, Hashable, Iterator, Mapping
-from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import MISSING, dataclass, field, fields
-from functools import cached_property
+from functools import cached_property, reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
-import numpy as np
 from mpi4py import MPI
 
 from tireroad.fem.collective import collect
-from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.model import TireModel
-from tireroad.fem.static.checkpoint import Entry, Journal
-from tireroad.fem.static.friction_press import Friction
-from tireroad.fem.static.road import RoadShape
 from tireroad.fem.static.state import StaticState
-from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.timing import Timing
-from tireroad.fem.tire.body import Body
-from tireroad.fem.wheel import Axle, Turning
-from tireroad.modal.damping import Damping, Proportional, StrainEnergy
+from tireroad.fem.wheel import Axle
 from tireroad.runs.files import store
 from tireroad.runs.files.cache import NO_CACHE, Cache
-from tireroad.runs.files.disk import write_text
 from tireroad.runs.files.folder import Summary
 from tireroad.runs.process import console
 from tireroad.runs.process.mpi import on_root
-from tireroad.runs.process.signals import Stopped
 from tireroad.runs.process.surroundings import peak_memory
+from tireroad.runs.scene.physics import make_tire
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.tables.scene import Scene, axle_of
+from tireroad.runs.stages.failures import check_failures, remembered
 
 if TYPE_CHECKING:
-    from tireroad.fem.sections.mesh2d import Ring
-    from tireroad.runs.scene.tables.tire import TireTable
+    pass
 
 T = TypeVar("T")
 MUMPS = "MUMPS through PETSc, ICNTL(14) = 100 %"
 
 Figures = dict[str, tuple[Any, str]]
+P = TypeVar("P")
 
 
 @dataclass
@@ -95,27 +72,6 @@ class Record:
 
 def _shown(value: Any) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
-
-
-def make_tire(comm: MPI.Comm, tire: TireTable):
-    """The tire without loads; its finite elements are made on first use."""
-    section = tire.ring()
-    return TireModel(section, lambda: make_body(comm, tire, section))
-
-
-def road_shape(scene: Scene) -> RoadShape:
-    """The road's shape under the tire: the wheel's camber, and the drum if there is one."""
-    drum = scene.road.drum_radius if scene.road else None
-    return RoadShape(
-        camber=math.radians(scene.static.camber),
-        drum_radius=drum,
-        inside=drum is not None and scene.road.drum == "inside",
-    )
-
-
-def make_body(comm: MPI.Comm, tire: TireTable, section: Ring) -> Body:
-    """The finite-element body, undeformed. Collective."""
-    return Body(comm, section, tire.shape.in_layers(tire), cords=tire.shape.cords(tire))
 
 
 @dataclass(frozen=True)
@@ -171,6 +127,12 @@ class Job:
         """The scene's tire, unloaded."""
         return make_tire(self.comm, self.scene.tire)
 
+    def value(self, name: str) -> Any:
+        """A table or key of the scene by its dotted name; None where a table on the way is absent."""
+        return reduce(
+            lambda holder, part: holder and getattr(holder, part), name.split("."), self.scene
+        )
+
     def path(self, stage: str) -> Path:
         """The file of a stage."""
         return self.directory / f"{stage}.h5"
@@ -196,9 +158,6 @@ class Job:
                 return pick(file)
 
         return on_root(self.comm, opened)
-
-
-P = TypeVar("P")
 
 
 class Result(Generic[P]):
@@ -257,9 +216,19 @@ class Shared(PipelinePart[P]):
 class Stage(PipelinePart[P]):
     """A part whose product is stored in `<name>.h5` and reused while its inputs are unchanged."""
 
-    @abstractmethod
-    def inputs(self) -> Mapping[str, Any]:
-        """Everything the product depends on, including the keys of other products. Collective."""
+    reads: ClassVar[tuple[str, ...]] = ()
+    """Tables and keys of the scene, dotted, that enter the hash whole."""
+
+    def inputs(self) -> dict[str, Any]:
+        """Everything the product depends on: the keys of the parts it takes, and what it `reads`. Collective.
+
+        A stage that depends on less of a table, or on what is made of it, adds that.
+        """
+        parts = {item.name: getattr(self, item.name) for item in fields(self)}
+        keys = {
+            name: part.key for name, part in parts.items() if isinstance(part, Result) and part.key
+        }
+        return keys | {name: self.job.value(name) for name in self.reads}
 
     @abstractmethod
     def produce(self, key: str, record: Record) -> P:
@@ -299,7 +268,7 @@ class Stage(PipelinePart[P]):
             if solver := self.solver():
                 console.log(f"{name:9s} solver: {solver}")
             record = Record()
-            with _remembering(self, key):
+            with remembered(name, key, job.scene.name, job.comm):
                 product = self.produce(key, record)
             collect(job.comm)
             figures = vars(record).copy()
@@ -310,7 +279,7 @@ class Stage(PipelinePart[P]):
 
     @classmethod
     def if_skipped(cls, job: Job, done: Mapping[str, Result]) -> Result[P] | None:
-        """What later parts receive if this stage is skipped; None: nothing."""
+        """The result that later parts receive if this stage is skipped; None: nothing."""
         return None
 
 
@@ -345,240 +314,10 @@ class Computed(Stage[P]):
         return product
 
     def begin(self) -> None:
-        """What has to happen before the product is computed. Collective."""
+        """Prepare the computation of the product. Collective."""
 
     def end(self, key: str, product: P) -> None:
-        """What has to happen once the product is written. Collective."""
-
-
-MOST = 2  # per kind: those of a run and of its coarser companion
-_kept: dict[str, OrderedDict[Hashable, Any]] | None = None
-
-
-def keep_matrices() -> None:
-    """Start keeping: this process computes the members of a family one after the other."""
-    global _kept
-    _kept = {}
-
-
-def memoize(kind: str, key: Hashable, make: Callable[[], T]) -> T:
-    """The value of `make`, or that of an earlier run with the same key. Collective if `make` is."""
-    if _kept is None:
-        return make()
-    known = _kept.setdefault(kind, OrderedDict())
-    if key not in known:
-        while len(known) >= MOST:  # freed before the new ones need the memory
-            known.popitem(last=False)
-        known[key] = make()
-    known.move_to_end(key)
-    return known[key]
-
-
-def forget_matrices() -> None:
-    """Drop everything, before a new static state: matrices belong to one state."""
-    if _kept is not None:
-        _kept.clear()
-
-
-WORTH = 60.0  # results are written once computing them has taken this many times the writing
-LEAST = 1.0  # s of computing
-_COLUMNS = "by_columns"
-_RATE = 2e8  # bytes per second, until a large part has been written
-_LARGE = 1e6  # bytes from which the write rate is measured: below, opening the file dominates
-
-
-@contextmanager
-def checkpointed(stage: Stage, what: str) -> Iterator[Journal]:
-    """The journal of a stage, of results named `what`; a stop writes them. Collective."""
-    job = stage.job
-    parts = _Parts(job, stage.name, store.wanted_hash(stage.name, stage.inputs()))
-    found = parts.read()
-    journal = Journal(found, parts.keep)
-    least = min(job.comm.allgather(len(found)))
-    if least:
-        console.say(f"  continues from the checkpoint after {least} {what}")
-    try:
-        yield journal
-    except Stopped:
-        parts.flush()
-        raise
-
-
-def forget_checkpoint(job: Job, stage: str) -> None:
-    """Remove the checkpoint of a finished stage. Collective."""
-    job.comm.Barrier()
-    on_root(job.comm, lambda: shutil.rmtree(_folder(job, stage), ignore_errors=True))
-
-
-def _folder(job: Job, stage: str) -> Path:
-    return job.directory / f"{stage}_checkpoint"
-
-
-class _Parts:
-    """The checkpoint files of this process."""
-
-    def __init__(self, job: Job, stage: str, key: str) -> None:
-        self._job, self._stage, self._key = job, stage, key
-        self._folder = _folder(job, stage)
-        self._waiting: list[Entry] = []
-        self._first, self._written = 0, time.monotonic()
-        self._rate = _RATE
-
-    def _path(self, number: int) -> Path:
-        comm = self._job.comm
-        return self._folder / f"{comm.rank}of{comm.size}-{number:04d}.h5"
-
-    def read(self) -> list[Entry]:
-        """Results stored for the same inputs and process count; reports others. Collective."""
-        found: list[Entry] = []
-        reason = "" if self._job.fresh else self._read(found)
-        reasons = [one for one in self._job.comm.allgather(reason) if one not in ("", "absent")]
-        if reasons:
-            console.say(f"  {self._folder.name} exists, but {reasons[0]}: only part of it is used")
-        return found
-
-    def _read(self, found: list[Entry]) -> str:
-        """Append the usable parts to `found`; returns why the next one is not."""
-        wanted = self._job.provenance(self._stage, self._key).input_hash
-        while not (reason := store.why_not(self._path(len(found)), wanted, self._stage)):
-            with store.opened(self._path(len(found))) as file:
-                found += [_entry(file[name]) for name in sorted(file)]
-        return reason
-
-    def keep(self, number: int, entry: Entry) -> None:
-        """Store a result; it is written with those before it once that pays off."""
-        if not self._waiting:
-            self._first = number
-        self._waiting.append(entry)
-        size = sum(array.nbytes for one in self._waiting for array in one.values())
-        if time.monotonic() - self._written > max(LEAST, WORTH * size / self._rate):
-            began = time.monotonic()
-            self.flush()
-            if size > _LARGE:
-                self._rate = size / max(time.monotonic() - began, 1e-3)
-
-    def flush(self) -> None:
-        """Write the results that are waiting."""
-        if not self._waiting:
-            return
-        provenance = self._job.provenance(self._stage, self._key)
-        # If the result folder was removed, writing the file reports it.
-        with suppress(FileNotFoundError):
-            self._folder.mkdir(exist_ok=True)
-        with store.writing(self._path(self._first), provenance) as file:
-            for k, entry in enumerate(self._waiting):
-                group = file.create_group(f"{k:04d}")
-                for name, array in entry.items():
-                    by_columns = array.flags.f_contiguous and not array.flags.c_contiguous
-                    group[name] = array.T if by_columns else array
-                    group[name].attrs[_COLUMNS] = by_columns
-        self._waiting, self._written = [], time.monotonic()
-
-
-def _entry(group) -> Entry:
-    """The arrays of a result by name, including groups.
-
-    Their memory order is restored, because the rounding of sums of products depends on it.
-    """
-    found: dict[str, np.ndarray] = {}
-
-    def add(name: str, one) -> None:
-        if hasattr(one, "shape"):
-            array = np.asarray(one[()])
-            found[name] = array.T if one.attrs[_COLUMNS] else array
-
-    group.visititems(add)
-    return found
-
-
-def damping_of(job: Job) -> Damping:
-    """Proportional damping if the scene has it, else modal strain energy (loss factors)."""
-    given = job.scene.damping
-    return StrainEnergy() if given is None else Proportional(given.mass, given.stiffness)
-
-
-def rolling_shape(turning: Turning) -> Rolling:
-    """Steady rolling, for the static state, of a wheel that turns so; at rest for speed 0."""
-    if turning.speed == 0:
-        return AT_REST
-    # Strain-energy damping needs modes, which come later: the shape then has inertia forces alone.
-    mass, stiffness = (0.0, 0.0) if isinstance(turning.damping, StrainEnergy) else turning.damping
-    return Rolling(
-        speed=turning.speed, damping=mass, stiffness_damping=stiffness, inertia=turning.inertia
-    )
-
-
-def wheel_slip(scene: Scene) -> tuple[float, float]:
-    """The scene's slip of the wheel (s_x, s_y), including its slip angle."""
-    along, across = scene.contact.slip if scene.contact else (0.0, 0.0)
-    angle = scene.rotation.slip_angle if scene.rotation else 0.0
-    return along, across + math.tan(math.radians(angle))
-
-
-def friction_of(scene: Scene, rolling: Rolling) -> Friction | None:
-    """Friction of the static state that rolls so; None if the scene has none."""
-    static, rotation = scene.static, scene.rotation
-    if static.friction is None:
-        return None
-    if not rolling.speed or rotation is None:
-        return Friction(coefficient=static.friction, steps=static.friction_steps)
-    return Friction(
-        coefficient=static.friction, radius=rotation.rolling_radius, slip=wheel_slip(scene)
-    )
-
-
-def turning_of(job: Job) -> Turning:
-    """The scene's speed, damping and inertia."""
-    rotation = job.scene.rotation
-    if not job.speed or rotation is None:
-        return Turning(speed=job.speed, damping=damping_of(job))
-    return Turning(
-        speed=job.speed,
-        damping=damping_of(job),
-        inertia=rotation.inertia,
-        shape_tolerance=rotation.shape_tolerance,
-    )
-
-
-def shapes_of(job: Job) -> Turning | None:
-    """The wheel's rotation if rotation shapes join its modes (modal.rotation_shapes), else None."""
-    return turning_of(job) if job.speed and job.scene.joins_shapes else None
-
-
-FAILURES = "TIREROAD_FAILURES"
-
-
-@contextmanager
-def failure_recorded(stage: str, summary: Summary, comm: MPI.Comm) -> Iterator[None]:
-    """Within the context, an error or a stop is entered in the summary by the root process."""
-    try:
-        yield
-    except BaseException as error:
-        if comm.rank == 0:
-            stopped = isinstance(error, Stopped)
-            told = f"stopped by {error}: resume continues" if stopped else str(error) or repr(error)
-            with suppress(Exception):  # of the first error, whatever else goes wrong
-                summary.end(stage, told)
-        raise
-
-
-def record_failure(stage: str, key: str, run: str, error: ConvergenceError) -> None:
-    """Keep why the stage of a `run` failed, if failures are kept. Root process only."""
-    if (file := _file(stage, key)) and not file.exists():
-        with suppress(OSError):
-            write_text(file, f"{error} (as in {run}, which failed first and has the same inputs)")
-
-
-def check_failures(stage: str, key: str) -> None:
-    """Raise ConvergenceError if the stage has failed on these inputs. Root process only."""
-    file = _file(stage, key)
-    if file and file.exists():
-        raise ConvergenceError(file.read_text(encoding="utf-8"))
-
-
-def _file(stage: str, key: str) -> Path | None:
-    folder = os.environ.get(FAILURES)
-    return Path(folder) / f"{stage}-{key}.txt" if folder else None
+        """Clean up once the product is written. Collective."""
 
 
 def _tell_reused(
@@ -606,17 +345,6 @@ def _tell_computed(
 def largest_memory(comm: MPI.Comm) -> float:
     """Largest resident memory of any process since its start (forget_peak), GB. Collective."""
     return 1e-9 * comm.allreduce(peak_memory(), MPI.MAX)
-
-
-@contextmanager
-def _remembering(stage: Stage, key: str) -> Iterator[None]:
-    """A failure within is remembered for the other members of a sweep."""
-    try:
-        yield
-    except ConvergenceError as error:
-        if stage.job.comm.rank == 0:  # not on_root: other processes need not have failed
-            record_failure(stage.name, key, stage.job.scene.name, error)
-        raise
 
 
 def _looked_up(stage: Stage, key: str, claim: ExitStack) -> tuple[str, str, dict[str, Any]]:

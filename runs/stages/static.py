@@ -23,22 +23,22 @@ from tireroad.fem.timing import Timing
 from tireroad.runs.files.store import put
 from tireroad.runs.process import console
 from tireroad.runs.process.mpi import on_root
-from tireroad.runs.stages.stage import (
-    MUMPS,
-    Computed,
-    Job,
-    Record,
-    checkpointed,
-    forget_checkpoint,
-    forget_matrices,
+from tireroad.runs.scene.physics import (
     friction_of,
     road_shape,
     rolling_shape,
     turning_of,
     wheel_slip,
 )
+from tireroad.runs.stages.checkpoint import checkpointed, forget_checkpoint
+from tireroad.runs.stages.matrices import forget_matrices
+from tireroad.runs.stages.stage import MUMPS, Computed, Job, Record
 
 _UNITS = {"points": "m", "force": "N", "area": "m2"}
+_SMALL = 1e-6  # of mu f: tolerance for a node that slips
+_SPEEDS, _SAME_SPEED = 6, 1e-6  # most solutions at a travel speed, and when two speeds agree
+_EXTENT = "length", "width", "area"
+COARSE = 0.02  # estimated relative error of the load above which the user is warned
 
 
 def fill_cords(file: h5py.File, state: StaticState) -> None:
@@ -72,9 +72,6 @@ def cord_headline(state: StaticState) -> dict[str, tuple[float, str]]:
             "%",
         ),
     }
-
-
-_SMALL = 1e-6  # of mu f: tolerance for a node that slips
 
 
 def fill_friction(file: h5py.File, state: StaticState) -> None:
@@ -158,18 +155,13 @@ def fill(file: h5py.File, state: StaticState, tire: TireModel) -> None:
         file.attrs["footprint_shoulder"] = even.shoulder
 
 
-_SPEEDS, _SAME_SPEED = 6, 1e-6  # most solutions at a travel speed, and when two speeds agree
-_EXTENT = "length", "width", "area"
-COARSE = 0.02  # estimated relative error of the load above which the user is warned
-
-
 def steady_rolling(job: Job, speed: float | None = None) -> Rolling:
     """Steady rolling in statics, at `speed` (rad/s) or the job's; at rest if the scene says so."""
     scene = job.scene
     speed = job.speed if speed is None else speed
     if not scene.static.steady_rolling or speed == 0:
         return AT_REST
-    return rolling_shape(replace(turning_of(job), speed=speed))
+    return rolling_shape(replace(turning_of(job.scene, job.speed), speed=speed))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -269,9 +261,9 @@ class StaticStage(Computed[StaticState]):
         self, loader: LoadStepper, rolling: Rolling, initial: InitialState | None = None
     ) -> LoadStepper:
         """Inflate the tire and press it on the road; returns the final loader. Collective."""
-        wanted = self.job.scene.static
-        loader.inflate(wanted.inflation, None if initial is None else initial.inflated)
-        placed = wanted.load, wanted.deflection, wanted.road_height
+        static = self.job.scene.static
+        loader.inflate(static.inflation, None if initial is None else initial.inflated)
+        placed = static.load, static.deflection, static.road_height
         return place(loader, *placed, friction_of(self.job.scene, rolling), initial)
 
     def _keep_last(self, loader: LoadStepper) -> str:
@@ -310,7 +302,8 @@ class StaticStage(Computed[StaticState]):
             file.attrs["from_file"] = "\n".join(taken)
 
     def _from_file(self) -> list[str]:
-        """What the tire is made of, of a file what of it is used and what not, as `check` prints it."""
+        """The construction of the tire, of a file also the parts that are used and those that are not, as `check`
+        prints it."""
         tire = self.job.scene.tire
         return tire.shape.described(tire)
 

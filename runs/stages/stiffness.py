@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import h5py
@@ -18,8 +18,9 @@ from tireroad.fem.static.press import CurvePoint, load_curve, slopes
 from tireroad.fem.static.state import StaticState
 from tireroad.runs.files.store import put
 from tireroad.runs.process import console
+from tireroad.runs.scene.physics import wheel_slip
 from tireroad.runs.scene.tables.scene import deflections
-from tireroad.runs.stages.stage import Computed, Job, Record, Result, wheel_slip
+from tireroad.runs.stages.stage import Computed, Job, Record, Result
 from tireroad.runs.stages.static import steady_rolling
 
 AXES = ("longitudinal", "lateral")
@@ -30,6 +31,27 @@ _STANDING, _ROLLING = 2.0, 3.0
 _MOST = 0.5  # slip
 
 Curve = Mapping[str, np.ndarray]
+_CURVE = {
+    "deflection": "m",
+    "load": "N",
+    "stiffness": "N/m",
+    "tangent": "N/m",
+    "points": "-",
+    "rolling_radius": "m",
+    "pressure": "Pa",
+    "footprint_length": "m",
+    "footprint_width": "m",
+    "footprint_area": "m2",
+}
+_FIGURES = {
+    "load": "N",
+    "vertical": "N/m",
+    "longitudinal": "N/m",
+    "lateral": "N/m",
+    "torsional": "N m/rad",
+    "vertical_tangent": "N/m",
+    "vertical_stuck": "N/m",
+}
 
 
 def slides(job: Job, state: StaticState, stuck: RoadStiffness) -> dict[str, Curve]:
@@ -37,15 +59,15 @@ def slides(job: Job, state: StaticState, stuck: RoadStiffness) -> dict[str, Curv
 
     `start`: initial slope, with all points sticking. Leaves the body in another state. Collective.
     """
-    wanted, friction = job.scene.stiffness, job.scene.static.friction
-    if state.pull is None or not friction or not wanted.slide_steps:
+    stiffness, friction = job.scene.stiffness, job.scene.static.friction
+    if state.pull is None or not friction or not stiffness.slide_steps:
         return {}  # friction 0 resists nothing: no displacement to slide over
     found: dict[str, Curve] = {}
     for axis, name in enumerate(AXES):
         slide = Slide(job.tire.body, state, friction, axis)
         start = slide.start(wheel_slip(job.scene))
         rate = start if slide.rolls else getattr(stuck, name)
-        end = wanted.slip_to if slide.rolls else wanted.slide_to
+        end = stiffness.slip_to if slide.rolls else stiffness.slide_to
         if end is None:
             end = (
                 (_ROLLING if slide.rolls else _STANDING)
@@ -56,7 +78,7 @@ def slides(job: Job, state: StaticState, stuck: RoadStiffness) -> dict[str, Curv
             end = min(end, _MOST) if slide.rolls else end
         points = []
         for point in slide.curve(
-            (end * np.arange(1, wanted.slide_steps + 1) / wanted.slide_steps).tolist()
+            (end * np.arange(1, stiffness.slide_steps + 1) / stiffness.slide_steps).tolist()
         ):
             points.append(point)
             console.say(f"  {name}: {_told(point, slide.rolls)}")
@@ -119,29 +141,6 @@ def describe(record: Record, found: Mapping[str, Curve], rolls: bool) -> None:
         record.headline[f"{name} force at most"] = (force, "N")
 
 
-_CURVE = {
-    "deflection": "m",
-    "load": "N",
-    "stiffness": "N/m",
-    "tangent": "N/m",
-    "points": "-",
-    "rolling_radius": "m",
-    "pressure": "Pa",
-    "footprint_length": "m",
-    "footprint_width": "m",
-    "footprint_area": "m2",
-}
-_FIGURES = {
-    "load": "N",
-    "vertical": "N/m",
-    "longitudinal": "N/m",
-    "lateral": "N/m",
-    "torsional": "N m/rad",
-    "vertical_tangent": "N/m",
-    "vertical_stuck": "N/m",
-}
-
-
 @dataclass(frozen=True)
 class Stiffness:
     """Stiffness of the tire.
@@ -161,26 +160,23 @@ class StiffnessStage(Computed[Stiffness]):
     """The load curve from the undeformed tire, and the stiffness about the scene's own state."""
 
     name: ClassVar[str] = "stiffness"
+    reads: ClassVar[tuple[str, ...]] = ("stiffness",)
     static: Result[StaticState]
-
-    def inputs(self) -> dict:
-        """The static state, which includes the wheel's slip, and the table [stiffness]."""
-        return {"static": self.static.key, "stiffness": asdict(self.job.scene.stiffness)}
 
     def compute(self, record: Record) -> Stiffness:
         """Compute; the body is put back to the static state afterwards. Collective."""
-        state, wanted = self.static.product, self.job.scene.stiffness
+        state, stiffness = self.static.product, self.job.scene.stiffness
         body = self.job.tire.body
         body.set_displacement(state.displacement)
         on_road = state.road_height is not None
         stuck = None
-        if wanted.which == "all" and on_road:
+        if stiffness.which == "all" and on_road:
             force = state.force[body.surface.place]
             centre = state.force @ state.positions / state.force.sum()
             stuck = self._stuck(record, body.surface.local[force > 0], centre)
         try:
             points, force = self._curve(record)
-            if wanted.which == "all" and not on_road:
+            if stiffness.which == "all" and not on_road:
                 places = body.lattice.points(body.ids) + body.owned(body.u.x.array)
                 centre = body.comm.allreduce(force @ places) / points[-1].load
                 stuck = self._stuck(record, np.flatnonzero(force > 0), centre)
@@ -289,8 +285,8 @@ def _describe(record: Record, found: Stiffness, stuck: RoadStiffness | None) -> 
     curve, figures = found.curve, found.figures
     record.headline |= {
         "deflections": (len(curve["load"]), "-"),
-        "up to": (float(curve["deflection"][-1]), "m"),
-        "load there": (float(curve["load"][-1]), "N"),
+        "largest deflection": (float(curve["deflection"][-1]), "m"),
+        "load at the largest deflection": (float(curve["load"][-1]), "N"),
         f"vertical stiffness at {figures['load']:.4g} N": (figures["vertical"], "N/m"),
     }
     if stuck is None:

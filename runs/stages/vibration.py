@@ -62,10 +62,6 @@ class VibrationStage(WholeTire[Vibration]):
     lines: Result[Lines | None]
     spectra: Result[Spectra] | None = None
 
-    def inputs(self) -> dict:
-        """Also the spectra, which set the run-in and the model's frequency limit."""
-        return super().inputs() | {"spectra": self.spectra.key if self.spectra else None}
-
     def compute(self, record: Record) -> Vibration | None:
         """The vibration of the outer face, line by line; None but on the root process. Collective."""
         lines, state = self.lines.product, self.static.product
@@ -124,7 +120,7 @@ def _headline(found: Vibration, surface: Surface) -> dict[str, tuple[float, str]
         "area of the outer face": (surface.area, "m2"),
         "velocity level": (found.total_velocity, "dB re 1 nm/s"),
         "equivalent radiated power": (found.total_power, "dB re 1 pW"),
-        "A-weighted": (found.total_weighted, "dB(A) re 1 pW"),
+        "A-weighted equivalent radiated power": (found.total_weighted, "dB(A) re 1 pW"),
         "strongest line": (float(found.frequency[found.velocity.argmax()]), "Hz"),
     }
 

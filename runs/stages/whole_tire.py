@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
-from typing import Any, ClassVar, TypeVar
+from typing import ClassVar, TypeVar
 
 import h5py
 import numpy as np
@@ -30,6 +30,7 @@ from tireroad.runs.stages.stage import Computed, Job, PipelinePart, Result, Shar
 _ROWS = 1024  # steps read at a time
 _AT_ONCE = 64  # coordinates transformed at a time, to save memory
 FADE = 0.05  # of a record at each end, where its motion over time fades in and out
+P = TypeVar("P")
 
 
 def driven_loads(job: Job, state: StaticState, setup: ContactSetup | None) -> sparse.csr_matrix:
@@ -88,8 +89,8 @@ class PatchForces:
     @property
     def sudden(self) -> np.ndarray:
         """Modal forces (m,) N kg^-1/2 that come at t = 0: the prescribed ones alone."""
-        given = self.job.scene.force
-        return histories(given, np.zeros(1))[0] @ self.seen[len(self.seen) - len(given) :]
+        force = self.job.scene.force
+        return histories(force, np.zeros(1))[0] @ self.seen[len(self.seen) - len(force) :]
 
     def pushes(self, start: int = 0) -> Iterator[np.ndarray]:
         """Modal forces (n, m) N kg^-1/2 from step `start` on, block by block. Root process only."""
@@ -103,11 +104,11 @@ class PatchForces:
             return prescribed
         with h5py.File(self.job.path("contact")) as file:
             horizontal = self.job.scene.horizontal_forces
-            given = (
+            arguments = (
                 file["normal_force"][some],
                 file["horizontal_force"][some] if horizontal else None,
             )
-            return np.hstack([*self._on_nodes(file, *given), prescribed])
+            return np.hstack([*self._on_nodes(file, *arguments), prescribed])
 
     def _on_nodes(
         self, file: h5py.File, normal: np.ndarray, horizontal: np.ndarray | None
@@ -123,9 +124,6 @@ class PatchForces:
             parts += [(horizontal - begun)[:, :, k] for k in (0, 1)]
         weights = self.setup.patch.weights if self.setup else None
         return parts if weights is None else [(weights.T @ part.T).T for part in parts]
-
-
-P = TypeVar("P")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -210,16 +208,7 @@ def _lines(basis: Basis, forces: PatchForces, left_out: float, top: float) -> Li
 class WholeTire(OfRun[P], Computed[P]):
     """A stage that shows the whole tire under the forces of the run. Its product is the root's alone."""
 
-    def inputs(self) -> dict[str, Any]:
-        """The forces over time, the states, and the band."""
-        scene = self.job.scene
-        return {
-            "modes": self.rotating.key,
-            "contact": self.contact.key if self.contact else None,
-            "forces": [vars(force) for force in scene.force],
-            "time": vars(scene.time),
-            "band": scene.greens.band,
-        }
+    reads: ClassVar[tuple[str, ...]] = ("force", "time", "greens.band")
 
 
 def replayed(basis: Basis, forces: PatchForces, wanted: Collection[int]) -> np.ndarray:
@@ -232,10 +221,10 @@ def replayed(basis: Basis, forces: PatchForces, wanted: Collection[int]) -> np.n
     response = couple(basis.states, unit, unit, np.zeros((3, len(unit))))
     always = forces.always
     begun = always + forces.sudden, forces.pushes(), always
-    given = response, forces.step, recursive(forces.scheme), *begun
+    arguments = response, forces.step, recursive(forces.scheme), *begun
     found = np.empty((len(wanted), len(unit)))
     number = filled = 0
-    for moved in marched(*given):
+    for moved in marched(*arguments):
         some = [k for k in range(len(moved)) if number + k in wanted]
         found[filled : filled + len(some)] = moved[some]
         filled, number = filled + len(some), number + len(moved)

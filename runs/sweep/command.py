@@ -30,12 +30,41 @@ from tireroad.runs.process import console
 from tireroad.runs.process.surroundings import available_memory
 from tireroad.runs.scene.estimate import memory
 from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.stages.stage import FAILURES
+from tireroad.runs.stages.failures import FAILURES
 from tireroad.runs.sweep.definition import Member, Sweep, read
 from tireroad.runs.sweep.page import gather, write, write_page
 
 _LOOK = 0.5  # s between two checks of the running members
 _OUTCOME = {0: "done", 2: "its input is wrong", 3: "a solver gave up", 4: "stopped"}
+MOST = 1000  # tasks of an array job: Slurm's own limit unless a cluster sets another (MaxArraySize)
+WARNING = 120  # s before the time limit at which a job is signalled to write a checkpoint
+_DIRECTIVE = re.compile(r"[A-Za-z][A-Za-z0-9-]*")
+SLURM = """\
+#!/bin/bash
+#SBATCH --job-name=$name
+#SBATCH --output=$logs/$name-%j.txt
+#SBATCH --open-mode=append
+#SBATCH --ntasks=$processes
+#SBATCH --signal=B:USR1@$warning
+#SBATCH --requeue
+$directives
+# A warning before the time limit: the run writes a checkpoint, and the job is queued again.
+export TIREROAD_CACHE=$cache OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
+child=
+again() { [ -n "$$child" ] && kill -USR1 "$$child"; }
+trap again USR1 TERM
+$body
+wait "$$child"
+status=$$?
+while kill -0 "$$child" 2>/dev/null; do wait "$$child"; status=$$?; done
+if [ "$$status" = 4 ]; then
+    scontrol requeue "$${SLURM_ARRAY_JOB_ID:+$${SLURM_ARRAY_JOB_ID}_}$${SLURM_ARRAY_TASK_ID:-$$SLURM_JOB_ID}"
+fi
+exit "$$status"
+"""
+_OWN = {"array", "dependency", "job-name", "ntasks", "open-mode", "output", "requeue", "signal"}
+_TABLE = {"template", "task", "submit", "array", "after"}
+_MORE = {"number", "join"}
 
 
 @dataclass
@@ -87,8 +116,8 @@ def _dispatch(sweep: Sweep, folder: Path, at_a_time: int, failures: Path) -> lis
     started = 0
     ended: list[Ended] = []
     try:
-        while waiting or any(one.member for one in workers):
-            for one in [one for one in workers if one.crashed]:
+        while waiting or any(worker.member for worker in workers):
+            for one in [worker for worker in workers if worker.crashed]:
                 workers.remove(one)
                 one.close()
             while waiting and len(workers) < at_a_time:
@@ -200,40 +229,11 @@ def _program(sweep: Sweep, *arguments: str) -> list[str]:
 
 def _arguments(sweep: Sweep, member: Member, folder: Path) -> list[str]:
     """The program's arguments for one member's run."""
-    settings: Sequence[str] = [part for one in member.overrides() for part in ("--set", one)]
+    settings: Sequence[str] = [
+        part for override in member.overrides() for part in ("--set", override)
+    ]
     out = str(folder / "members" / member.name)
     return ["run", str(sweep.scene.resolve()), "--out", out, *settings]
-
-
-MOST = 1000  # tasks of an array job: Slurm's own limit unless a cluster sets another (MaxArraySize)
-WARNING = 120  # s before the time limit at which a job is signalled to write a checkpoint
-_DIRECTIVE = re.compile(r"[A-Za-z][A-Za-z0-9-]*")
-SLURM = """\
-#!/bin/bash
-#SBATCH --job-name=$name
-#SBATCH --output=$logs/$name-%j.txt
-#SBATCH --open-mode=append
-#SBATCH --ntasks=$processes
-#SBATCH --signal=B:USR1@$warning
-#SBATCH --requeue
-$directives
-# A warning before the time limit: the run writes a checkpoint, and the job is queued again.
-export TIREROAD_CACHE=$cache OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
-child=
-again() { [ -n "$$child" ] && kill -USR1 "$$child"; }
-trap again USR1 TERM
-$body
-wait "$$child"
-status=$$?
-while kill -0 "$$child" 2>/dev/null; do wait "$$child"; status=$$?; done
-if [ "$$status" = 4 ]; then
-    scontrol requeue "$${SLURM_ARRAY_JOB_ID:+$${SLURM_ARRAY_JOB_ID}_}$${SLURM_ARRAY_TASK_ID:-$$SLURM_JOB_ID}"
-fi
-exit "$$status"
-"""
-_OWN = {"array", "dependency", "job-name", "ntasks", "open-mode", "output", "requeue", "signal"}
-_TABLE = {"template", "task", "submit", "array", "after"}
-_MORE = {"number", "join"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -362,7 +362,7 @@ def submit(sweep: Sweep, scripts: Mapping[str, Script]) -> dict[str, str]:
 
 
 def _submitted(jobs: Mapping[str, str]) -> str:
-    """What to do about the jobs before one that was refused."""
+    """Advice on the jobs before one that was refused."""
     if not jobs:
         return ""
     told = ", ".join(f"{name} as job {job}" for name, job in jobs.items())

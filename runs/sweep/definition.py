@@ -50,6 +50,7 @@ PLANS = {
 PLAN_KEYS = {"plan"}.union(*PLANS.values())
 _AXIS = {"grid": {"key", "values", "range", "count"}, "latin-hypercube": {"key", "range"}}
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,79}")
+_KEYS = {"name", "scene", "processes", "slurm", "queue"} | PLAN_KEYS
 
 
 @dataclass(frozen=True)
@@ -104,7 +105,7 @@ def _crossed(path: Path, raw: Mapping[str, Any], plan: str) -> tuple[tuple[str, 
     if plan == "latin-hypercube":
         return keys, _named(keys, _hypercube(path, raw, axes))
     values = [_values(f"{path}: axis {key}", axis) for key, axis in zip(keys, axes, strict=True)]
-    _check_count(path, math.prod(len(one) for one in values))
+    _check_count(path, math.prod(len(value) for value in values))
     return keys, _named(keys, list(itertools.product(*values)))
 
 
@@ -263,9 +264,6 @@ def _short(value: Any) -> str:
         else str(value)
     )
     return re.sub(r"[^A-Za-z0-9._-]", "", text)[:24]
-
-
-_KEYS = {"name", "scene", "processes", "slurm", "queue"} | PLAN_KEYS
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,8 +1,6 @@
-"""sweep.html: the members of a sweep side by side, with their third octaves.
+"""sweep.html: the members of a sweep side by side, with their third octaves and the errors of these.
 
-Third octaves of a sweep's members in dB relative to the first with any, with their uncertainty.
-
-Members that differ only in a seed are samples of one road: their powers are averaged, and the mean
+Levels are also given in dB relative to the first member that has any. Members that differ only in a seed are samples of one road: their powers are averaged, and the mean
 power lies within t s / sqrt(n) of that of all roads in 95 of 100 cases (Student's t with n - 1
 degrees of freedom, s the standard deviation over the n seeds). The error bars of the runs
 (contact.results.error_bars) are added as squares; both are independent of each other and of those
@@ -22,29 +20,43 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 from scipy import stats
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.disk import replacing, write_text
-from tireroad.runs.files.reader import RunResults
 from tireroad.runs.files.store import sealed
+from tireroad.runs.files.trials import NAME, read_trials
 from tireroad.runs.report.compare import legend_above, pen
 from tireroad.runs.report.figures import Drawing, canvas, drawing, encode, styled
+from tireroad.runs.report.kit import page_of
 from tireroad.runs.report.levels import band_levels, is_drawn, rank
-from tireroad.runs.report.read import quantity, shown_unit
-from tireroad.runs.scene.load import with_modal
+from tireroad.runs.report.read import shown_unit
+from tireroad.runs.results.reader import RunResults
+from tireroad.runs.scene.choices import with_modal
 from tireroad.runs.scene.resolved import dumps, literal
 from tireroad.runs.scene.schema import parts
-from tireroad.runs.search.journal import NAME, read_trials
 from tireroad.runs.search.settings import applied
 from tireroad.runs.sweep.definition import Member, Sweep
-from tireroad.runs.version import PROGRAM, VERSION
 
 Array = NDArray[np.float64]
 ERROR = "error of the "
+_SURE = 0.95
+TOTAL = "spectra: level of the vertical force on the axle"  # over all lines, whatever the bands
+SHOWN = (
+    TOTAL,
+    "static: deflection",
+    "static: load",
+    "contact: mean load",
+    "sound: A-weighted CPX level",
+    "sound: A-weighted sound power level",
+    "rotating: lowest frequency",
+    "modes: lowest mode",
+)
+_VARIES = 1e-6  # relative
+WIDE = 9.5  # inches
+CURVES = 12  # third-octave spectra that can be distinguished in one figure
 
 
 @dataclass(frozen=True)
@@ -89,7 +101,7 @@ def gather(sweep: Sweep, folder: Path) -> Gathered:
     settings = [_settings(sweep, member) for member in sweep.members]
     return Gathered(
         names=tuple(member.name for member in sweep.members),
-        settings={key: tuple(one[key] for one in settings) for key in sweep.axes},
+        settings={key: tuple(setting[key] for setting in settings) for key in sweep.axes},
         columns=tuple(
             SweepColumn(name, unit, np.array([row.get((name, unit), np.nan) for row in rows]))
             for name, unit in keys
@@ -137,29 +149,29 @@ def _value(scene: Any, path: Sequence[str]) -> Any:
 def _scenes(sweep: Sweep, member: Member, run: RunResults) -> list[str]:
     """The resolved scenes that a run of the member leaves: its own, and those a search tries."""
     scene = sweep.load(member)
-    found = [dumps(scene)]
+    scenes = [dumps(scene)]
     if scene.accuracy.searches:
         with suppress(OSError):
             for trial in read_trials(run.directory / NAME):
-                found.append(dumps(with_modal(applied(scene, trial.settings), None)))
-    return found
+                scenes.append(dumps(with_modal(applied(scene, trial.settings), None)))
+    return scenes
 
 
 def _figures(run: RunResults) -> dict[tuple[str, str], float]:
     """Headline numbers of all stages, third-octave levels and their errors, by (name, unit)."""
-    found: dict[tuple[str, str], float] = {}
+    figures: dict[tuple[str, str], float] = {}
     for stage, entries in run.summary.items():
         for name, entry in (entries.get("headline") or {}).items():
             value = entry.get("value")
             if isinstance(value, int | float) and not isinstance(value, bool):
-                found[f"{stage}: {name}", entry.get("unit", "-")] = float(value)
+                figures[f"{stage}: {name}", entry.get("unit", "-")] = float(value)
     for one in band_levels(run):
         for band, value, error in zip(one.band, one.level, one.error, strict=True):
             if np.isfinite(value):
-                found[f"{one.name}, {band:g} Hz", one.unit] = float(value)
+                figures[f"{one.name}, {band:g} Hz", one.unit] = float(value)
             if np.isfinite(error):
-                found[f"{ERROR}{one.name}, {band:g} Hz", "dB"] = float(error)
-    return found
+                figures[f"{ERROR}{one.name}, {band:g} Hz", "dB"] = float(error)
+    return figures
 
 
 def write(table: Gathered, folder: Path) -> None:
@@ -196,11 +208,8 @@ def numeric(settings: Mapping[str, Sequence[Any]]) -> dict[str, Array]:
 
 
 def _numbers(values: Sequence[Any]) -> bool:
-    given = [v for v in values if v is not None]
-    return bool(given) and all(isinstance(v, int | float) for v in given)
-
-
-_SURE = 0.95
+    numbers = [v for v in values if v is not None]
+    return bool(numbers) and all(isinstance(v, int | float) for v in numbers)
 
 
 @dataclass(frozen=True)
@@ -285,32 +294,13 @@ def _mean(level: Array, error: Array) -> tuple[Array, Array]:
     return 10 * np.log10(mean), np.where(unknown & (count < 2), np.nan, total)
 
 
-TOTAL = "spectra: level of the vertical force on the axle"  # over all lines, whatever the bands
-SHOWN = (
-    TOTAL,
-    "static: deflection",
-    "static: load",
-    "contact: mean load",
-    "sound: A-weighted CPX level",
-    "sound: A-weighted sound power level",
-    "rotating: lowest",
-    "modes: lowest",
-)
-_VARIES = 1e-6  # relative
-WIDE = 9.5  # inches
-CURVES = 12  # third-octave spectra that can be distinguished in one figure
-
-
 def write_page(table: Gathered, folder: Path, title: str, failed: Sequence[str]) -> Path:
     """Write folder/sweep.html; returns its path."""
-    loader = FileSystemLoader(Path(__file__).parent)
-    pages = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
-    pages.filters["quantity"] = quantity
-    pages.filters["setting"] = _setting
     path = folder / "sweep.html"
-    text = pages.get_template("sweep.html.j2").render(
-        title=title,
-        program=f"{PROGRAM} {VERSION}",
+    text = page_of(
+        "sweep",
+        title,
+        filters={"setting": _setting},
         table=table,
         columns=[column for column in table.columns if _banded(column.name)[1] is None],
         figures=_page_figures(table),
@@ -363,7 +353,7 @@ def _lines(table: Gathered, key: str, values: Array) -> list[list[int]]:
     others: dict[str, list[int]] = {}
     for k in np.argsort(values, kind="stable").tolist():
         if np.isfinite(values[k]):
-            rest = repr([given[k] for name, given in table.settings.items() if name != key])
+            rest = repr([setting[k] for name, setting in table.settings.items() if name != key])
             others.setdefault(rest, []).append(k)
     return list(others.values())
 

@@ -21,9 +21,9 @@ def work() -> int:
     from mpi4py import MPI
 
     from tireroad.runs.cli import main
-    from tireroad.runs.stages import stage
+    from tireroad.runs.stages.matrices import keep_matrices
 
-    stage.keep_matrices()
+    keep_matrices()
     status = DONE
     while status != STOPPED and (told := MPI.COMM_WORLD.bcast(_told())) is not None:
         signals.stop_on_signals()

@@ -10,9 +10,9 @@ import h5py
 import numpy as np
 from mpi4py import MPI
 
+from tireroad.runs.pipeline import run_scene
 from tireroad.runs.process import console
 from tireroad.runs.scene.load import load
-from tireroad.runs.stages.pipeline import run_scene
 from tireroad.runs.validation.full_elements import LOADED, Choice, Tires, compare, verdicts
 from tireroad.runs.validation.rolling import ROADS
 from tireroad.runs.validation.tables import Table

@@ -25,11 +25,11 @@ from tireroad.greens.responses import make_response
 from tireroad.modal.damping import StrainEnergy, beyond, rates
 from tireroad.modal.rolling import RollingModes, rolling_modes
 from tireroad.modal.standing import fewer
+from tireroad.runs.pipeline import Finished, run_scene
 from tireroad.runs.process import console
 from tireroad.runs.scene.load import load
-from tireroad.runs.stages.pipeline import Finished, run_scene
+from tireroad.runs.scene.physics import turning_of
 from tireroad.runs.stages.setup import leaning, leaning_loads, probes, scene_setup
-from tireroad.runs.stages.stage import turning_of
 from tireroad.runs.validation.tables import Table
 
 
@@ -188,7 +188,7 @@ class Tires:
     def response(self, count: int, residual: str, counted: bool = True) -> Response:
         """The response of the lowest modes as the stages make it; the `counted` part, or all."""
         if count not in self._rolling:
-            turning = turning_of(self.job)
+            turning = turning_of(self.job.scene, self.job.speed)
             few = fewer(self.modes, self.motions, count, turning, self.job.axle)
             self._rolling[count] = rolling_modes(few, turning, self.job.comm)
         rolling, points = self._rolling[count], self.probes

@@ -49,8 +49,8 @@ from tireroad.modal.solver.slicing import Modes
 from tireroad.modal.standing import sites
 from tireroad.modal.states import StateModes
 from tireroad.runs.files.store import opened
+from tireroad.runs.pipeline import run_scene
 from tireroad.runs.process import console
-from tireroad.runs.stages.pipeline import run_scene
 from tireroad.runs.validation.cases import RollingStrip, oval_patch, thesis_torus
 from tireroad.runs.validation.tables import Table
 

@@ -16,6 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from tireroad.runs.report.figures import canvas, encode, styled
+from tireroad.runs.report.kit import page_of
 from tireroad.runs.version import PROGRAM, VERSION
 
 COLOURS = ("#2f6db5", "#c8502d", "#2e8b6a", "#7a4fa3", "#b58a1f", "#52606d")
@@ -227,54 +228,15 @@ _KINDS: dict[str, Callable[[Any], str]] = {"lines": _lines, "front": _front, "ba
 
 LONG = 16  # rows above which a table is collapsed
 
-_PAGE = """<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
-<title>{{ title }}</title><style>
-body{font:15px/1.55 Georgia,"Times New Roman",serif;max-width:60rem;margin:2.5rem auto;padding:0 1.2rem;color:#1d2733}
-h1{font-size:1.7rem;margin:0}h2{font-size:1.3rem;margin:2.6rem 0 .3rem;border-bottom:2px solid #1d2733}
-.about,.machine{color:#4a5a6c}.machine{margin:.3rem 0 1.2rem;font-size:.9rem}
-nav a{margin-right:1rem}a{color:#2f6db5}
-figure{margin:1.4rem 0}img{max-width:100%;display:block;margin:0 auto}
-figcaption,caption{font-size:.92rem;text-align:left;color:#1d2733;padding:.3rem 0;caption-side:top}
-table{border-collapse:collapse;margin:.4rem 0;font:13px/1.4 system-ui,sans-serif;font-variant-numeric:tabular-nums;
-border-top:1.5px solid #1d2733;border-bottom:1.5px solid #1d2733}
-th{border-bottom:1px solid #1d2733;text-align:right;vertical-align:bottom;font-weight:600}
-th small{font-weight:400;display:block;color:#4a5a6c}td,th{padding:.2rem .7rem}td{text-align:right}
-.word{text-align:left}td.word{white-space:nowrap}tr:nth-child(even) td{background:#f5f7fa}
-.scroll{overflow-x:auto}.note{font-size:.9rem;margin:.25rem 0;color:#34424f}
-summary{cursor:pointer;color:#2f6db5;font-size:.92rem}
-@media print{body{margin:0}details>*{display:block}}
-</style></head><body>
-<h1>{{ title }}</h1><p class="machine">{{ machine }}</p>
-<nav>{% for part in parts %}<a href="#{{ part.name }}">{{ part.name }}</a>{% endfor %}</nav>
-{% for part in parts %}<h2 id="{{ part.name }}">{{ part.name }}</h2><p class="about">{{ part.about }}</p>
-{% for t in part.tables %}
-{% if t.image %}<figure><img alt="{{ t.title }}" src="{{ t.image }}">
-<figcaption><b>Figure {{ t.figure }}.</b> {{ t.title }}. {{ t.notes[0] if t.notes else "" }}</figcaption></figure>{% endif %}
-{% if t.long %}<details><summary>Table {{ t.number }}: {{ t.title }} ({{ t.rows|length }} rows)</summary>{% endif %}
-<div class="scroll"><table><caption><b>Table {{ t.number }}.</b> {{ t.title }}</caption><thead><tr>
-{% for name, unit, word in t.columns %}<th{% if word %} class="word"{% endif %}>{{ name }}{% if unit %}<small>{{ unit }}</small>{% endif %}</th>{% endfor %}
-</tr></thead><tbody>
-{% for row in t.rows %}<tr>{% for value, word in row %}<td{% if word %} class="word"{% endif %}>{{ value }}</td>{% endfor %}</tr>
-{% endfor %}</tbody></table></div>
-{% if t.long %}</details>{% endif %}
-{% for note in t.notes %}{% if not (t.image and loop.first) %}<p class="note">{{ note }}</p>{% endif %}{% endfor %}
-{% endfor %}{% endfor %}
-</body></html>
-"""
-
 
 def page(results: dict[str, list], about: dict[str, str]) -> str:
     """HTML of tables (runs.validation.tables.Table) by module name, with their ABOUT lines."""
-    import jinja2
-
     counted = {"tables": 0, "figures": 0}
     parts = [
         {"name": name, "about": about[name], "tables": [_shaped(t, counted) for t in tables]}
         for name, tables in results.items()
     ]
-    template = jinja2.Environment(autoescape=True).from_string(_PAGE)
-    return template.render(title=f"{PROGRAM} {VERSION}", machine=machine(), parts=parts)
+    return page_of("tables", f"{PROGRAM} {VERSION}", machine=machine(), parts=parts)
 
 
 def machine() -> str:

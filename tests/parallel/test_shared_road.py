@@ -14,8 +14,8 @@ from tireroad.contact.roads.kinds.laser import LaserFile
 from tireroad.contact.roads.kinds.measured import GridFile
 from tireroad.contact.roads.road import RoadKind
 from tireroad.fem.errors import InputError
+from tireroad.runs.pipeline import share
 from tireroad.runs.scene.rules import made
-from tireroad.runs.stages.pipeline import share
 
 COMM = MPI.COMM_WORLD
 X, Y = 5e-4 * np.arange(400), 5e-4 * np.arange(200)

@@ -23,7 +23,7 @@ from in_child import judged, warm
 from scene_makers import BASES, SIZES, needed, write_files
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.scene.check import explain
+from tireroad.runs.check import explain
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.rules import made
 from tireroad.runs.scene.schema import walk

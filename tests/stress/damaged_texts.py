@@ -23,7 +23,7 @@ import numpy as np
 from mutants import DECKS, mutants
 
 from tireroad.contact.roads.kinds.laser import LaserFile
-from tireroad.fem.decks.own import Wishes, read
+from tireroad.fem.decks.user_section import Wishes, read
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections.section_file import read as read_section
 from tireroad.runs.sweep.definition import read as read_sweep

@@ -28,8 +28,8 @@ from in_child import judged as ended
 from scene_makers import BASES, damaged, overrides, write_files
 
 from tireroad.fem.errors import InputError
+from tireroad.runs.check import explain
 from tireroad.runs.process.mpi import ending
-from tireroad.runs.scene.check import explain
 from tireroad.runs.scene.load import load
 
 FEW = 10  # runs up to which the scenes to start from are not run themselves

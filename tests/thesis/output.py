@@ -11,9 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
 from tireroad.runs.files.disk import write_text
+from tireroad.runs.report.kit import page_of
 from tireroad.runs.report.read import quantity
 from tireroad.runs.version import PROGRAM, VERSION
 from tireroad.tests.thesis.claim import Claim
@@ -48,7 +47,7 @@ def write(entries: Sequence[Entry], directory: Path, seconds: float, processes: 
     write_text(directory / "reproduce.json", json.dumps(data, indent=1, ensure_ascii=False) + "\n")
     write_text(directory / "reproduce.csv", _table(entries))
     page = directory / "reproduce.html"
-    write_text(page, _page(entries, head))
+    write_text(page, _page(entries, seconds, processes))
     return page
 
 
@@ -87,17 +86,18 @@ def _table(entries: Sequence[Entry]) -> str:
     return stream.getvalue()
 
 
-def _page(entries: Sequence[Entry], head: dict[str, Any]) -> str:
-    pages = Environment(
-        loader=FileSystemLoader(Path(__file__).parent),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-    )
-    pages.filters |= {"quantity": quantity, "asked": asked}
+def _page(entries: Sequence[Entry], seconds: float, processes: int) -> str:
     claims = [claim for entry in entries if entry.found for claim in entry.found.claims]
-    return pages.get_template("reproduce.html.j2").render(
-        **head, entries=entries, agree=sum(claim.agrees for claim in claims), claims=len(claims)
+    return page_of(
+        "reproduce",
+        "The thesis reproduced",
+        folder=Path(__file__).parent,
+        filters={"asked": asked},
+        processes=processes,
+        seconds=seconds,
+        entries=entries,
+        agree=sum(claim.agrees for claim in claims),
+        claims=len(claims),
     )
 
 

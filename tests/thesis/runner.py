@@ -13,10 +13,10 @@ from mpi4py import MPI
 
 from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.files.folder import claimed
+from tireroad.runs.pipeline import Finished, run_scene
 from tireroad.runs.process import console, mpi
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.stages.pipeline import Finished, run_scene
 
 FOLDER = Path(__file__).parent / "scenes"
 T = TypeVar("T")

@@ -8,7 +8,7 @@ from tireroad.fem.matrices.operators import Operators
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.symmetry import DofPositions
 from tireroad.runs.scene.load import load
-from tireroad.runs.stages.stage import make_body
+from tireroad.runs.scene.physics import make_body
 
 SCENE = """
 [tire.material]

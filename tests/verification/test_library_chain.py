@@ -29,7 +29,7 @@ from tireroad.greens.responses import make_response
 from tireroad.modal.damping import StrainEnergy
 from tireroad.modal.rolling import rolling_modes
 from tireroad.modal.standing import standing_modes
-from tireroad.runs.stages.stage import rolling_shape
+from tireroad.runs.scene.physics import rolling_shape
 from tireroad.runs.validation.cases import thesis_torus
 
 SCENE = """

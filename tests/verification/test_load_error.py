@@ -26,7 +26,7 @@ from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.mesh import Region
 from tireroad.runs.scene.load import load
-from tireroad.runs.stages.stage import make_body
+from tireroad.runs.scene.physics import make_body
 from tireroad.runs.validation.cases import thesis_torus
 
 pytestmark = pytest.mark.slow

@@ -18,7 +18,7 @@ from tireroad.modal.basis import project
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.symmetry import DofPositions
 from tireroad.runs.scene.load import load
-from tireroad.runs.stages.stage import make_body
+from tireroad.runs.scene.physics import make_body
 
 PRESSURE = 2.2e5
 

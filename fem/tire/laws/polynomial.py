@@ -8,6 +8,9 @@ from ufl.core.expr import Expr
 from tireroad.fem.parameters import number
 from tireroad.fem.tire.material import MaterialLaw, material_law
 
+# Of the inverse Langevin function, to the fifth order in I1 (Arruda and Boyce 1993).
+CHAIN = (1 / 2, 1 / 20, 11 / 1050, 19 / 7000, 519 / 673750)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Polynomial(MaterialLaw):
@@ -117,10 +120,6 @@ class SecondOrder(Polynomial):
         first, second = (invariant - 3 for invariant in isochoric(C))
         linear = c10 * first + c01 * second
         return linear + c20 * first**2 + c11 * first * second + c02 * second**2, dilatation(C, bulk)
-
-
-# Of the inverse Langevin function, to the fifth order in I1 (Arruda and Boyce 1993).
-CHAIN = (1 / 2, 1 / 20, 11 / 1050, 19 / 7000, 519 / 673750)
 
 
 @material_law(

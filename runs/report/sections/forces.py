@@ -24,6 +24,14 @@ from tireroad.runs.report.read import (
 from tireroad.runs.report.sections.tire import pressure
 
 _AXES = "xyz"
+_SHOWN = 0.6  # m of tread drawn
+_DEEPEST = 60.0  # dB below the highest level: what is drawn
+POINTS = 3  # at most, drawn
+LEAST = 1e-4  # of the largest; below, rounding at what is zero by symmetry
+SAMPLED = 400  # instants read of a (time, point) dataset: it may be larger than memory
+AT_ONCE = 2e8  # bytes
+PAIRED = 6  # receptances drawn
+PLAYED = 240  # instants of the animated footprint
 
 
 def wheel(results: Results, section: Section, time: NDArray) -> None:
@@ -70,9 +78,6 @@ def _most(values: NDArray, unit: str) -> str:
     return quantity(float(np.abs(values).max()), unit)
 
 
-_SHOWN = 0.6  # m of tread drawn
-
-
 def tread(results: Results, section: Section) -> None:
     """Add the pattern, and the part of it under the footprint at the beginning (contact.h5)."""
     depth = results.optional("contact.h5", "pattern/depth")
@@ -108,9 +113,6 @@ def _pattern_drawn(s: NDArray, y: NDArray, depth: NDArray, points: NDArray, begu
     return figures.encode(figure)
 
 
-_DEEPEST = 60.0  # dB below the highest level: what is drawn
-
-
 def texture(results: Results, section: Section) -> None:
     """Add mean profile depth and texture third octaves of the road (contact.h5)."""
     depth = results.attribute("contact.h5", "mean_profile_depth")
@@ -138,10 +140,6 @@ def _road_drawn(wavelength: NDArray, level: NDArray, labels: tuple[str, str]) ->
     axes[0, 0].set(xlabel=labels[0], ylabel=labels[1], xscale="log")
     axes[0, 0].set_xlim(wavelength.min(), wavelength.max())
     return figures.encode(figure)
-
-
-POINTS = 3  # at most, drawn
-LEAST = 1e-4  # of the largest; below, rounding at what is zero by symmetry
 
 
 def add(results: Results, section: Section, names: list[str]) -> None:
@@ -204,12 +202,6 @@ def transmissibilities(
     return encode(figure)
 
 
-SAMPLED = 400  # instants read of a (time, point) dataset: it may be larger than memory
-AT_ONCE = 2e8  # bytes
-PAIRED = 6  # receptances drawn
-PLAYED = 240  # instants of the animated footprint
-
-
 def contact(results: Results) -> Section:
     """The section on rolling contact (contact.h5)."""
     name = "contact.h5"
@@ -243,7 +235,7 @@ def contact(results: Results) -> Section:
 
 
 def run_in(results: Results) -> float:
-    """What the spectra leave out as run-in, s; 0 where nothing is known of it."""
+    """Run-in (s) that the spectra leave out; 0 where it is unknown."""
     try:
         return float(results.attribute("spectra.h5", "left_out") or 0.0)
     except (Absent, InputError):  # a file that is damaged is told of by its own section

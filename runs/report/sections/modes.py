@@ -212,14 +212,14 @@ def campbell(results: Results, section: Section) -> None:
     undamped = results.optional("rotating.h5", "campbell/undamped")
     name = results.optional("rotating.h5", "campbell/name")
     names = [f"branch {k + 1}" for k in range(damped.shape[1])] if name is None else list(name)
-    given = speed, damped, undamped, radius, names
+    arguments = speed, damped, undamped, radius, names
     text = "Branches followed over speed, on one static state. Solid: damped, as the tire rings"
     if undamped is not None:
         text += (
             "; dashed: the same tire without damping (what is damped beyond critical has only this)"
         )
     text += "; dotted: n Ω/2π, n = 1 to 8, at which a standing road excites."
-    section.show(campbell_figure(*given), text, campbell_live(*given))
+    section.show(campbell_figure(*arguments), text, campbell_live(*arguments))
 
 
 def vibration(results: Results) -> Section:

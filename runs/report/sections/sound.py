@@ -9,7 +9,6 @@ from matplotlib.collections import PolyCollection
 from numpy.typing import NDArray
 
 from tireroad.contact.results.spectra import FEW, lines, nominal
-from tireroad.runs.files.wave import wave_file
 from tireroad.runs.report import live
 from tireroad.runs.report.figures import (
     CYCLE,
@@ -24,6 +23,7 @@ from tireroad.runs.report.figures import (
     third_octaves,
 )
 from tireroad.runs.report.read import Results, Section, TextTable, about, digits
+from tireroad.runs.results.wave import wave_file
 
 FILE = "sound.h5"
 _CHARTED = 4  # microphones in one chart of bars

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.contact.results.spectra import FEW, SILENT, heard, nominal
+from tireroad.runs.files.trials import CAUSES, MARGIN, NAME, Trial, read_trials, worst
 from tireroad.runs.report import figures, live
 from tireroad.runs.report.read import (
     Results,
@@ -20,8 +21,12 @@ from tireroad.runs.report.read import (
     without_friction,
 )
 from tireroad.runs.scene.tables.scene import AccuracyTable
-from tireroad.runs.search.journal import CAUSES, NAME, Trial, read_trials, worst
-from tireroad.runs.search.settings import MARGIN, aim
+
+_FILE = "spectra.h5"
+_MORE = (  # third octaves, their quantity, reference
+    ("contact_level", "contact force", "dB re 1 N"),
+    ("hub_moment_level", "moment on the hub", "dB re 1 N m"),
+)
 
 
 def add(results: Results, section: Section) -> None:
@@ -34,15 +39,15 @@ def add(results: Results, section: Section) -> None:
 
 
 def _wanted(scene: Mapping[str, Any]) -> AccuracyTable | None:
-    wanted = AccuracyTable(**scene.get("accuracy", {}))
-    return None if wanted.target is None and wanted.target_db is None else wanted
+    table = AccuracyTable(**scene.get("accuracy", {}))
+    return None if table.target is None and table.target_db is None else table
 
 
 def _show(section: Section, wanted: AccuracyTable, trials: list[Trial]) -> None:
     over = [_errors(trial, wanted) for trial in trials]
     cost = np.array([sum(trial.seconds.values()) for trial in trials])
     section.facts += [
-        ("searched for", aim(wanted)),
+        ("searched for", wanted.aim()),
         ("trials of the search", str(len(trials))),
         ("they took", quantity(float(sum(trial.spent for trial in trials)), "s")),
     ]
@@ -83,13 +88,6 @@ def trade(cost: NDArray, error: NDArray, parts: NDArray) -> str:
     return figures.encode(figure)
 
 
-_FILE = "spectra.h5"
-_MORE = (  # third octaves, their quantity, reference
-    ("contact_level", "contact force", "dB re 1 N"),
-    ("hub_moment_level", "moment on the hub", "dB re 1 N m"),
-)
-
-
 def spectra(results: Results) -> Section:
     """Spectra of the varying axle force or, if it is not stored, of the varying contact force."""
     frequency, force = results.array(_FILE, "frequency"), results.optional(_FILE, "axle_force")
@@ -107,7 +105,7 @@ def spectra(results: Results) -> Section:
     section.facts.append(("spacing of lines", spacing))
     for name, key, unit in (
         ("valid up to", "limit", "Hz"),
-        ("which is", "limit_cause", ""),
+        ("limited by", "limit_cause", ""),
         ("the axle force is the", "axle_force_is", ""),
         ("left out as run-in", "left_out", "s"),
     ):

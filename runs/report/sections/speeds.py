@@ -22,7 +22,7 @@ _WAVE = (
 
 
 def speeds(results: Results, stages: Mapping) -> Section | None:
-    """What ends at which speed, of a run with a rolling tire; None for others. `stages` as in summary.json."""
+    """Speeds at which model, tire or symbol end, of a run with a rolling tire; None for others. `stages` as in summary.json."""
     headline = stages.get("rotating", {}).get("headline") or {}
     critical = headline.get("critical speed", {}).get("value")
     radius = None
@@ -34,22 +34,22 @@ def speeds(results: Results, stages: Mapping) -> Section | None:
     def told(speed: float) -> str:
         return f"{digits(speed)} rad/s, {digits(3.6 * speed * radius)} km/h"
 
-    made = Section("What ends at which speed")
+    section = Section("What ends at which speed")
     own = headline.get("speed", {}).get("value")
     if isinstance(own, int | float):
-        made.facts.append(("this run", told(own)))
+        section.facts.append(("this run", told(own)))
     if critical < float("inf"):
-        made.facts.append(("critical speed of the undamped tire", told(critical)))
-        for key in ("its standing wave", "the critical speed is"):
+        section.facts.append(("critical speed of the undamped tire", told(critical)))
+        for key in ("standing wave at the critical speed", "bound on the critical speed"):
             if key in headline:
-                made.facts.append((key, str(headline[key]["value"])))
+                section.facts.append((key, str(headline[key]["value"])))
     else:
-        made.facts.append(("critical speed of the undamped tire", "none by these modes"))
+        section.facts.append(("critical speed of the undamped tire", "none by these modes"))
     rated = _rated(results)
     if rated:
-        made.facts.append((f"speed symbol {rated[0]}", told(rated[1] / radius)))
-    made.notes = [_SHAPE, _WAVE]
-    return made
+        section.facts.append((f"speed symbol {rated[0]}", told(rated[1] / radius)))
+    section.notes = [_SHAPE, _WAVE]
+    return section
 
 
 def _rated(results: Results) -> tuple[str, float] | None:

@@ -15,6 +15,37 @@ from tireroad.runs.report.realism import mean_pressure
 
 _MOSTLY = 0.3  # of a state's kinetic energy
 _LISTED = 6
+LISTED = 16  # rows of a table of modes; the files hold all modes
+PICTURED = 6
+_LABELS = {"footprint shoulder": "pressure of shoulders over middle"}
+NAMES = (
+    "R: in the plane of the wheel, symmetric in y; L: out of it, antisymmetric; T: torsional, about the axle; C: air "
+    "in the cavity; then the number of waves around the tire. R0 breathes, R1 moves the belt up or forward, L0 moves "
+    "it sideways, L1 tilts it (yaw, camber). [n,a] is not the lowest of its kind: n waves around, a nodal lines along "
+    "the tread. R7/6: no number of waves holds half of it, 7 and 6 the most."
+)
+_ALONG = (
+    *(("kg in ", axis) for axis in "xyz"),
+    *(("kg m² about ", axis) for axis in "xyz"),
+)
+_WORTH = 0.01  # of the largest effective mass
+_FILE = "stiffness.h5"
+_FACTS = (
+    ("vertical", "vertical stiffness, slope of the curve", "N/m"),
+    ("longitudinal", "longitudinal stiffness", "N/m"),
+    ("lateral", "lateral stiffness", "N/m"),
+    ("torsional", "torsional stiffness about the vertical", "N m/rad"),
+)
+_COLUMNS = (
+    ("deflection", 1e3, "deflection, mm"),
+    ("load", 1.0, "load, N"),
+    ("stiffness", 1e-3, "slope, N/mm"),
+    ("footprint_length", 1e3, "length, mm"),
+    ("footprint_width", 1e3, "width, mm"),
+    ("footprint_area", 1e4, "area, cm²"),
+    ("pressure", 1e-3, "mean pressure, kPa"),
+    ("rolling_radius", 1e3, "rolling radius, mm"),
+)
 
 
 def duct(results: Results, section: Section) -> None:
@@ -44,13 +75,6 @@ def resonances(
 def _listed(frequency: NDArray) -> str:
     more = ", …" if len(frequency) > _LISTED else ""
     return ", ".join(quantity(float(f), "Hz") for f in frequency[:_LISTED]) + more
-
-
-LISTED = 16  # rows of a table of modes; the files hold all modes
-PICTURED = 6
-
-
-_LABELS = {"footprint shoulder": "pressure of shoulders over middle"}
 
 
 def static(results: Results) -> Section:
@@ -172,14 +196,6 @@ def pressure(force: NDArray, area: NDArray | None) -> tuple[NDArray, str]:
     ), "pressure in kPa"
 
 
-NAMES = (
-    "R: in the plane of the wheel, symmetric in y; L: out of it, antisymmetric; T: torsional, about the axle; C: air "
-    "in the cavity; then the number of waves around the tire. R0 breathes, R1 moves the belt up or forward, L0 moves "
-    "it sideways, L1 tilts it (yaw, camber). [n,a] is not the lowest of its kind: n waves around, a nodal lines along "
-    "the tread. R7/6: no number of waves holds half of it, 7 and 6 the most."
-)
-
-
 def modes(results: Results) -> Section:
     """The section on the modes of the loaded, non-rotating tire (modes.h5)."""
     name = "modes.h5"
@@ -253,52 +269,28 @@ def _carried(row: NDArray, every: NDArray) -> str:
     return ", ".join(found) or "–"
 
 
-_ALONG = (
-    *(("kg in ", axis) for axis in "xyz"),
-    *(("kg m² about ", axis) for axis in "xyz"),
-)
-_WORTH = 0.01  # of the largest effective mass
-
-
-_FILE = "stiffness.h5"
-_FACTS = (
-    ("vertical", "vertical stiffness, slope of the curve", "N/m"),
-    ("longitudinal", "longitudinal stiffness", "N/m"),
-    ("lateral", "lateral stiffness", "N/m"),
-    ("torsional", "torsional stiffness about the vertical", "N m/rad"),
-)
-_COLUMNS = (
-    ("deflection", 1e3, "deflection, mm"),
-    ("load", 1.0, "load, N"),
-    ("stiffness", 1e-3, "slope, N/mm"),
-    ("footprint_length", 1e3, "length, mm"),
-    ("footprint_width", 1e3, "width, mm"),
-    ("footprint_area", 1e4, "area, cm²"),
-    ("pressure", 1e-3, "mean pressure, kPa"),
-    ("rolling_radius", 1e3, "rolling radius, mm"),
-)
-
-
 def stiffness(results: Results) -> Section:
     """The section: curve, table and stiffnesses."""
-    made = Section(
+    section = Section(
         "Load, deflection and stiffness",
         "The standing tire pressed on a flat road, its rim held. Horizontally and about the vertical: "
         "the footprint sticks to a road that moves a little, at constant load.",
     )
     load = float(results.array(_FILE, "load"))
-    made.facts.append(("at a load of", quantity(load, "N")))
+    section.facts.append(("at a load of", quantity(load, "N")))
     for name, title, unit in _FACTS:
         value = results.optional(_FILE, name)
         if value is not None:
-            made.facts.append((title, quantity(float(value), unit)))
+            section.facts.append((title, quantity(float(value), unit)))
     columns = [scale * results.array(_FILE, f"curve/{name}") for name, scale, _ in _COLUMNS]
     head = tuple(title for *_, title in _COLUMNS)
-    made.table = TextTable(head, [tuple(f"{v:.4g}" for v in row) for row in np.transpose(columns)])
+    section.table = TextTable(
+        head, [tuple(f"{v:.4g}" for v in row) for row in np.transpose(columns)]
+    )
     picture = curve(columns[0], columns[1], columns[5], load)
-    made.show(picture, "Load and contact area over deflection; dashed: the scene's load.")
-    _slides(results, made)
-    return made
+    section.show(picture, "Load and contact area over deflection; dashed: the scene's load.")
+    _slides(results, section)
+    return section
 
 
 def _slides(results: Results, made: Section) -> None:

@@ -27,7 +27,7 @@ from tireroad.runs.scene.tables.tire import (
 
 if TYPE_CHECKING:
     from tireroad.fem.decks.compounds import Rubber
-    from tireroad.fem.decks.own import OwnSection, Wishes
+    from tireroad.fem.decks.user_section import OwnSection, Wishes
     from tireroad.fem.sections.mesh2d import Ring, SectionMesh
     from tireroad.fem.tire.cords import Cords
     from tireroad.fem.tire.material import Material
@@ -50,7 +50,7 @@ def own_ring(tire: TireTable) -> Ring:
 
 def _source(tire: TireTable) -> tuple[Path, int, Wishes]:
     """The file, its modification time, and what is requested from it."""
-    from tireroad.fem.decks.own import Wishes
+    from tireroad.fem.decks.user_section import Wishes
 
     keys = _keys(tire)
     path = keys.name
@@ -71,7 +71,7 @@ def _source(tire: TireTable) -> tuple[Path, int, Wishes]:
 
 @lru_cache(maxsize=4)
 def _read(path: Path, _: int, wishes: Wishes) -> OwnSection:
-    from tireroad.fem.decks.own import read
+    from tireroad.fem.decks.user_section import read
 
     return read(path, wishes)
 
@@ -166,14 +166,14 @@ def _wall(tire: TireTable) -> MaterialTable:
 
 
 def _small_motions(rubber: Rubber) -> dict[str, Any]:
-    """What a file's compound has of small motions: a ratio not 1, a loss factor not 0, a spectrum."""
-    given = {
+    """Properties of a file's compound for small motions: a ratio not 1, a loss factor not 0, a spectrum."""
+    small_motions = {
         "dynamic": rubber.dynamic,
         "loss_factor": rubber.loss_factor,
         "spectrum": rubber.spectrum,
     }
     neutral = {"dynamic": 1.0, "loss_factor": 0.0, "spectrum": None}
-    return {key: value for key, value in given.items() if value != neutral[key]}
+    return {key: value for key, value in small_motions.items() if value != neutral[key]}
 
 
 def file_parts(tire: TireTable) -> Parts:
@@ -220,7 +220,7 @@ def own_cords(tire: TireTable) -> list[Cords]:
 
 
 def described(tire: TireTable) -> list[str]:
-    """Which parts of the tire's file are used and which are not, for `check`."""
+    """Parts of the tire's file that are used and those that are not, for `check`."""
     own = own_section(tire)
     mesh = own.mesh
     lines = [f"tire from {_keys(tire).name.name}", *(f"  {line}" for line in own.used)]

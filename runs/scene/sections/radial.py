@@ -40,6 +40,10 @@ _GROOVES, _MOST_GROOVES = 4, 8  # those of fem.sections.radial, whose import nee
 # (elements around, along) available to a search.
 FINER = ((16, 14), (20, 18), (24, 22), (30, 26), (36, 32), (44, 38), (52, 46), (64, 56))
 
+# Places that a torus has by default are let pass, and left out of what is written back.
+_TORUS = {("cords", "depth"): CORDS_DEPTH, ("cords", "arc"): CORDS_ARC}
+_MODEL = "neo-hookean"
+
 
 @section_kind("radial", "the built-in radial passenger tire (docs/radial-tire.md)")
 class RadialSection(SectionKind):
@@ -77,7 +81,7 @@ class RadialSection(SectionKind):
 
     @property
     def construction(self) -> Construction:
-        """What the tire is built of by its size. Raises InputError for a size or a rim that is none."""
+        """The construction of the tire of this size. Raises InputError for a size or a rim that is none."""
         return built(self.size, self.grooves, self.rim_width)
 
     def elements(self, tire: TireTable) -> tuple[RadialSection, int, int]:
@@ -247,19 +251,12 @@ def _check_parts(
                 source.add((*path, key), _fixed(value, names, named=bool(own)))
 
 
-# Places that a torus has by default are let pass, and left out of what is written back.
-_TORUS = {("cords", "depth"): CORDS_DEPTH, ("cords", "arc"): CORDS_ARC}
-
-
 def _fixed(value: object, names: list[str], named: bool) -> str:
     """The place of a part cannot be given: what to write instead."""
     fixed = f"= {literal(value)} cannot be chosen: where each part of a radial tire lies follows from the size. "
     if named:
         return f"{fixed}Leave it out: the name says where"
     return f"{fixed}Name a compound instead: name = one of {', '.join(names)}"
-
-
-_MODEL = "neo-hookean"
 
 
 def _own(name: str) -> Material:

@@ -257,8 +257,7 @@ def patch(which: int, region: RegionTable) -> RegionPatch:
 
 
 def rubber(tire: TireTable, region: RegionTable | None = None) -> Material:
-    """The compound of the wall, or of one of its regions, which has from [tire] what it does not
-    say."""
+    """The compound of the wall, or of one of its regions; keys that a region leaves out are taken from [tire]."""
     from tireroad.fem.tire.material import Material
 
     assert tire.material is not None, "a torus has a wall of one material"

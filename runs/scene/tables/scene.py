@@ -14,6 +14,7 @@ from tireroad.contact.roads.under_tire import Motion, Placement
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Key, Limits, OnlyFor, described, finite, parameter, text
 from tireroad.fem.wheel import DIRECTIONS, SHAPE_TOLERANCE, Axle
+from tireroad.greens.residuals import RESIDUALS, names
 from tireroad.runs.scene.outputs import OUTPUTS, Output
 from tireroad.runs.scene.schema import (
     Collects,
@@ -32,6 +33,15 @@ from tireroad.runs.scene.schema import (
 from tireroad.runs.scene.tables.contact import ContactTable, PatternTable, TimeTable
 from tireroad.runs.scene.tables.sound import HEARD, SoundTable
 from tireroad.runs.scene.tables.tire import CavityTable, TireTable
+
+Where = Callable[[tuple[str, ...], str], InputError]
+Springs = tuple[float, ...] | tuple[tuple[float, ...], ...]
+_SPRINGS = Limits(least=-1e15, most=1e15)  # N/m, N m/rad and per unit of velocity
+_HELD = tuple(name for name in DIRECTIONS if name != "z")
+_MOVING: OnlyFor = ("kind", ("corner", "free"))
+_SPRUNG: OnlyFor = ("kind", ("corner",))
+_MOST = 200
+_BEYOND = 1.5  # times the scene's own deflection, by default
 
 
 @dataclass(frozen=True)
@@ -144,14 +154,6 @@ class RoadTable(Variants, Placement):
         return getattr(self.surface, "file", None)
 
 
-Where = Callable[[tuple[str, ...], str], InputError]
-Springs = tuple[float, ...] | tuple[tuple[float, ...], ...]
-_SPRINGS = Limits(least=-1e15, most=1e15)  # N/m, N m/rad and per unit of velocity
-_HELD = tuple(name for name in DIRECTIONS if name != "z")
-_MOVING: OnlyFor = ("kind", ("corner", "free"))
-_SPRUNG: OnlyFor = ("kind", ("corner",))
-
-
 def _entry(value: Any) -> float:
     number = finite(value)
     _SPRINGS.check(number, "")
@@ -233,18 +235,18 @@ class AxleTable:
 
 def axle_of(scene: Scene) -> Axle | None:
     """The moving wheel; None if held. Raises InputError if it is no valid mechanical system."""
-    given = scene.axle
-    if given.kind == "fixed" or len(given.locked) == len(DIRECTIONS):
+    axle = scene.axle
+    if axle.kind == "fixed" or len(axle.locked) == len(DIRECTIONS):
         return None
     none = (0.0,) * 6
-    free = given.kind == "free"
+    free = axle.kind == "free"
     return Axle(
-        wheel_mass=given.wheel_mass,
-        wheel_inertia=given.wheel_inertia,
-        stiffness=np.array(none if free else given.stiffness),
-        damping=np.array(none if free else given.damping),
-        body_mass=None if free else given.body_mass,
-        locked=given.locked,
+        wheel_mass=axle.wheel_mass,
+        wheel_inertia=axle.wheel_inertia,
+        stiffness=np.array(none if free else axle.stiffness),
+        damping=np.array(none if free else axle.damping),
+        body_mass=None if free else axle.body_mass,
+        locked=axle.locked,
     )
 
 
@@ -356,6 +358,12 @@ class AccuracyTable:
         most=1e8,
     )
 
+    def aim(self) -> str:
+        """The target in words."""
+        asked = [f"{100 * self.target:.3g} %"] if self.target is not None else []
+        asked += [f"{self.target_db:.3g} dB"] if self.target_db is not None else []
+        return f"settings with {' and '.join(asked)} of the {self.of.replace('_', ' ')} up to {self.up_to:g} Hz"
+
     @property
     def aimed(self) -> bool:
         """Whether a target error is given."""
@@ -369,27 +377,27 @@ class AccuracyTable:
 
 def check_accuracy(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     """Check what a target requires of the other tables."""
-    wanted = scene.accuracy
-    if not wanted.aimed:
+    accuracy = scene.accuracy
+    if not accuracy.aimed:
         return
-    key = ("accuracy", "target" if wanted.target is not None else "target_db")
-    if not wanted.estimate:
+    key = ("accuracy", "target" if accuracy.target is not None else "target_db")
+    if not accuracy.estimate:
         raise error(key, "is met by the estimated error: it needs accuracy.estimate = true")
     if not scene.in_contact or scene.road is None or scene.time is None:
         raise error(
             key,
             "is of the forces of a tire on a road: add [contact], [road], [time], and load (N) to [static]",
         )
-    if wanted.of == "axle_force" and not scene.output.axle_force:
+    if accuracy.of == "axle_force" and not scene.output.axle_force:
         raise error(("accuracy", "of"), '= "axle_force" needs output.axle_force = true')
     if scene.road.kind == "flat" and scene.road.motion.kind == "none" and not scene.force:
         raise error(key, "is of what varies, and nothing drives the tire: take another road")
-    if wanted.up_to * scene.time.duration < 4:
+    if accuracy.up_to * scene.time.duration < 4:
         raise error(
             ("accuracy", "up_to"),
-            f"= {wanted.up_to:g} Hz is not seen in {scene.time.duration:g} s: four periods at least",
+            f"= {accuracy.up_to:g} Hz is not seen in {scene.time.duration:g} s: four periods at least",
         )
-    if wanted.searches:
+    if accuracy.searches:
         _check_points(scene, error)
 
 
@@ -408,10 +416,6 @@ def _check_points(scene: Scene, error: Where) -> None:
             f'= "{scene.contact.tread}" has no compliance of its own, so it works on the nodes of the mesh only, and a '
             'search for accuracy chooses grids of points: take another, e.g. "half-space", or accuracy.search = false',
         )
-
-
-_MOST = 200
-_BEYOND = 1.5  # times the scene's own deflection, by default
 
 
 def _ascending(doc: str, unit: str, limits: Limits) -> Any:
@@ -481,8 +485,8 @@ def deflections(wanted: StiffnessTable, own: float | None) -> list[float]:
 
 def check_stiffness(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     """Raise an error if there is nothing to derive the deflections from."""
-    wanted, static = scene.stiffness, scene.static
-    if wanted is None or wanted.deflections or wanted.up_to:
+    stiffness, static = scene.stiffness, scene.static
+    if stiffness is None or stiffness.deflections or stiffness.up_to:
         return
     if not static.on_road:
         raise error(
@@ -587,9 +591,11 @@ class RotationTable:
 class GreensTable:
     residual: str = choice(
         "static",
-        ("none", "dirac", "static", "attachment"),
+        tuple(RESIDUALS),
         "residual flexibility, which represents the truncated modes",
-        dropped={"second-order": 'take "attachment", as accurate standing and more so rolling'},
+        dropped={
+            "second-order": f"take {names(joins=True)}, as accurate standing and more so rolling"
+        },
     )
     dynamic: int | None = integer(
         None,

@@ -1,9 +1,8 @@
 """The table [tire], key by key, and the base of the kinds of section.
 
-Base of the kinds of section: own keys, and the resulting ring of elements, compounds and cords.
-
-A new kind is one file in runs.scene.sections, or a class in a user's script. The scene's
-keys, `check`, the key reference and the range tests derive from it.
+A kind of section has own keys, and makes the ring of elements, compounds and cords of them. A new
+one is one file in runs.scene.sections, or a class in a user's script. The scene's keys, `check`, the
+key reference and the range tests derive from it.
 """
 
 from __future__ import annotations
@@ -40,6 +39,13 @@ if TYPE_CHECKING:
 
 # Elements around in the meshes of a search, unless a kind has its own.
 AROUND = (16, 20, 24, 30, 36, 44, 52, 64, 78, 96, 120)
+Raw = dict[str, Any]
+Where = Callable[[tuple[str, ...], str], InputError]
+NEAR_ROAD = 0.2  # footprint_size with a road
+# Of a torus: arc (deg) and depth of a region that has none, and place of a line of cords.
+AROUND_CROWN, WHOLE_WALL = (0.0, 45.0), (0.0, 1.0)
+CORDS_DEPTH, CORDS_ARC = 0.006, (-45.0, 45.0)  # m, deg
+_SMALL_MOTIONS = "dynamic", "loss_factor", "spectrum"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,12 +65,9 @@ class Proportions:
     through: int
 
 
-Raw = dict[str, Any]
-
-
 @dataclass(frozen=True)
 class Parts:
-    """What a section is built of, as tables of a scene: `compounds` by name, of [[tire.region]], and lines
+    """The compounds and cords of a section, as tables of a scene: `compounds` by name, of [[tire.region]], and lines
     of `cords` by name, of [[tire.cords]].
 
     `elsewhere`: the table of a region or line of any other name, a key each. `whole`: written back in
@@ -111,7 +114,7 @@ class SectionKind(Parameters):
         raise NotImplementedError
 
     def parts(self, tire: TireTable) -> Parts:
-        """What the section is built of, over which the scene's [[tire.region]] and [[tire.cords]] are merged."""
+        """The compounds and cords of the section, over which the scene's [[tire.region]] and [[tire.cords]] are merged."""
         return Parts({}, {}, {}, {})
 
     def as_scaled(self) -> Self:
@@ -198,9 +201,6 @@ SECTIONS: Registry[SectionKind] = Registry("section", "tireroad.runs.scene.secti
 section_kind = SECTIONS.register
 
 
-Where = Callable[[tuple[str, ...], str], InputError]
-
-
 @dataclass(frozen=True)
 class CavityTable:
     gas: str = choice(
@@ -223,12 +223,6 @@ class CavityTable:
         least=1,
         most=5000,
     )
-
-
-NEAR_ROAD = 0.2  # footprint_size with a road
-# Of a torus: arc (deg) and depth of a region that has none, and place of a line of cords.
-AROUND_CROWN, WHOLE_WALL = (0.0, 45.0), (0.0, 1.0)
-CORDS_DEPTH, CORDS_ARC = 0.006, (-45.0, 45.0)  # m, deg
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -457,7 +451,7 @@ def region_of(tire: TireTable, name: str) -> RegionTable | None:
 
 
 def losses_of(part: TireTable | RegionTable | None) -> dict[str, Any]:
-    """What [tire] or a region states of small motions. A Prony series gives all of it."""
+    """Keys of [tire] or a region for small motions. A Prony series gives all of it."""
     if part is None:
         return {}
     if part.prony_shares or part.prony_times:
@@ -465,9 +459,6 @@ def losses_of(part: TireTable | RegionTable | None) -> dict[str, Any]:
     law = None if part.exponent is None else power_law(part.exponent)
     given = dict(zip(_SMALL_MOTIONS, (part.dynamic, part.loss_factor, law), strict=True))
     return {key: value for key, value in given.items() if value is not None}
-
-
-_SMALL_MOTIONS = "dynamic", "loss_factor", "spectrum"
 
 
 def changed(compound: Material, region: RegionTable | None) -> Material:

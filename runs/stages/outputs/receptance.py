@@ -75,7 +75,7 @@ class Receptance(Output):
             along = seen.along(seen.response.receptance(frequency))
         peak = int(np.abs(along[:, 0, 0]).argmax())
         record.headline["largest receptance"] = (float(np.abs(along[peak, 0, 0])), "m/N")
-        record.headline["at"] = (float(frequency[peak]), "Hz")
+        record.headline["frequency of the largest receptance"] = (float(frequency[peak]), "Hz")
         self._dents(seen, record, along)
         out = {"frequency": (frequency, "Hz"), "receptance": (along, "m/N")}
         return out | (self._by_full_matrices(seen, record) if self.direct else {})

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tireroad.fem.parameters import integer, number
+from tireroad.greens.residuals import names
 from tireroad.runs.scene.outputs import (
     MOST_FREQUENCIES,
     OUTPUTS,
@@ -127,7 +128,7 @@ def compare(record: Record, what: str, off: float, to: float) -> None:
         record.warnings.append(
             f"output.transmissibility: the {what} by the free rim is {100 * off:.2g} % off that by momentum up to {to:.4g} Hz; "
             "one of them is wrong by as much: take more modes (modal.count, output.transmissibility.free_rim), "
-            'greens.residual = "attachment", or a lower output.transmissibility.to'
+            f"greens.residual = {names(joins=True)}, or a lower output.transmissibility.to"
         )
 
 

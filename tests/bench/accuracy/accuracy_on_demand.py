@@ -14,11 +14,12 @@ from mpi4py import MPI
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.timing import by_processor
 from tireroad.runs.files.cache import Cache
+from tireroad.runs.files.trials import Settings, Trial, worst
 from tireroad.runs.process import console
 from tireroad.runs.scene.estimate import estimate
-from tireroad.runs.search.journal import SearchJournal, Trial, worst
+from tireroad.runs.search.journal import SearchJournal
 from tireroad.runs.search.search import Search, seconds
-from tireroad.runs.search.settings import Ladders, Settings, applied
+from tireroad.runs.search.settings import Ladders, applied
 from tireroad.runs.stages.rolling import run_in
 from tireroad.runs.validation.tables import Table
 from tireroad.tests.bench.parts.kept import Records, every_case

@@ -71,7 +71,7 @@ class Apart:
 def apart(exact: Rolled, found: Rolled, force: str, duration: float) -> Apart:
     """Distance of a vertical force in two runs over one road, up to half the lower highest mode."""
     steps = [run.figure("contact", "step") for run in (exact, found)]
-    top = 0.5 * min(run.figure("modes", "highest") for run in (exact, found))
+    top = 0.5 * min(run.figure("modes", "highest mode") for run in (exact, found))
     values = [run.forces[force][:, 2:] for run in (exact, found)]
     one, other = (measured(v, step, top) for v, step in zip(values, steps, strict=True))
     reference, varying = (v - v.mean(axis=0) for v in values)

@@ -21,8 +21,8 @@ from tireroad.modal.rolling import rolling_modes
 from tireroad.modal.standing import fewer
 from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.files.store import opened
+from tireroad.runs.pipeline import Finished, run_scene
 from tireroad.runs.process import console
-from tireroad.runs.stages.pipeline import Finished, run_scene
 from tireroad.runs.stages.setup import leaning, leaning_loads
 from tireroad.runs.validation.full_elements import Conditions, FullHistory, follow
 

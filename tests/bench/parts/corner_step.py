@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
+from tireroad.runs.pipeline import run_scene
 from tireroad.runs.process import console
 from tireroad.runs.scene.load import load
-from tireroad.runs.stages.pipeline import run_scene
 from tireroad.runs.validation.tables import Table
 from tireroad.tests.bench.accuracy.rough_road import Mesh, write_scene
 

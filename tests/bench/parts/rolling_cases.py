@@ -18,10 +18,10 @@ from mpi4py import MPI
 
 from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.files.disk import replacing
+from tireroad.runs.pipeline import Finished, run_scene
 from tireroad.runs.process import console
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.tables.scene import AccuracyTable, Scene
-from tireroad.runs.stages.pipeline import Finished, run_scene
 from tireroad.tests.bench.parts.apart import apart
 
 

@@ -11,7 +11,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 @pytest.fixture
 def own(tmp_path):
     """Reads a deck given as text, with rims and faces as `torus_decks.plain` names them."""
-    from tireroad.fem.decks.own import Wishes, read
+    from tireroad.fem.decks.user_section import Wishes, read
 
     def from_text(text, name="tire.inp", **wishes):
         data = text if isinstance(text, bytes) else text.encode()

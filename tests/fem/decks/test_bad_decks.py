@@ -9,7 +9,7 @@ from ring_decks import solids
 from torus_decks import BELT, CORDS, Torus, membranes, plain
 
 from tireroad.fem.decks import deck
-from tireroad.fem.decks.own import read
+from tireroad.fem.decks.user_section import read
 from tireroad.fem.errors import InputError
 
 RING = np.linspace(0, 2 * np.pi, 9)[:-1]

@@ -8,7 +8,7 @@ from ring_decks import solids
 from torus_decks import CENTRE, HALF_ANGLE, MINOR, RUBBER, WALL, Torus, plain
 
 from tireroad.fem.decks import abaqus, gmsh
-from tireroad.fem.decks.own import read, regions
+from tireroad.fem.decks.user_section import read, regions
 from tireroad.fem.errors import InputError
 
 EXACT = 2 * np.pi * HALF_ANGLE * (MINOR**2 - (MINOR - WALL) ** 2) * CENTRE + 2 * np.pi * (

@@ -4,7 +4,7 @@ import pytest
 from good_decks import GOOD
 from mutants import DECKS, mutants
 
-from tireroad.fem.decks.own import Wishes, read
+from tireroad.fem.decks.user_section import Wishes, read
 from tireroad.fem.errors import InputError
 
 

@@ -103,11 +103,15 @@ def test_the_predicted_state_errs_by_the_square_of_the_rise(make_body):
     problem = loader.equilibrium
     loader.deflect(5e-3)
     assert problem.road_stiffness() > 0  # the tangent of the state itself
-    start, kept, height = problem.body.u.x.array.copy(), problem.road.kept(), problem.road.height
+    start, kept, height = (
+        problem.body.u.x.array.copy(),
+        problem.road.snapshot(),
+        problem.road.height,
+    )
     sizes, errors = (2e-6, 1e-6), []
     for size in sizes:
         problem.body.u.x.array[:] = start
-        problem.road.put_back(kept)
+        problem.road.restore(kept)
         problem.road.height = height
         assert problem.predict(height + size)
         assert problem.road.height == pytest.approx(height + size, abs=1e-15)

@@ -75,7 +75,7 @@ def test_the_tangent_is_that_of_central_differences(pressed, rolling, road) -> N
     ends = []
     for size in (1e-7, -1e-7):
         body.u.x.array[:] = start + size * change
-        ends.append(contact.rows(problem._out().copy()))
+        ends.append(contact.rows(problem._residual().copy()))
     free = np.setdiff1d(np.arange(len(direction)), np.concatenate([contact.held, problem._rim]))
     found = ((ends[0] - ends[1]) / 2e-7)[free]
     here = contact._along[contact.active].ravel()

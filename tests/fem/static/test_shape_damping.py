@@ -39,9 +39,9 @@ def test_a_step_leaves_the_spectral_radius_of_the_rate(make_body, csr) -> None:
     weak = problem(make_body, 1e-4)
     rates = sparse.csr_matrix(csr(weak._damping._rate_matrix))
     largest = np.abs(eigs(rates, k=2, which="LM", return_eigenvectors=False)).max()
-    assert weak.lag == pytest.approx(1.3 * SPEED * 1e-4 * largest, rel=0.03)
-    assert problem(make_body, 1e-2).lag == 0.0  # the tangent has all
-    assert problem(make_body, 0.0).lag == 0.0
+    assert weak.convergence_rate == pytest.approx(1.3 * SPEED * 1e-4 * largest, rel=0.03)
+    assert problem(make_body, 1e-2).convergence_rate == 0.0  # the tangent has all
+    assert problem(make_body, 0.0).convergence_rate == 0.0
 
 
 TILTED = RoadShape(camber=np.radians(2.0))
@@ -58,7 +58,7 @@ def test_the_state_is_that_of_the_complete_tangent(make_body, monkeypatch, road)
     for weak in (equilibrium_module._WEAK, 0.0):
         monkeypatch.setattr(equilibrium_module, "_WEAK", weak)
         equilibrium = problem(make_body, 1.2e-3, road, MPI.COMM_WORLD)
-        assert (equilibrium.lag > 0.5) == (weak > 0)
+        assert (equilibrium.convergence_rate > 0.5) == (weak > 0)
         loader = LoadStepper(equilibrium, lambda progress: None)
         loader.inflate(2e5)
         place(loader, 800.0, None, None)

@@ -29,7 +29,7 @@ class MadeUp:
         self.curve, self.equilibrium, self.body = curve, self, self
         self.u = SimpleNamespace(x=SimpleNamespace(array=np.zeros(1)))
         self.ring = SimpleNamespace(thickness=0.012)
-        self.road = SimpleNamespace(kept=lambda: None, put_back=lambda kept: None)
+        self.road = SimpleNamespace(snapshot=lambda: None, restore=lambda state: None)
         self.road_height, self.newton_steps, self.visited = 0.0, 0, []
 
     def solve(self, height, load=None, allowed=0.0) -> SolveOutcome:

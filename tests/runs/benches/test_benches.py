@@ -6,9 +6,9 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
+from tireroad.runs.files.trials import Settings, Trial
 from tireroad.runs.scene.sections import torus
-from tireroad.runs.search.journal import Trial
-from tireroad.runs.search.settings import CAUSES, Settings
+from tireroad.runs.search.settings import CAUSES
 from tireroad.runs.validation import tables
 from tireroad.runs.validation.tables import Table
 from tireroad.runs.validation.tables_page import _shown, drawn, page

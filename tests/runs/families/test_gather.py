@@ -10,8 +10,9 @@ import pytest
 
 from tireroad.runs.files.disk import signed, write_text
 from tireroad.runs.files.folder import Summary
+from tireroad.runs.files.trials import Trial
 from tireroad.runs.scene.resolved import dumps
-from tireroad.runs.search.journal import SearchJournal, Trial
+from tireroad.runs.search.journal import SearchJournal
 from tireroad.runs.search.settings import Ladders, applied
 from tireroad.runs.sweep.definition import Sweep, read
 from tireroad.runs.sweep.page import gather, write
@@ -32,7 +33,7 @@ def family(folder: Path, speed: float) -> Sweep:
 
 
 def begin(sweep: Sweep, folder: Path) -> list[Summary]:
-    """The members' folders as runs.stages.pipeline begins a run."""
+    """The members' folders as runs.pipeline begins a run."""
     found = []
     for member in sweep.members:
         own, text = folder / "members" / member.name, dumps(sweep.load(member))

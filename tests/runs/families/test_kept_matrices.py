@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from tires import soft_torus
 
-from tireroad.runs.stages import stage
+from tireroad.runs.stages import matrices
 
 SCENE = (
     soft_torus(16, 8)
@@ -37,11 +37,11 @@ import os, sys
 import tireroad
 from tireroad.fem import model
 from tireroad.runs.cli import main
-from tireroad.runs.stages import stage
+from tireroad.runs.stages import matrices
 made = []
 real = model.SmallMotions.__init__
 model.SmallMotions.__init__ = lambda *given, **named: (made.append(1), real(*given, **named))[1]
-stage.keep_matrices()
+matrices.keep_matrices()
 for speed in (40.0, 45.0, 50.0):
     assert main(["run", sys.argv[1], "--out", f"{sys.argv[2]}/{speed:g}", "--set", f"rotation.speed={speed}"]) == 0
     print("made", len(made))
@@ -50,22 +50,22 @@ for speed in (40.0, 45.0, 50.0):
 
 @pytest.fixture(autouse=True)
 def nothing_kept(monkeypatch):
-    monkeypatch.setattr(stage, "_kept", None)
+    monkeypatch.setattr(matrices, "_kept", None)
 
 
 def test_the_last_two_are_kept() -> None:
     made = []
 
     def once(key: str) -> str:
-        return stage.memoize("kind", key, lambda: made.append(key) or key)
+        return matrices.memoize("kind", key, lambda: made.append(key) or key)
 
     once("alone"), once("alone")
     assert made == ["alone", "alone"]  # of a run by itself nothing is
-    stage.keep_matrices()
+    matrices.keep_matrices()
     for key in ("run", "coarser", "run", "coarser", "other", "coarser", "run"):
         assert once(key) == key
     assert made[2:] == ["run", "coarser", "other", "run"]
-    stage.forget_matrices()
+    matrices.forget_matrices()
     once("run")
     assert made[-1] == "run" and len(made) == 7
 

@@ -11,6 +11,7 @@ from wanted_scene import SCENE
 from tireroad.contact.results.error_bars import orders
 from tireroad.fem.errors import ConvergenceError
 from tireroad.runs.files.folder import check_kept_scene
+from tireroad.runs.files.trials import MARGIN, ErrorsByCause, Settings, Trial, worst
 from tireroad.runs.process import console
 from tireroad.runs.process.signals import Stopped
 from tireroad.runs.scene.estimate import estimate
@@ -18,9 +19,9 @@ from tireroad.runs.scene.load import load
 from tireroad.runs.scene.sections import torus
 from tireroad.runs.search import journal
 from tireroad.runs.search import search as searching
-from tireroad.runs.search.journal import ErrorsByCause, SearchJournal, Trial, to_resume, worst
+from tireroad.runs.search.journal import SearchJournal, to_resume
 from tireroad.runs.search.search import Search
-from tireroad.runs.search.settings import CAUSES, MARGIN, Ladders, Settings, applied, size_ratio
+from tireroad.runs.search.settings import CAUSES, Ladders, applied, size_ratio
 
 AT_FIRST = {"step": 0.04, "points": 0.2, "modes": 0.06, "mesh": 0.3}
 

@@ -8,12 +8,13 @@ from mpi4py import MPI
 from wanted_scene import SCENE
 
 from tireroad.fem.errors import ConvergenceError, InputError, UnsuitedSettings
+from tireroad.runs.check import explain
 from tireroad.runs.files.disk import Refused
+from tireroad.runs.files.trials import ErrorsByCause, worst
 from tireroad.runs.process import console
-from tireroad.runs.scene.check import explain
 from tireroad.runs.scene.load import load
 from tireroad.runs.search import search
-from tireroad.runs.search.journal import ErrorsByCause, SearchJournal, worst
+from tireroad.runs.search.journal import SearchJournal
 from tireroad.runs.search.search import Search
 from tireroad.runs.search.settings import CAUSES, Ladders
 

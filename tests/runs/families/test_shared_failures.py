@@ -10,7 +10,8 @@ from mpi4py import MPI
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.runs.files.cache import NO_CACHE
-from tireroad.runs.stages.stage import FAILURES, Stage
+from tireroad.runs.stages.failures import FAILURES
+from tireroad.runs.stages.stage import Stage
 
 
 class Folding:

@@ -125,7 +125,7 @@ def test_a_cache_that_cannot_be_written_is_none(home: Path) -> None:
 
 
 def test_a_cache_that_takes_no_more_is_told_and_the_run_goes_on(
-    home: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A folder that exists but cannot be written, or is full: it ended the run with status 3."""
     source = home / "stage.h5"
@@ -135,8 +135,10 @@ def test_a_cache_that_takes_no_more_is_told_and_the_run_goes_on(
         raise Refused(f"{path}: cannot be written")
 
     monkeypatch.setattr(shared, "write_text", refuses)
+    told: list[str] = []
+    monkeypatch.setattr(shared._LOG, "warning", told.append)
     Cache.of_user().keep("static", "a", source, {})
-    said = capsys.readouterr().out
+    (said,) = told
     assert "not kept for other runs, TIREROAD_CACHE = " in said and "cannot be written" in said
     assert Cache.of_user().entries() == []
 

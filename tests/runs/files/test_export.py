@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from synthetic_results import sealed, write_results
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.files.export import INSTANTS, MADE, SHAPES, export
+from tireroad.runs.results.export import INSTANTS, MADE, SHAPES, export
 
 CSV = {
     "footprint.csv",

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from tireroad.runs.files.folder import folder_of
+from tireroad.runs.files.names import scene_name
 from tireroad.runs.report.input_file import describe_road
-from tireroad.runs.scene.resolved import scene_name
 
 
 def test_files_of_one_name_do_not_overwrite_each_other(tmp_path: Path) -> None:

@@ -16,11 +16,11 @@ from synthetic_scene import SCENE
 import tireroad
 from tireroad.fem.errors import ConvergenceError
 from tireroad.runs.files.disk import signed
-from tireroad.runs.files.export import export
 from tireroad.runs.files.folder import Summary, left_out, remarks
 from tireroad.runs.report.compare import compare
 from tireroad.runs.report.page import render
-from tireroad.runs.stages.stage import failure_recorded
+from tireroad.runs.results.export import export
+from tireroad.runs.stages.failures import failure_recorded
 
 NAME = "synthetic-torus"
 OTHER = SCENE + "# another scene\n"

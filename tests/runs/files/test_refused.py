@@ -10,8 +10,8 @@ from mpi4py import MPI
 from synthetic_results import write_results
 
 from tireroad.fem.errors import InputError
+from tireroad.runs import pipeline
 from tireroad.runs.scene.load import load
-from tireroad.runs.stages import pipeline
 
 SCENE = """
 name = "synthetic-torus"

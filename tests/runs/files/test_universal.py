@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tireroad.runs.files.export import DISPLACEMENT, dataset, direction
+from tireroad.runs.results.export import DISPLACEMENT, dataset, direction
 
 
 @pytest.mark.parametrize("even", [True, False])

@@ -5,8 +5,9 @@ from pathlib import Path
 import pytest
 
 from tireroad.runs import cli
+from tireroad.runs.files.names import STAGES
 from tireroad.runs.scene.load import load
-from tireroad.runs.scene.plan import STAGES, skipped
+from tireroad.runs.scene.plan import skipped
 from tireroad.runs.version import VERSION
 
 LIGHT = """

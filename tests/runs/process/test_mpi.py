@@ -4,6 +4,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import pytest
 from mpi4py import MPI
@@ -125,7 +126,7 @@ def test_a_stop_says_what_the_command_goes_on_from(monkeypatch, capsys, command,
     def stopped(args) -> None:
         raise signals.Stopped("SIGINT")
 
-    monkeypatch.setitem(cli.ALONE, command, stopped)
+    monkeypatch.setitem(cli.COMMANDS, command, replace(cli.COMMANDS[command], alone=stopped))
     monkeypatch.setattr(signals, "stop_on_signals", lambda: None)
     assert cli.main([command, "any.toml"]) == STOPPED
     said = capsys.readouterr().err

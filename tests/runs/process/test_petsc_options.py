@@ -1,6 +1,6 @@
 """Options of PETSc that nothing reads are told."""
 
-from tireroad.runs.stages import pipeline
+from tireroad.runs import pipeline
 
 
 def test_options_that_petsc_did_not_read_are_told(monkeypatch) -> None:

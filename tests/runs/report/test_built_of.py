@@ -40,7 +40,10 @@ def test_what_ends_at_which_speed(tmp_path: Path) -> None:
     headline = {
         "speed": {"value": 72.0, "unit": "rad/s"},
         "critical speed": {"value": 157.0, "unit": "rad/s"},
-        "its standing wave": {"value": "32 around, largest at y = 100 mm", "unit": "-"},
+        "standing wave at the critical speed": {
+            "value": "32 around, largest at y = 100 mm",
+            "unit": "-",
+        },
     }
     of_the_run = {"static.h5": {"rolling_radius": 0.3}}
     results = SimpleNamespace(
@@ -52,5 +55,5 @@ def test_what_ends_at_which_speed(tmp_path: Path) -> None:
     facts = dict(made.facts)
     assert facts["critical speed of the undamped tire"] == "157 rad/s, 169.6 km/h"
     assert facts["speed symbol H"].startswith("194.4 rad/s, 210 km/h")
-    assert facts["its standing wave"].startswith("32 around")
+    assert facts["standing wave at the critical speed"].startswith("32 around")
     assert float(facts["this run"].split(", ")[1].split()[0]) == pytest.approx(77.76, abs=0.05)

@@ -12,9 +12,9 @@ import pytest
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.disk import signed
-from tireroad.runs.files.reader import RunResults
 from tireroad.runs.report.compare import Row, _change, assurance, compare, level_rows, scene_rows
 from tireroad.runs.report.levels import SOUND
+from tireroad.runs.results.reader import RunResults
 
 
 def write(folder: Path, load: float, level: float, frequencies: list[float], turn: bool) -> Path:

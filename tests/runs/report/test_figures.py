@@ -9,7 +9,7 @@ from matplotlib import image
 from synthetic_results import lattice
 
 from tireroad.runs.report import figures, surface_figures
-from tireroad.runs.report.page import verdict
+from tireroad.runs.report.ratings import LIMITS, verdict
 from tireroad.runs.report.read import bounded, quantity
 
 
@@ -124,9 +124,19 @@ def test_bars_that_differ_little_do_not_look_as_if_they_differed_much(levels: li
     assert floor % 10 == 0 and floor <= top - 20 and floor <= min(levels) and top >= max(levels)
 
 
-def test_a_count_of_residual_states_is_no_residual() -> None:
-    assert verdict("worst residual", 1e-3) == "poor" and verdict("worst residual", 1e-9) == "good"
-    assert verdict("residual states faster than 3 times the highest mode, made static", 115) == ""
+def test_an_indicator_is_rated_by_its_stage_and_name() -> None:
+    assert verdict("modes", "worst residual", 1e-3) == "poor"
+    assert verdict("modes", "worst residual", 1e-9) == "good"
+    assert verdict("greens", "estimated truncation error up to 284.6 Hz, contact", 0.1) == "fair"
+    assert verdict("static", "least contact force", -1e-9) == "poor"
+    made_static = "residual states faster than 3 times the highest mode, made static"
+    assert verdict("greens", made_static, 115) == ""
+    assert verdict("contact", "energy left in the residual flexibility", 1.0) == ""
+
+
+def test_no_two_ratings_apply_to_one_indicator() -> None:
+    for limits in LIMITS.values():
+        assert not [(a, b) for a in limits for b in limits if a != b and a.startswith(b)]
 
 
 def test_an_error_has_the_unit_of_its_value() -> None:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from written_page import page
 
+from tireroad.runs.files.trials import ErrorsByCause, Settings, Trial
 from tireroad.runs.report.sections import spectra
-from tireroad.runs.search.journal import ErrorsByCause, Trial
-from tireroad.runs.search.settings import CAUSES, Settings
+from tireroad.runs.search.settings import CAUSES
 
 
 @pytest.mark.long

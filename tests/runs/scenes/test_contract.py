@@ -8,8 +8,8 @@ import json
 import pytest
 from full_scene import CONTRACT, REAL_TIRE, refused
 
+from tireroad.runs.check import explain
 from tireroad.runs.cli import main
-from tireroad.runs.scene.check import explain
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.plan import skipped
 from tireroad.runs.scene.resolved import dumps

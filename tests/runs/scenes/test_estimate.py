@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 from tireroad.fem.errors import InputError
+from tireroad.runs.check import explain
+from tireroad.runs.process import demand
 from tireroad.runs.scene import estimate as scene_estimate
-from tireroad.runs.scene.check import explain
 from tireroad.runs.scene.estimate import estimate, memory
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.sizes import highest_frequency, sizes
@@ -101,7 +102,7 @@ def test_modes_below_a_frequency_count(torus: Path) -> None:
     ],
 )
 def test_what_cannot_succeed_is_refused_by_its_key(torus, overrides, words, monkeypatch) -> None:
-    free = "tireroad.runs.scene.estimate.available_memory"
+    free = "tireroad.runs.process.demand.available_memory"
     monkeypatch.setattr(free, lambda: 64e9)  # whatever runs beside
     with pytest.raises(InputError) as caught:
         explain(load(torus, overrides))
@@ -113,7 +114,7 @@ def test_check_tells_what_each_process_takes(torus: Path, monkeypatch) -> None:
     """Two have more than one together, and each less; factors that do not fit are on disk."""
     scene, told = load(torus), []
     for count, free in ((1, 1e12), (2, 1e12), (2, 1.2e9)):
-        monkeypatch.setattr(scene_estimate, "available_memory", lambda free=free: free)
+        monkeypatch.setattr(demand, "available_memory", lambda free=free: free)
         line = next(x for x in explain(scene, count).splitlines() if "estimated memory" in x)
         told.append(float(line.split()[2]))
     assert told[0] / 2 < told[1] < told[0]
@@ -132,12 +133,12 @@ def test_doubt_is_a_warning_and_certainty_an_error(torus, monkeypatch, tmp_path)
     wanted = estimate(load(torus))
     needed = sum(wanted.memory.values())
     for share, outcome in ((0.5, "refused"), (1.0, "warned"), (2.0, "silent")):
-        monkeypatch.setattr(scene_estimate, "available_memory", lambda share=share: share * needed)
+        monkeypatch.setattr(demand, "available_memory", lambda share=share: share * needed)
         if outcome == "refused":
             with pytest.raises(InputError, match="matrices"):
-                scene_estimate.check_demand(wanted, tmp_path)
+                demand.check_demand(wanted, tmp_path)
         else:
-            told = " ".join(scene_estimate.check_demand(wanted, tmp_path))
+            told = " ".join(demand.check_demand(wanted, tmp_path))
             assert ("GB are free" in told) == ("out of core" in told) == (outcome == "warned")
     # Factors and matrices are spread over the processes; each one has a program and a pencil of its own.
     together = scene_estimate.memory_of(wanted, 4)
@@ -151,13 +152,13 @@ def test_factors_go_to_disk_where_memory_is_short(torus, monkeypatch, tmp_path) 
     wanted = estimate(load(torus, larger), until="static")
     needed, factor = sum(wanted.memory.values()), wanted.memory[scene_estimate.FACTOR]
     assert factor > needed / 4
-    room = (needed - scene_estimate.ON_DISK * factor) / scene_estimate.DOUBTFUL * 1.01
-    monkeypatch.setattr(scene_estimate, "available_memory", lambda: room)
-    assert scene_estimate.out_of_core(wanted, 1)
-    (warning,) = (one for one in scene_estimate.check_demand(wanted, tmp_path) if "memory" in one)
+    room = (needed - scene_estimate.ON_DISK * factor) / demand.DOUBTFUL * 1.01
+    monkeypatch.setattr(demand, "available_memory", lambda: room)
+    assert demand.out_of_core(wanted, 1)
+    (warning,) = (one for one in demand.check_demand(wanted, tmp_path) if "memory" in one)
     assert "MUMPS out of core" in warning
-    monkeypatch.setattr(scene_estimate, "available_memory", lambda: 2 * needed)
-    assert not scene_estimate.out_of_core(wanted, 1)
+    monkeypatch.setattr(demand, "available_memory", lambda: 2 * needed)
+    assert not demand.out_of_core(wanted, 1)
 
 
 def test_a_factor_on_disk_is_a_factor(tmp_path: Path, launch) -> None:
@@ -173,18 +174,18 @@ def test_the_disk_is_that_of_the_result_folder(torus, monkeypatch, tmp_path) -> 
     asked = []
     usage = shutil.disk_usage(tmp_path)
     monkeypatch.setattr(
-        scene_estimate.shutil,
+        demand.shutil,
         "disk_usage",
         lambda p: (asked.append(p), usage._replace(free=1000))[1],
     )
     with pytest.raises(InputError, match=r"disk in .*not/yet"):
-        scene_estimate.check_demand(estimate(load(torus)), tmp_path / "not" / "yet")
+        demand.check_demand(estimate(load(torus)), tmp_path / "not" / "yet")
     assert asked == [tmp_path]
 
 
 def test_hours_are_said(torus: Path, monkeypatch, tmp_path: Path) -> None:
     usage = shutil.disk_usage(tmp_path)
-    monkeypatch.setattr(scene_estimate.shutil, "disk_usage", lambda _: usage._replace(free=10**13))
+    monkeypatch.setattr(demand.shutil, "disk_usage", lambda _: usage._replace(free=10**13))
     wanted = estimate(load(torus, ["time.duration=100", "time.step=1e-5"]))
-    (warning,) = scene_estimate.check_demand(wanted, tmp_path)
+    (warning,) = demand.check_demand(wanted, tmp_path)
     assert "7 hours of one core" in warning and "contact loop (time.duration" in warning

@@ -14,12 +14,12 @@ from scene_keys import KEYS
 
 from tireroad.contact.roads.road import ROADS
 from tireroad.fem.tire.material import MATERIALS
+from tireroad.runs.pipeline import run_scene
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.schema import collection_of, variant_of, walk
 from tireroad.runs.scene.tables import tire as tire_tables
 from tireroad.runs.scene.tables.contact import PatternTable
 from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.stages.pipeline import run_scene
 from tireroad.runs.stages.setup import make_pattern
 
 TIRE = """

@@ -10,7 +10,7 @@ import pytest
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections.radial import COMPOUNDS, GROOVE, radial
-from tireroad.runs.scene.check import explain
+from tireroad.runs.check import explain
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.resolved import dumps
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.scene.check import explain
+from tireroad.runs.check import explain
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.rules import foot
 

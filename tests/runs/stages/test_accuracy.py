@@ -14,10 +14,10 @@ from tireroad.contact.results.error_bars import CAUSES, bars, measured
 from tireroad.contact.tread.kernel import KernelTread
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.disk import Refused
+from tireroad.runs.pipeline import run_scene
 from tireroad.runs.process import console
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.accuracy import Given, backed, coarser, coarser_job, companions
-from tireroad.runs.stages.pipeline import run_scene
 from tireroad.runs.stages.setup import points_of
 from tireroad.runs.stages.stage import Job
 

@@ -10,11 +10,11 @@ from mpi4py import MPI
 from tires import soft_torus
 
 from tireroad.fem.errors import InputError
+from tireroad.runs.pipeline import run_scene
 from tireroad.runs.process import console
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.tables.scene import axle_of
 from tireroad.runs.stages import corner
-from tireroad.runs.stages.pipeline import run_scene
 
 SCENE = (
     soft_torus(20, 6)

@@ -17,10 +17,10 @@ from mpi4py import MPI
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.timing import Timing
 from tireroad.modal.solver.slicing import SOLVERS, SymmetricProblem
+from tireroad.runs.pipeline import run_scene
 from tireroad.runs.process.signals import Stopped
 from tireroad.runs.scene.load import load
-from tireroad.runs.stages import stage as stages_stage
-from tireroad.runs.stages.pipeline import run_scene
+from tireroad.runs.stages import checkpoint
 
 ROUNDING = 0.0 if MPI.COMM_WORLD.size == 1 else 1e-9  # of factors on several processes, run by run
 pytestmark = [pytest.mark.slow, pytest.mark.mpi]
@@ -48,7 +48,7 @@ speed = 30.0
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch) -> Path:
-    monkeypatch.setattr(stages_stage, "LEAST", 1e9)  # only a stop writes
+    monkeypatch.setattr(checkpoint, "LEAST", 1e9)  # only a stop writes
     return COMM.bcast(tmp_path)
 
 
@@ -69,7 +69,7 @@ def run(scene, directory: Path, until: str) -> None:
 
 def stopped(monkeypatch, scene, directory: Path, until: str, after: int) -> None:
     """Run, and stop as by a signal once this process has so many results; a stop writes them."""
-    keep = stages_stage._Parts.keep
+    keep = checkpoint._Parts.keep
 
     def keep_and_stop(parts, number: int, entry) -> None:
         keep(parts, number, entry)
@@ -77,7 +77,7 @@ def stopped(monkeypatch, scene, directory: Path, until: str, after: int) -> None
             raise Stopped("SIGTERM")
 
     with monkeypatch.context() as patch, pytest.raises(Stopped):
-        patch.setattr(stages_stage._Parts, "keep", keep_and_stop)
+        patch.setattr(checkpoint._Parts, "keep", keep_and_stop)
         run(scene, directory, until)
     COMM.Barrier()
 
@@ -204,8 +204,8 @@ def test_what_is_damaged_is_not_taken(folder: Path, monkeypatch, capsys) -> None
 @pytest.mark.long
 def test_results_are_written_when_that_is_worth_it(folder: Path, monkeypatch) -> None:
     """A part begins with the first result that was not written before; other inputs take none of them."""
-    monkeypatch.setattr(stages_stage, "LEAST", 0.0)
-    monkeypatch.setattr(stages_stage, "WORTH", 0.0)
+    monkeypatch.setattr(checkpoint, "LEAST", 0.0)
+    monkeypatch.setattr(checkpoint, "WORTH", 0.0)
     scene = scene_of(folder)
     stopped(monkeypatch, scene, folder / "broken", "static", 3)
     assert len(parts(folder / "broken", "static")) == 3 * COMM.size
@@ -220,11 +220,9 @@ def test_results_are_written_when_that_is_worth_it(folder: Path, monkeypatch) ->
 def test_what_has_no_bytes_tells_nothing_of_the_disk(tmp_path: Path, monkeypatch) -> None:
     """A process that had no part of a slice has a result of no bytes, and others after it."""
     written = []
-    monkeypatch.setattr(stages_stage, "LEAST", 0.0)
-    monkeypatch.setattr(
-        stages_stage._Parts, "flush", lambda self: written.append(len(self._waiting))
-    )
-    kept = stages_stage._Parts(SimpleNamespace(directory=tmp_path), "modes", "key")
+    monkeypatch.setattr(checkpoint, "LEAST", 0.0)
+    monkeypatch.setattr(checkpoint._Parts, "flush", lambda self: written.append(len(self._waiting)))
+    kept = checkpoint._Parts(SimpleNamespace(directory=tmp_path), "modes", "key")
     for number in range(3):
         kept.keep(number, {"vectors": np.zeros((0, 4))})
     assert written == [1, 2, 3]

@@ -13,9 +13,9 @@ from tires import soft_torus
 import tireroad
 from tireroad.contact.results.spectra import amplitudes
 from tireroad.greens.outputs import Surface
+from tireroad.runs.pipeline import run_scene
 from tireroad.runs.process import console
 from tireroad.runs.scene.load import load
-from tireroad.runs.stages.pipeline import run_scene
 
 pytestmark = pytest.mark.slow
 

@@ -169,8 +169,8 @@ duration = 0.03
         assert file["frequency"][:].max() <= file.attrs["limit"] < 0.5 / 1e-4
         assert "highest mode" in file.attrs["limit_cause"]
     told = stages["spectra"]["headline"]
-    highest = stages["modes"]["headline"]["highest"]["value"]
-    assert told["an answer up to"]["value"] == pytest.approx(0.8 * highest, rel=1e-3)
+    highest = stages["modes"]["headline"]["highest mode"]["value"]
+    assert told["valid up to"]["value"] == pytest.approx(0.8 * highest, rel=1e-3)
     assert "spectra end at" in (folder / "log.txt").read_text()
     page = (folder / "report.html").read_text()
     assert "belgian_block.crg" in page

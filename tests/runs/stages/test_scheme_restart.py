@@ -8,11 +8,11 @@ from tires import soft_torus
 
 from tireroad.contact.results.chatter import ANY, LIMIT, Alternation, Chatter
 from tireroad.runs.files.cache import Cache
+from tireroad.runs.pipeline import run_scene
 from tireroad.runs.process import console
 from tireroad.runs.process.signals import Stopped
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages import contact
-from tireroad.runs.stages.pipeline import run_scene
 
 pytestmark = pytest.mark.slow
 

@@ -17,10 +17,10 @@ from tires import soft_torus
 import tireroad
 from tireroad.greens.outputs import Surface
 from tireroad.greens.tire_sound import directions
-from tireroad.runs.files.export import export
+from tireroad.runs.pipeline import run_scene
 from tireroad.runs.report.page import write_report
+from tireroad.runs.results.export import export
 from tireroad.runs.scene.load import load
-from tireroad.runs.stages.pipeline import run_scene
 from tireroad.runs.stages.sound import SoundStage, _total_error
 
 pytestmark = pytest.mark.slow

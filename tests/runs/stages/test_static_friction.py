@@ -7,10 +7,10 @@ from mpi4py import MPI
 from tires import soft_torus
 
 from tireroad.fem.errors import InputError
+from tireroad.runs.pipeline import run_scene
 from tireroad.runs.report.read import Results, quantity
 from tireroad.runs.report.sections.tire import friction
 from tireroad.runs.scene.load import load
-from tireroad.runs.stages.pipeline import run_scene
 
 SCENE = (
     soft_torus(16, 6)

@@ -9,9 +9,9 @@ import pytest
 from mpi4py import MPI
 from tires import soft_torus
 
+from tireroad.runs.pipeline import run_scene
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages import contact
-from tireroad.runs.stages.pipeline import run_scene
 
 SCENE = (
     soft_torus(20, 6)

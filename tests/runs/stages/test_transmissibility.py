@@ -9,10 +9,10 @@ from mpi4py import MPI
 from tires import soft_torus
 
 from tireroad.fem.errors import InputError
+from tireroad.runs.pipeline import run_scene
 from tireroad.runs.process import console
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.outputs.transmissibility import apart, compare
-from tireroad.runs.stages.pipeline import run_scene
 from tireroad.runs.stages.stage import Record
 
 SCENE = (

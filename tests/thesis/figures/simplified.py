@@ -13,7 +13,7 @@ from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.greens.responses import make_response
 from tireroad.modal.rolling import rolling_modes
-from tireroad.runs.stages.pipeline import Finished
+from tireroad.runs.pipeline import Finished
 from tireroad.runs.stages.setup import Probes, probes
 from tireroad.tests.thesis.runner import Scenes
 

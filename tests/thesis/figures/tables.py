@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from tireroad.runs.stages.pipeline import Finished
+from tireroad.runs.pipeline import Finished
 from tireroad.tests.thesis.claim import Claim
 from tireroad.tests.thesis.figure import Reproduced, figure
 from tireroad.tests.thesis.runner import Scenes

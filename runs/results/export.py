@@ -30,7 +30,7 @@ from tireroad.fem.errors import InputError
 from tireroad.runs.files.disk import replacing
 from tireroad.runs.files.folder import left_out
 from tireroad.runs.files.store import opened
-from tireroad.runs.files.wave import wave_file
+from tireroad.runs.results.wave import wave_file
 from tireroad.runs.version import PROGRAM
 
 FRF = 4  # function type: frequency response
@@ -46,6 +46,31 @@ _NAMES = {
 }
 AXLE = 1000  # number of the axle as a point
 _EVEN = 1e-9
+SHAPES = 20  # modes written
+INSTANTS = 400  # contact states written: each takes 1 kB of page and an entry of the time slider
+_BORROWED = 'xpointer(//Grid[@Name="states"]/Grid[1]/*[self::Topology or self::Geometry])'
+AXES = ("x", "y", "z")
+NAMES = {  # levels in third_octave/ whose names do not give the quantity
+    "level": "axle force level",
+    "level_a_weighted": "axle force level a weighted",
+    "level_error": "error of the axle force level",
+    "contact_level": "contact force level",
+    "contact_level_a_weighted": "contact force level a weighted",
+    "contact_level_error": "error of the contact force level",
+}
+MADE = {
+    "tire.tir",
+    *(f"{name}.csv" for name in ("stiffness", "stiffness_longitudinal", "stiffness_lateral")),
+    *(f"{name}.csv" for name in ("footprint", "modes", "contact_force", "spectra", "third_octave")),
+    *(f"{name}.csv" for name in ("density", "response", "receptance", "vibration", "sound")),
+    *(f"{name}.csv" for name in ("rolling_modes", "campbell")),
+    "response.uff",
+    *(f"{name}.xdmf" for name in ("static", "modes", "contact", "motion")),
+    *(f"{name}_fields.h5" for name in ("static", "modes", "contact", "motion")),
+}
+"""The names of all files that an export may write."""
+Columns = dict[str, NDArray]  # heading with unit -> values (n)
+Remark = Callable[[str, str], None]  # name of a file, what cannot be made of it and why
 
 
 def frequency_responses(file: h5py.File, directions: Sequence[Sequence[float]]) -> str:
@@ -115,11 +140,6 @@ def dataset(
         for f, value in zip(frequency, values, strict=True):
             yield f"{f:13.5E}{value.real:20.11E}{value.imag:20.11E}"
     yield f"{-1:6d}"
-
-
-SHAPES = 20  # modes written
-INSTANTS = 400  # contact states written: each takes 1 kB of page and an entry of the time slider
-_BORROWED = 'xpointer(//Grid[@Name="states"]/Grid[1]/*[self::Topology or self::Geometry])'
 
 
 @dataclass
@@ -270,30 +290,6 @@ def _item(shape: tuple[int, ...], dtype: np.dtype, place: str) -> str:
     )
 
 
-AXES = ("x", "y", "z")
-NAMES = {  # levels in third_octave/ whose names do not give the quantity
-    "level": "axle force level",
-    "level_a_weighted": "axle force level a weighted",
-    "level_error": "error of the axle force level",
-    "contact_level": "contact force level",
-    "contact_level_a_weighted": "contact force level a weighted",
-    "contact_level_error": "error of the contact force level",
-}
-MADE = {
-    "tire.tir",
-    *(f"{name}.csv" for name in ("stiffness", "stiffness_longitudinal", "stiffness_lateral")),
-    *(f"{name}.csv" for name in ("footprint", "modes", "contact_force", "spectra", "third_octave")),
-    *(f"{name}.csv" for name in ("density", "response", "receptance", "vibration", "sound")),
-    *(f"{name}.csv" for name in ("rolling_modes", "campbell")),
-    "response.uff",
-    *(f"{name}.xdmf" for name in ("static", "modes", "contact", "motion")),
-    *(f"{name}_fields.h5" for name in ("static", "modes", "contact", "motion")),
-}
-"""The names of all files that an export may write."""
-Columns = dict[str, NDArray]  # heading with unit -> values (n)
-Remark = Callable[[str, str], None]  # name of a file, what cannot be made of it and why
-
-
 def export(
     directory: Path,
     uff: bool = False,
@@ -322,7 +318,7 @@ def export(
     if uff:
         files |= _asked("response.uff", remark, lambda: _universal(directory, others))
     if tir:
-        from tireroad.runs.files.tir import written  # needs the tire, which no other export does
+        from tireroad.runs.results.tir import written  # needs the tire, which no other export does
 
         files |= _asked(
             "tire.tir", remark, lambda: written(directory, others, partial(remark, "tire.tir"))
@@ -485,7 +481,8 @@ def stiffness(file: h5py.File) -> dict[str, Callable[[Path], object]]:
         f"{name.replace('_', ' ')} [{curve[name].attrs['unit']}]": curve[name][()] for name in curve
     }
     files = _table(
-        "stiffness.csv", dict(sorted(columns.items(), key=lambda one: "deflection" not in one[0]))
+        "stiffness.csv",
+        dict(sorted(columns.items(), key=lambda column: "deflection" not in column[0])),
     )
     for axis in file.get("slide", {}):
         parts = file[f"slide/{axis}"]

@@ -3,10 +3,12 @@
 from pathlib import Path
 from typing import Any
 
+from tireroad.runs.files.names import STAGES
+from tireroad.runs.process.demand import check_demand, out_of_core
 from tireroad.runs.process.surroundings import crowded
 from tireroad.runs.scene import files
-from tireroad.runs.scene.estimate import check_demand, duration, estimate, memory_of, out_of_core
-from tireroad.runs.scene.plan import STAGES, meets_road, skipped
+from tireroad.runs.scene.estimate import duration, estimate, memory_of
+from tireroad.runs.scene.plan import meets_road, skipped
 from tireroad.runs.scene.resolved import literal
 from tireroad.runs.scene.rules import check_road, remarks
 from tireroad.runs.scene.schema import applies, entries, key_of, table_of
@@ -49,7 +51,7 @@ def _aligned(rows: list[Row], widths: list[int]) -> list[str]:
 
 
 def explain(scene: Scene, processes: int = 1, until: str | None = None) -> str:
-    """What `check` prints for so many processes, and a run that ends with stage `until`.
+    """The text of `check` for so many processes, and a run that ends with stage `until`.
 
     Raises InputError for an unusable road, if the run meets it."""
     on_road = meets_road(until)

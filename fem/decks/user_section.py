@@ -50,6 +50,11 @@ from tireroad.fem.sections.construction import Construction, CordLine
 from tireroad.fem.sections.mesh2d import SectionMesh
 from tireroad.fem.tire.material import power_law
 
+_PLANE = re.compile(r"ELEMENT, TYPE=(CP[SE]\d+\w*)")
+ELEMENTS = 26  # bead to bead, as in the built-in radial tire
+MERGE = 1e-6  # m
+MESHES = {".inp": abaqus.read, ".msh": gmsh.read}
+
 
 def named_edges(deck: Deck, edges: DeckEdges, name: str, key: str) -> np.ndarray:
     """Edge numbers of a surface, node set or membrane set. InputError for other names.
@@ -110,9 +115,6 @@ class Regions:
     places: tuple[Place, ...]
     of: dict[int, int]
     notes: tuple[str, ...] = ()
-
-
-_PLANE = re.compile(r"ELEMENT, TYPE=(CP[SE]\d+\w*)")
 
 
 def no_solids(deck: Deck) -> InputError:
@@ -192,9 +194,6 @@ def _by_set(deck: Deck, blocks: list[CardBlock], labels: np.ndarray) -> Regions:
     return Regions(tuple(names), (None,) * count, (place,) * count, of, tuple(notes))
 
 
-ELEMENTS = 26  # bead to bead, as in the built-in radial tire
-
-
 def drawn(path: Path) -> tuple[SectionMesh, tuple[Rubber, ...], tuple[Ply, ...]]:
     """Mesh of order 2, compound of each region, cords. Raises InputError with the file's name."""
     construction = section_file.read(path)
@@ -223,10 +222,6 @@ def _rubber(construction: Construction, name: str) -> Rubber:
 def _ply(line: CordLine, mesh: SectionMesh) -> Ply:
     given = {key: value for key, value in vars(line).items() if key not in ("under", "to")}
     return Ply(sides=mesh.plies[line.name], **given)
-
-
-MERGE = 1e-6  # m
-MESHES = {".inp": abaqus.read, ".msh": gmsh.read}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -330,7 +325,7 @@ def _section(deck: Deck, ring_angles: np.ndarray | None, wishes: Wishes) -> OwnS
         notes.append(
             f"{together} nodes nearer than {wishes.merge:g} m to another are one with it (tire.merge)"
         )
-    notes += [note for one in compounds if one for note in one.notes]
+    notes += [note for compound in compounds if compound for note in compound.notes]
     return OwnSection(
         mesh=mesh,
         rubbers=tuple(compounds),
@@ -431,15 +426,15 @@ def _mass_per_area(deck: Deck, layer: CordLayer, units: Units) -> float:
 def _lines(deck: Deck, quads: Quads, edges: DeckEdges, origins: Origins, wishes: Wishes) -> dict:
     """Named lines inside the body of a Gmsh mesh, for cords of the scene."""
     faces_named = {name.upper() for names in _names(deck, wishes).values() for name in names}
-    found = {}
+    lines = {}
     for name in deck.lines:
         numbers = origins.with_parts(named_edges(deck, edges, name, "cords"))
         sides = with_origin(quads, numbers)
         if name.upper() in faces_named or len(on_outline(quads, sides)) == len(sides):
             continue
         for n, line in enumerate(strings(ends(quads, sides))[0]):
-            found[name if n == 0 else f"{name} ({n + 1})"] = forward(quads, sides[line])
-    return found
+            lines[name if n == 0 else f"{name} ({n + 1})"] = forward(quads, sides[line])
+    return lines
 
 
 def _rubbers(deck: Deck, found: Regions, units: Units, wishes: Wishes) -> list[Rubber | None]:

@@ -24,41 +24,46 @@ from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.files.disk import FACTORS, remove_factors
 from tireroad.runs.files.folder import Summary, make_folder
 from tireroad.runs.process import console
+from tireroad.runs.process.demand import check_demand, out_of_core
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.process.surroundings import factors_on_disk, forget_peak
 from tireroad.runs.scene import files
-from tireroad.runs.scene.estimate import (
-    Estimate,
-    check_demand,
-    duration,
-    estimate,
-    memory_of,
-    out_of_core,
-)
-from tireroad.runs.scene.load import with_modal
+from tireroad.runs.scene.choices import with_modal
+from tireroad.runs.scene.estimate import Estimate, duration, estimate, memory_of
 from tireroad.runs.scene.plan import meets_road, skipped
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.rules import check_road, keep, made
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.stages.accuracy import STATIC_TO_GREENS, AccuracyStage
 from tireroad.runs.stages.contact import ContactStage
+from tireroad.runs.stages.failures import failure_recorded
 from tireroad.runs.stages.greens import Responses
 from tireroad.runs.stages.response import ResponseStage
 from tireroad.runs.stages.setup import Setup
 from tireroad.runs.stages.sound import RadiationStage, SoundStage
 from tireroad.runs.stages.spectra import SpectraStage
-from tireroad.runs.stages.stage import (
-    Job,
-    PipelinePart,
-    Result,
-    Stage,
-    failure_recorded,
-    largest_memory,
-)
+from tireroad.runs.stages.stage import Job, PipelinePart, Result, Stage, largest_memory
 from tireroad.runs.stages.static import StaticStage
 from tireroad.runs.stages.stiffness import StiffnessStage
 from tireroad.runs.stages.vibration import MotionStage, VibrationStage
 from tireroad.runs.stages.whole_tire import LinesOfRun
+
+PARTS: tuple[type[PipelinePart], ...] = (
+    StaticStage,
+    RadiationStage,
+    StiffnessStage,
+    *STATIC_TO_GREENS,
+    ContactStage,
+    AccuracyStage,
+    ResponseStage,
+    SpectraStage,
+    LinesOfRun,
+    VibrationStage,
+    SoundStage,
+    MotionStage,
+)
+
+"""Each takes its inputs by name from the parts before it."""
 
 
 def share(surface: RoadKind, comm: MPI.Comm) -> None:
@@ -99,27 +104,9 @@ def _sent(road: Road | None, node: MPI.Comm) -> Road | None:
         node.Barrier()
 
 
-PARTS: tuple[type[PipelinePart], ...] = (
-    StaticStage,
-    RadiationStage,
-    StiffnessStage,
-    *STATIC_TO_GREENS,
-    ContactStage,
-    AccuracyStage,
-    ResponseStage,
-    SpectraStage,
-    LinesOfRun,
-    VibrationStage,
-    SoundStage,
-    MotionStage,
-)
-
-"""Each takes its inputs by name from the parts before it."""
-
-
 @dataclass(frozen=True)
 class Finished:
-    """What a run leaves in memory: its `job`, and the parts that are `done`, by name."""
+    """The products of a run in memory: its `job`, and the parts that are `done`, by name."""
 
     job: Job
     done: Mapping[str, Result]
@@ -195,7 +182,7 @@ def run_scene(
                 if found is not None and kind is Setup and "contact" not in reasons:
                     _ = found.product  # a road narrower than the footprint is refused before modes
     stages = on_root(comm, lambda: summary.data["stages"])
-    _check_options(petsc_options, [k for k, one in stages.items() if one["status"] == "reused"])
+    _check_options(petsc_options, [k for k, stage in stages.items() if stage["status"] == "reused"])
     peak = largest_memory(comm)
     console.say(f"memory: {peak:.2g} GB of a process at most, {needed:.2g} GB estimated")
     if "report" in reasons:
@@ -229,7 +216,7 @@ def _begun(job: Job, until: str | None) -> tuple[Summary, float, bool]:
 
 
 def _skipped(kind: type[Stage], job: Job, done, reason: str, summary: Summary) -> Result | None:
-    """What later parts receive instead of a stage that is skipped for a `reason`. Collective."""
+    """The result that later parts receive instead of a stage that is skipped for a `reason`. Collective."""
     console.say(f"{kind.name:9s} skipped: {reason}")
     on_root(job.comm, lambda: summary.record(kind.name, "skipped", reason=reason))
     return kind.if_skipped(job, done)

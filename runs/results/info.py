@@ -11,6 +11,7 @@ import numpy as np
 from tireroad.fem.errors import InputError
 from tireroad.runs.files import disk
 from tireroad.runs.files.store import verify
+from tireroad.runs.results.datasets import declared
 from tireroad.runs.scene.parts import in_lines, listed
 
 LONG = 96  # longest attribute text printed in full
@@ -50,7 +51,7 @@ def describe(file: Path, as_json: bool = False) -> str:
                 *_head(file, opened, whole),
                 *_attributes(opened),
                 *_tire(opened),
-                *_datasets(opened),
+                *_datasets(opened, file.name),
             )
             return "\n".join(_printable(line) for line in lines)
     except Exception as error:  # HDF5 and h5py raise all kinds of errors on a damaged foreign file
@@ -58,11 +59,15 @@ def describe(file: Path, as_json: bool = False) -> str:
 
 
 def _candidates(folder: Path) -> str:
-    """What to give instead of a folder."""
-    found = [str(one) for one in sorted(folder.glob("*.h5"))]
-    if not found:
+    """Files of a folder that can be given instead of it."""
+    candidates = [str(one) for one in sorted(folder.glob("*.h5"))]
+    if not candidates:
         return "it holds no .h5 file; give a result file of a run, such as static.h5"
-    return f"give a file in it, {found[0]}" if not found[1:] else f"give one of {', '.join(found)}"
+    return (
+        f"give a file in it, {candidates[0]}"
+        if not candidates[1:]
+        else f"give one of {', '.join(candidates)}"
+    )
 
 
 def _held(path: Path, file: h5py.File, checksum_is: str) -> dict:
@@ -75,6 +80,7 @@ def _held(path: Path, file: h5py.File, checksum_is: str) -> dict:
                 "shape": None if item.shape is None else list(item.shape),
                 "type": _kind(item),
                 "unit": _unit(item),
+                "meaning": _meaning(path.name, name),
                 "stored": item.id.get_storage_size(),
                 "compression": item.compression,
             }
@@ -167,23 +173,29 @@ def _scene(text: str) -> str:
     return f"{tables.get('name', 'without a name')}, {lines} lines ({names})"
 
 
-def _datasets(file: h5py.File) -> Iterator[str]:
+def _datasets(file: h5py.File, name_of_file: str) -> Iterator[str]:
     found: list[tuple[str, ...]] = []
 
     def visit(name: str, item: h5py.Group | h5py.Dataset) -> None:
         if isinstance(item, h5py.Dataset):
-            found.append((name, _shape(item), _kind(item), _unit(item), _stored(item)))
+            cells = _shape(item), _kind(item), _unit(item), _stored(item)
+            found.append((name, *cells, _meaning(name_of_file, name)))
 
     file.visititems(visit)
     yield ""
     if not found:
         yield "no datasets"
         return
-    rows = [("dataset", "shape", "type", "unit", "stored"), *found]
+    rows = [("dataset", "shape", "type", "unit", "stored", "meaning"), *found]
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     for row in rows:
         cells = (f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True))
         yield "  ".join(cells).rstrip()
+
+
+def _meaning(file: str, name: str) -> str:
+    known = declared(file, name)
+    return known.meaning if known else ""
 
 
 def _shape(dataset: h5py.Dataset) -> str:

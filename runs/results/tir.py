@@ -28,6 +28,23 @@ _NEEDS_STIFFNESS = (
     "VERTICAL_STIFFNESS, the curves of load, effective rolling radius and footprint, and the horizontal stiffnesses "
     "are left out: add [stiffness] to the scene and run it again"
 )
+_STATIC = (
+    "mass",
+    "load",
+    "deflection",
+    "inflation",
+    "rolling_radius",
+    "footprint_length",
+    "footprint_width",
+)
+_UNITS = (
+    ("LENGTH", "meter"),
+    ("FORCE", "newton"),
+    ("ANGLE", "radians"),
+    ("MASS", "kg"),
+    ("TIME", "second"),
+)
+_STIFF = "load", "vertical", "longitudinal", "lateral", "torsional"
 
 
 def written(
@@ -75,24 +92,6 @@ def written(
 
 def _shown(value: float | str) -> str:
     return f"'{value}'" if isinstance(value, str) else f"{value:.8g}"
-
-
-_STATIC = (
-    "mass",
-    "load",
-    "deflection",
-    "inflation",
-    "rolling_radius",
-    "footprint_length",
-    "footprint_width",
-)
-_UNITS = (
-    ("LENGTH", "meter"),
-    ("FORCE", "newton"),
-    ("ANGLE", "radians"),
-    ("MASS", "kg"),
-    ("TIME", "second"),
-)
 
 
 def _sections(
@@ -170,9 +169,6 @@ def _sections(
     yield "CONTACT_PATCH", patch
 
 
-_STIFF = "load", "vertical", "longitudinal", "lateral", "torsional"
-
-
 def _vertical(
     stiffness: dict[str, float], curve: dict[str, np.ndarray], radius: float
 ) -> list[Row]:
@@ -246,7 +242,7 @@ def _patch(
 
 
 class _AsRun:
-    """What the ring of a scene is made of; laws of rubber by their moduli at zero strain."""
+    """Section, compounds and cords of the ring of a scene; laws of rubber by their moduli at zero strain."""
 
     def __init__(self, scene: Scene) -> None:
         shape = scene.tire.shape

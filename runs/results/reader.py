@@ -179,14 +179,14 @@ class RunResults(Mapping[str, NDArray[Any]]):
 
 def _units(file: h5py.File) -> list[tuple[str, str]]:
     """Name and unit of every dataset."""
-    found: list[tuple[str, str]] = []
+    units: list[tuple[str, str]] = []
 
     def visit(name: str, item: h5py.Group | h5py.Dataset) -> None:
         if isinstance(item, h5py.Dataset):
-            found.append((name, str(item.attrs.get("unit", "-"))))
+            units.append((name, str(item.attrs.get("unit", "-"))))
 
     file.visititems(visit)
-    return found
+    return units
 
 
 def load(directory: str | Path) -> RunResults:

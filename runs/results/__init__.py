@@ -1,0 +1,1 @@
+"""Result folders for people and programs: reader, info, export, .tir files."""

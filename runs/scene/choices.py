@@ -1,0 +1,264 @@
+"""Choices of what a scene leaves open, in one list, `CHOICES`: by its other tables, in this order.
+
+A choice is a function of the scene so far and of what was `Given`. Those that depend on each other
+stand in the order in which they do: the mesh before the number of modes that it has.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+from tireroad.contact.choices import USABLE
+from tireroad.contact.tread.laws.elastic import ElasticTread
+from tireroad.fem.parameters import second_digit
+from tireroad.runs.scene.plan import skipped
+from tireroad.runs.scene.schema import Pitch, Source
+from tireroad.runs.scene.tables.scene import (
+    DampingTable,
+    ModalTable,
+    RoadTable,
+    Scene,
+    filled,
+    rubbed,
+)
+
+Say = Callable[[str], object]
+TIRE, MODES = frozenset({"tire"}), frozenset({"tire", "modal"})
+
+BAND_EDGE = 10**0.05  # upper edge of a third octave over its middle
+# Of the band's upper edge: damped forces are off by 3/16 (2 pi / 16)^2 = 2.9 % there, 0.25 dB; on a rough road
+# linear ones chatter.
+STEPS_A_PERIOD = 16
+SCHEME = "damped"
+LOOSER = 0.01  # rotation.shape_tolerance where errors count in dB: docs/verification/band.md
+# Points on the shortest wave, where that is closer than the nodes of a mesh lead to: within 1.2 dB of points 0.7
+# times as far apart in every third octave from 79 Hz to 1 kHz, where those at half the nodes' distance (3.8 mm) are
+# 0.6 to 3.7 dB too loud (205/60 R15 at 80 km/h on two-slope; docs/verification/band.md).
+ON_A_WAVE, CLOSE = 8.0, 4e-3  # -, m
+UNHEARD = 1.2  # times the band's upper edge: the rolling radius is not known yet
+COARSE_UP_TO = 450.0  # Hz: to there 24 segments of 16 elements carry the waves of a radial tire
+TREAD_RUBBER = (
+    1e7  # Pa: contact.youngs_modulus of a radial tire, whose own tread is taken for usual
+)
+
+
+@dataclass(frozen=True)
+class Given:
+    """The `raw` tables of a scene's file, the last stage `until`, its `source` and who is told (`say`)."""
+
+    raw: dict[str, Any]
+    until: str | None
+    source: Source
+    say: Say
+
+    def keys(self, table: str) -> dict[str, Any]:
+        """The keys of a table that the scene gives."""
+        return keys if isinstance(keys := self.raw.get(table), dict) else {}
+
+
+def by_band(scene: Scene, given: Given) -> Scene:
+    """Choose by accuracy.up_to, where a scene gives it, what it leaves open: mesh, modes, step.
+
+    A search chooses for itself. Points follow later (points).
+    """
+    tables = {name: given.keys(name) for name in ("modal", "rotation", "time", "tire")}
+    if not _by_band(scene, given):
+        return scene
+    top, chosen = BAND_EDGE * scene.accuracy.up_to, []
+    if not {"count", "up_to"} & set(tables["modal"]):
+        highest = 10.0 * math.ceil(top / USABLE / 10)
+        scene = replace(scene, modal=replace(scene.modes, up_to=highest))
+        chosen.append(f"modal.up_to = {highest:g} Hz, of which {USABLE:.0%} are an answer")
+    rotation = scene.rotation
+    if rotation and scene.joins_shapes and "shape_tolerance" not in tables["rotation"]:
+        scene = replace(scene, rotation=replace(rotation, shape_tolerance=LOOSER))
+        chosen.append(f"rotation.shape_tolerance = {LOOSER:g}")
+    assert scene.time is not None, "there is contact in time"
+    if "step" not in tables["time"]:
+        step = float(f"{1 / (STEPS_A_PERIOD * top):.2g}")
+        scene = replace(scene, time=replace(scene.time, step=step))
+        chosen.append(f"time.step = {step:g} s, {STEPS_A_PERIOD} to a period")
+    if "scheme" not in tables["time"]:
+        scene = replace(scene, time=replace(scene.time, scheme=SCHEME))
+        chosen.append(f'time.scheme = "{SCHEME}"')
+    open_mesh = not {"segments", "elements_arc"} & set(tables["tire"])
+    if scene.tire.section == "radial" and open_mesh and scene.accuracy.up_to <= COARSE_UP_TO:
+        tire = replace(scene.tire, segments=24, shape=scene.tire.shape.elements_along(16))
+        scene = replace(scene, tire=tire)
+        chosen.append(
+            "tire.segments = 24 and tire.elements_arc = 16, which carry waves to that frequency"
+        )
+    if chosen:
+        given.say(f"accuracy.up_to = {scene.accuracy.up_to:g} Hz chooses " + "; ".join(chosen))
+    return scene
+
+
+def _by_band(scene: Scene, given: Given) -> bool:
+    """Whether accuracy.up_to chooses what the scene leaves open."""
+    method = scene.rotation.method if scene.rotation else "projected"
+    stated = "up_to" in given.keys("accuracy") and method == "projected"
+    return scene.in_contact and stated and not scene.accuracy.searches
+
+
+def mesh(scene: Scene, given: Given) -> Scene:
+    """Set the mesh keys that are open; on a road, elements are smaller at the footprint."""
+    return replace(scene, tire=scene.tire.with_elements(scene.static.on_road))
+
+
+def points(scene: Scene, given: Given) -> Scene:
+    """`ON_A_WAVE` contact points on the shortest wave, where that is closer than `CLOSE`.
+
+    `contact.points = "auto"` else (contact.patch).
+    """
+    contact, rotation = scene.contact, scene.rotation
+    if not _by_band(scene, given) or "points" in given.keys("contact"):
+        return scene
+    if contact is None or contact.on_nodes or rotation is None or not rotation.speed:
+        return scene
+    speed = rotation.speed * scene.tire.proportions().outer_radius
+    wave = speed / scene.accuracy.up_to
+    if wave / ON_A_WAVE >= CLOSE:
+        return scene
+    pitch = _unheard(wave / ON_A_WAVE, speed, scene)
+    given.say(
+        f"accuracy.up_to chooses contact.points = {pitch:g} m, {wave / pitch:.2g} to the shortest wave"
+    )
+    return replace(scene, contact=replace(contact, points=Pitch(pitch, pitch)))
+
+
+def _unheard(wanted: float, speed: float, scene: Scene) -> float:
+    """The pitch (m), two digits of it, nearest to the `wanted` one whose passing is not heard.
+
+    Points pass at speed / pitch; that and its harmonics, sampled by the steps, must not return inside
+    the band, neither in the run nor in its companions with twice the step and twice the pitch.
+    """
+    digit = second_digit(wanted)
+    first, top = math.floor(wanted / digit), UNHEARD * BAND_EDGE * scene.accuracy.up_to
+    steps = scene.time.step if scene.time else "auto"
+    if isinstance(steps, str):
+        return round(first * digit, 9)
+    rates = 1 / steps, 0.5 / steps
+
+    def heard(pitch: float) -> bool:
+        passing = (k * speed / pitch for k in (0.5, 1.0, 1.5, 2.0, 3.0))
+        return any(abs(f - rate * round(f / rate)) < top for f in passing for rate in rates)
+
+    tried = sorted(range(max(first // 2, 1), 2 * first), key=lambda count: abs(count - first))
+    count = next((count for count in tried if not heard(count * digit)), first)
+    return round(count * digit, 9)
+
+
+def tread_rubber(scene: Scene, given: Given) -> Scene:
+    """Rubber of the contact of a radial tire where the scene leaves it open: as much stiffer as its tread."""
+    contact, stiffer = scene.contact, scene.tire.shape.tread_over_own(scene.tire)
+    if contact is None or stiffer is None or "youngs_modulus" in given.keys("contact"):
+        return scene
+    if not isinstance(contact.law, ElasticTread):
+        return scene
+    modulus = float(f"{TREAD_RUBBER * stiffer:.6g}")
+    times = (
+        f", {stiffer:.4g} times that of a usual tread as the tire's own is" if stiffer != 1 else ""
+    )
+    given.say(f"contact.youngs_modulus = {modulus:g} Pa, of tread rubber{times}")
+    return replace(
+        scene, contact=replace(contact, law=replace(contact.law, youngs_modulus=modulus))
+    )
+
+
+def wheel_speed(scene: Scene, given: Given) -> Scene:
+    """Set the wheel's speed for a travel speed until the static state gives its rolling radius."""
+    rotation = scene.rotation
+    if rotation is None or rotation.travel_speed is None:
+        return scene
+    speed = rotation.travel_speed / (
+        rotation.rolling_radius or scene.tire.proportions().outer_radius
+    )
+    return replace(scene, rotation=replace(rotation, speed=speed))
+
+
+def damping(scene: Scene, given: Given) -> Scene:
+    """Set the default proportional damping if neither it nor a compound's loss factor is given."""
+    loses = scene.tire.shape.has_losses(scene.tire)
+    return replace(scene, damping=DampingTable()) if scene.damping is None and not loses else scene
+
+
+def flat_road(scene: Scene, given: Given) -> Scene:
+    """Set a flat road where there is contact with none given."""
+    if scene.contact is None or scene.road is not None:
+        return scene
+    given.say("no [road]: it is flat")
+    return replace(scene, road=RoadTable())
+
+
+def outputs(scene: Scene, given: Given) -> Scene:
+    """Leave out what is asked of driven points where there are none."""
+    kept = tuple(one for one in scene.output.kinds if scene.force or one[1].of != "points")
+    if len(kept) == len(scene.output.kinds):
+        return scene
+    lost = [f"output.{name}" for name, kind in scene.output.kinds if (name, kind) not in kept]
+    given.say(f"no [[force]], hence no driven points: {', '.join(lost)} left out")
+    return replace(scene, output=replace(scene.output, kinds=kept))
+
+
+def with_modal(scene: Scene, until: str | None) -> Scene:
+    """Set the default [modal] where something needs modes, or the run is to end with them."""
+    needed = scene.contact, scene.force, scene.rotation, scene.axle.kind != "fixed"
+    if scene.modal is None and (any(needed) or until in ("modes", "rotating")):
+        return replace(scene, modal=ModalTable())
+    return scene
+
+
+def count_of_modes(scene: Scene, given: Given) -> Scene:
+    """Fit the default number of modes to the mesh; note a given one that the mesh does not have.
+
+    A given number is judged only if the modes will be computed.
+    """
+    modal = scene.modal
+    if modal is None or modal.up_to is not None:
+        return scene
+    count, free = modal.count, scene.tire.free_unknowns()
+    if count < free:
+        return scene
+    if "count" not in given.keys("modal"):
+        given.say(
+            f"modal.count is {free - 1}, all the modes that the mesh has, not {count} as by default"
+        )
+        return replace(scene, modal=replace(modal, count=free - 1))
+    if "modes" not in skipped(scene, given.until):
+        text = f"= {count} must be less than the {free} free unknowns of the mesh"
+        given.source.add(("modal", "count"), text)
+    return scene
+
+
+class Choice(NamedTuple):
+    """A choice, left out where one of the tables it is made `by` is wrong."""
+
+    make: Callable[[Scene, Given], Scene]
+    by: frozenset[str] = frozenset()
+
+
+CHOICES = (
+    Choice(lambda scene, given: filled(scene)),  # air in the cavity
+    Choice(lambda scene, given: rubbed(scene)),  # friction where the tread shears
+    Choice(by_band),
+    Choice(mesh),
+    Choice(damping, TIRE),
+    Choice(tread_rubber, TIRE),
+    Choice(wheel_speed, TIRE),
+    Choice(points, TIRE),
+    Choice(flat_road),
+    Choice(outputs),
+    Choice(lambda scene, given: with_modal(scene, given.until)),
+    Choice(count_of_modes, MODES),
+)
+
+
+def chosen(scene: Scene, given: Given) -> Scene:
+    """The scene with everything chosen that it leaves open."""
+    for choice in CHOICES:
+        if not choice.by & given.source.broken():
+            scene = choice.make(scene, given)
+    return scene
