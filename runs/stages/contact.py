@@ -651,10 +651,10 @@ class ContactStage(Stage[ContactHistory]):
         loop = make_loop(spec, setup, tire, step)
         limit = loop.contact.largest_unique
         if limit is not None:
-            record.indicators["friction up to which a step has one answer"] = (limit, "-")
-            record.warnings += [
-                text for text in beyond_unique(spec.friction, limit) if text not in record.warnings
-            ]
+            record.indicators["friction up to which a step is known to have one solution"] = (
+                limit,
+                "-",
+            )
         return loop
 
     def _steps(self, setup, loop: Loop, file: ContactFile, totals, losses, chosen) -> None:
@@ -683,13 +683,3 @@ class ContactStage(Stage[ContactHistory]):
     def read(self, file) -> ContactHistory:
         """The totals over time, without the single points."""
         return ContactHistory.of(file)
-
-
-def beyond_unique(friction: float | None, limit: float) -> list[str]:
-    """A warning if slipping points may leave a step with more than one solution."""
-    if friction is None or friction <= limit:
-        return []
-    return [
-        f"contact.friction = {friction:g} is more than {limit:.3g}, up to which the solution of a step is "
-        "known to be unique: where points slip there may be others; lower it, or take a softer tread"
-    ]

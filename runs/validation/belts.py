@@ -52,6 +52,7 @@ count = {modes}
 [contact]
 points = "nodes"
 youngs_modulus = 1e7
+friction = 0.0
 [road]
 {road}
 [time]

@@ -33,6 +33,7 @@ speed = 50.0
 [contact]
 points = "nodes"
 youngs_modulus = 1e7
+friction = 0.0
 reach = 0.02
 [road]
 kind = "sine"
@@ -112,6 +113,7 @@ locked = []
 [contact]
 points = "nodes"
 youngs_modulus = 1e7
+friction = 0.0
 [road]
 {road}
 [time]

@@ -50,10 +50,8 @@ def run() -> list[Table]:
 
 def scene_of(road: str, mesh: dict[str, int] | None = None, duration: float = DURATION) -> str:
     """The scene of `validate rolling` on this road, without friction: large motions begin at the static state."""
-    scene = SCENE.format(road=road, modes=60, **(mesh or MESH))
-    return scene.replace("duration = 0.1", f"duration = {duration:g}").replace(
-        "[contact]", "[contact]\nfriction = 0.0"
-    )
+    scene = SCENE.format(road=road, modes=60, friction=0.0, **(mesh or MESH))
+    return scene.replace("duration = 0.1", f"duration = {duration:g}")
 
 
 def beside(tires: Tires) -> tuple[float, ...]:

@@ -31,6 +31,7 @@ count = {modes}
 [contact]
 points = "nodes"
 youngs_modulus = 1e7
+friction = 0.0
 [road]
 kind = "flat"
 motion = {{ kind = "sine", amplitude = {amplitude}, frequency = 50.0 }}

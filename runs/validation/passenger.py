@@ -34,6 +34,7 @@ speed = 71.9
 [contact]
 points = {{ dx = 0.005, dy = 0.005 }}
 youngs_modulus = 1e7
+friction = 0.0
 [road]
 kind = "two-slope"
 longest_wave = 0.5

@@ -35,6 +35,7 @@ count = {modes}
 [contact]
 points = "nodes"
 youngs_modulus = 1e7
+friction = {friction:g}
 [road]
 {road}
 [time]
@@ -92,7 +93,8 @@ def _run(mesh: dict[str, int], steps: Sequence[float], roads: dict[str, str]) ->
     tables, rows, apart = [], [], []
     with tempfile.TemporaryDirectory() as folder:
         scenes = {
-            name: SCENE.format(road=road, modes=modes, **mesh) for name, road in roads.items()
+            name: SCENE.format(road=road, modes=modes, friction=1.0, **mesh)
+            for name, road in roads.items()
         }
         tires = Tires(next(iter(scenes.values())), Path(folder))
         for name, scene in scenes.items():

@@ -39,7 +39,7 @@ def tables(mesh: dict[str, int], residuals, steps, finest: float) -> list[Table]
     with tempfile.TemporaryDirectory() as folder:
         tires = None
         for tread in TREADS:
-            scene = SCENE.format(road=ROADS[ROAD], **mesh)
+            scene = SCENE.format(road=ROADS[ROAD], friction=0.0, **mesh)
             scene = scene.replace("youngs_modulus = 1e7", f"youngs_modulus = {tread:g}")
             tires = tires or Tires(scene, Path(folder))
             tires.change(scene)
