@@ -51,6 +51,7 @@ residual = "{residual}"
 [contact]
 points = {{ dx = {pitch}, dy = {pitch} }}
 youngs_modulus = 1e7
+friction = 0.0
 [road]
 {road}
 [time]
