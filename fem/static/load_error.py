@@ -27,7 +27,8 @@ from tireroad.fem.sections import mesh2d
 from tireroad.fem.sections.mesh2d import Ring, SectionMesh
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.footprint import Footprint, footprint, nodal_area
-from tireroad.fem.static.load_steps import LoadStepper, balance_near, cords_strained
+from tireroad.fem.static.load_steps import LoadStepper
+from tireroad.fem.static.restart import balance_near, cords_strained
 from tireroad.fem.static.state import StaticState, static_state
 from tireroad.fem.static.symmetric import HalfModelEquilibrium, looks_the_same
 from tireroad.fem.static.virtual_work import Rolling

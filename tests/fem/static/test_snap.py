@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from tireroad.fem.static import load_steps
+from tireroad.fem.static import restart
 from tireroad.fem.static.equilibrium import Equilibrium, SolveOutcome
 from tireroad.fem.static.load_steps import LoadStepper, Show, march
 from tireroad.fem.tire.material import compound
@@ -26,7 +26,7 @@ def loader(make_body):
 def test_falls_to_the_state_that_small_steps_find(loader):
     """One shape carries this load, and no drag is left in it."""
     problem, start = loader.equilibrium, loader.body.u.x.array.copy()
-    fallen = load_steps.pseudo_transient(problem, loader.touch + DEEP)
+    fallen = restart.pseudo_transient(problem, loader.touch + DEEP)
     assert fallen.converged and problem.springs is None
     found, force = loader.body.u.x.array.copy(), problem.load()
     loader.body.u.x.array[:] = start
@@ -43,8 +43,8 @@ def test_what_does_not_come_to_rest_is_put_back(loader, monkeypatch):
     problem = loader.equilibrium
     loader.deflect(0.005)
     before, force, height = loader.body.u.x.array.copy(), problem.load(), problem.road_height
-    monkeypatch.setattr(load_steps, "_MOST_FALLS", 3)
-    fallen = load_steps.pseudo_transient(problem, loader.touch + DEEP)
+    monkeypatch.setattr(restart, "_MOST_FALLS", 3)
+    fallen = restart.pseudo_transient(problem, loader.touch + DEEP)
     assert not fallen.converged and "pseudo-transient continuation" in fallen.reason
     assert problem.springs is None and problem.road_height == problem.road.height == height
     assert problem.load() == force
