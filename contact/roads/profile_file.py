@@ -22,6 +22,7 @@ from tireroad.contact.roads.meaning import (
     Layout,
     ReadAs,
     Scale,
+    check_flags,
     check_late,
     downwards_note,
     layout_of,
@@ -45,6 +46,7 @@ Array = NDArray[np.float64]
 _FEWEST = 3  # heights
 _BLOCK = 65536  # lines read at a time
 _MOST_COLUMNS = 8
+_SAME = 0.02  # of a distance between heights that is stated twice
 _SAMPLE = 400  # lines that tell how x is rounded
 HEIGHTS, LENGTHS = "mm", "mm"  # assumed where neither file nor scene says
 
@@ -93,7 +95,9 @@ def read_profile(path: Path, source: str, given: Given = Given()) -> Profile:
                 raise InputError(f"{source}: none of the {count} heights is a number")
             raise InputError(f"{source}: {_no_rows(rows)}")
         data = check_late(
-            chain((line for line in head if line.number >= layout.first), lines), source
+            chain((line for line in head if line.number >= layout.first), lines),
+            source,
+            alone=layout.width == 1,
         )
         table, numbers, odd = _table(path, data, layout, source)
     if len(table) < _FEWEST:
@@ -145,6 +149,8 @@ def _profile(
 ) -> Profile:
     """Columns, units and missing heights of a table."""
     at, z, notes = _columns(table, layout, given, source)
+    for k in layout.of("other"):
+        check_flags(layout.columns[k], table[:, k], source)
     notes += downwards_note(layout.columns[z].title)
     stated = layout.stated
     height = scale_of("z", layout.columns[z], stated, ("height_unit", given.height_unit), source)
@@ -184,6 +190,11 @@ def _profile(
         notes += more
         x, rounding = along.metres * place, along.metres * rounding
         step = (place[-1] - place[0]) / max(len(place) - 1, 1)
+        if given.pitch and abs(along.metres * step / given.pitch - 1) > _SAME:
+            raise InputError(
+                f"{source}: heights are every {1e3 * along.metres * step:.4g} mm by {_place(layout, at)}, in {along.text}, and "
+                f"road.pitch = {given.pitch:g} m: take the key out, or say road.length_unit"
+            )
         readings.append(
             ReadAs("x", _place(layout, at), along.text, f"every {step:.4g} of the file")
         )
@@ -275,6 +286,9 @@ def _columns(
         return None, 0, []
     if width == 3 and _is_count(table[:, 0]):
         return _ordered(table, columns, (1, 2), ["the first column counts the lines"])
+    unsaid = not given.length_unit and not layout.stated.units
+    if width == 2 and given.pitch and unsaid and _consecutive(table[:, 0]):
+        return None, 1, ["the first column counts the heights"]
     if width == 2:
         return _ordered(table, columns, (0, 1), [])
     raise _many(table, "", source)
@@ -319,7 +333,7 @@ def _by_headings(
     counts = [k for k in layout.of("count") if _consecutive(table[:, k])]
     unknown = [k for k in range(width) if columns[k].role == ""]
     if z and not x and width == 2:  # whatever it is called, it counts
-        counts += [k for k in unknown if _is_count(table[:, k]) and columns[k].unit is None]
+        counts += [k for k in unknown if _consecutive(table[:, k]) and columns[k].unit is None]
         unknown = [k for k in unknown if k not in counts]
     if width == 1:
         if columns[0].role in ("x", "time", "other"):

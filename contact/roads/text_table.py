@@ -21,8 +21,8 @@ from tireroad.fem.errors import InputError
 
 # What programs print instead of a number that they do not have; 1.#QNAN is of older Windows.
 MISSING = re.compile(
-    r"[+-]?(?:nan(?:\(\w*\))?|n/?a|<na>|null|none|missing|void|inf(?:inity)?|\d*[.,]?#(?:q?nan|snan|ind|inf)\w*|#n/?a|#nv"
-    r"|\*+|-+|\?+)?",
+    r"[+-]?(?:nan(?:\(\w*\))?|n/?a|<na>|null|none|missing|void|inf(?:inity)?|\d*[.,]?#(?:q?nan|snan|ind|inf)\w*"
+    r"|#(?:n/?a|nv|(?:num|wert|value|ref|bezug|div/0|name|null|zahl)[!?])|\*+|-+|\?+)?",
     re.IGNORECASE,
 )
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?")
@@ -165,8 +165,10 @@ def lines_of(stream: TextIO, source: str) -> Iterator[Line]:
                 )
             text = line.translate(_TYPED).strip(" \r\n\f\v")
             mark = next((mark for mark in COMMENTS if text.lstrip().startswith(mark)), None)
-            # "#" alone over a column is a heading: #;x;z
-            if mark == "#" and re.match(r"#\s*[;\t,]", text):
+            # "#" alone over a column is a heading: #;x;z; #N/A is no height.
+            if mark == "#" and (
+                re.match(r"#\s*[;\t,]", text) or MISSING.fullmatch(re.split(r"[;,\t ]", text)[0])
+            ):
                 mark = None
             if mark:
                 yield Line(number, text.lstrip().lstrip("#%/!").strip(), True)
@@ -178,10 +180,10 @@ def lines_of(stream: TextIO, source: str) -> Iterator[Line]:
 
 
 def _bare(line: str) -> str:
-    """Without a comment at its end; `#` within a word or at the end of a heading (Sample #, z) is part of that."""
+    """Numbers without a comment at their end; in a heading (Sample #, z) `#` is part of it."""
     if "#" not in line and "//" not in line:
         return line
-    return re.sub(r"\s+(?:#(?!\s*(?:[;,\t|]|$))|//).*$", "", line)
+    return re.sub(r"^([^A-Za-z]*(?:\d|nan)[^#/]*?)\s+(?:#|//).*$", r"\1", line, flags=re.IGNORECASE)
 
 
 def quoted(text: str, separator: str) -> list[str]:
@@ -286,6 +288,7 @@ def numbers_of(lines: Sequence[Line], form: Form, width: int, source: str) -> ND
     return table
 
 
+_COUNTED = 64  # lines of a block: where trailing zeros are dropped, one in ten has fewer decimals
 _INTEGER_OR_FIXED = re.compile(r"[+-]?\d*(?:[.,](\d*))?$")
 
 
@@ -303,7 +306,7 @@ class Decimals:
         self, lines: Sequence[Line], form: Form, table: NDArray[np.float64], columns: Sequence[int]
     ) -> None:
         """Count in a block of rows `table` (lines, width), of its columns that hold heights."""
-        few = range(0, len(lines), -(-len(lines) // 16))
+        few = range(0, len(lines), -(-len(lines) // _COUNTED))
         z = table[:, list(columns)]
         marked = special(z)
         rows = np.flatnonzero(marked.any(axis=1))
@@ -327,5 +330,7 @@ class Decimals:
             return []
         (digits,) = self.usual
         return sorted(
-            value for value, of in self.odd.items() if sum(of.values()) - of.get(digits, 0) > 1
+            value + 0.0
+            for value, of in self.odd.items()
+            if sum(of.values()) - of.get(digits, 0) > 1
         )
