@@ -169,6 +169,7 @@ def _list(file: Path, head: list[Line], lines: Iterator[Line], layout: Layout, k
         blocks.append(table[:, at])
         count += len(block)
         check_count(file, count)
+    decimals.check(source)
     x, y, z = _points(file, np.concatenate(blocks))
     columns = [layout.columns[k] for k in at]
     scales = keys.scales(columns, layout.stated, source)
@@ -236,6 +237,7 @@ def _matrix(
             spool.add(table[:, left + 1 :])
     if count < 2:
         raise InputError(f"{source}: {count + 1} lines of data, at least 3 are needed")
+    decimals.check(source)
     x = np.concatenate(positions)
     titles = _corner(corner, keys, layout.stated, source)
     scales = keys.scales(titles, layout.stated, source)

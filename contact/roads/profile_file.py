@@ -99,10 +99,10 @@ def read_profile(path: Path, source: str, given: Given = Given()) -> Profile:
             source,
             alone=layout.width == 1,
         )
-        table, numbers, odd = _table(path, data, layout, source)
+        table, numbers, decimals = _table(path, data, layout, source)
     if len(table) < _FEWEST:
         raise InputError(f"{source}: only {len(table)} heights: too few for a road")
-    return _profile(table, numbers, odd, layout, rows, given, source)
+    return _profile(table, numbers, decimals, layout, rows, given, source)
 
 
 def _no_rows(rows: Sequence[Line]) -> str:
@@ -122,8 +122,8 @@ def _no_rows(rows: Sequence[Line]) -> str:
 
 def _table(
     path: Path, data: Iterator[Line], layout: Layout, source: str
-) -> tuple[Array, NDArray[np.intp], list[list[float]]]:
-    """All rows, their lines, and of each column numbers that are written otherwise than the rest."""
+) -> tuple[Array, NDArray[np.intp], list[Decimals]]:
+    """All rows, their lines, and of each column how its numbers are written."""
     blocks: list[Array] = []
     decimals = [Decimals() for _ in range(layout.width)]
     numbers: list[int] = []
@@ -135,13 +135,13 @@ def _table(
         check_count(path, len(numbers))
     if not blocks:
         return np.empty((0, layout.width)), np.empty(0, dtype=int), []
-    return np.concatenate(blocks), np.array(numbers), [one.codes() for one in decimals]
+    return np.concatenate(blocks), np.array(numbers), decimals
 
 
 def _profile(
     table: Array,
     numbers: NDArray[np.intp],
-    odd: list[list[float]],
+    decimals: list[Decimals],
     layout: Layout,
     rows: list[Line],
     given: Given,
@@ -151,6 +151,7 @@ def _profile(
     at, z, notes = _columns(table, layout, given, source)
     for k in layout.of("other"):
         check_flags(layout.columns[k], table[:, k], source)
+    decimals[z].check(source)
     notes += downwards_note(layout.columns[z].title)
     stated = layout.stated
     height = scale_of("z", layout.columns[z], stated, ("height_unit", given.height_unit), source)
@@ -169,7 +170,9 @@ def _profile(
     heights[gone] = np.nan
     if given.missing is None or len(given.missing):
         found = codes(heights[None, :], up.metres)
-        found += [code for code in odd[z] if code not in found and (heights == code).any()]
+        found += [
+            code for code in decimals[z].codes() if code not in found and (heights == code).any()
+        ]
         if found:
             same = np.isin(heights, found)
             where = f"in line {numbers[np.flatnonzero(same)[0]]}"

@@ -300,6 +300,7 @@ class Decimals:
     """
 
     usual: dict[int, int] = field(default_factory=dict)
+    sizes: dict[int, list[float]] = field(default_factory=dict)  # smallest and largest magnitude
     odd: dict[float, dict[int, int]] = field(default_factory=dict)
 
     def count(
@@ -323,6 +324,18 @@ class Decimals:
                     of[digits] = of.get(digits, 0) + 1
                 elif row in few:
                     self.usual[digits] = self.usual.get(digits, 0) + 1
+                    least, most = self.sizes.get(digits, (np.inf, 0.0))
+                    self.sizes[digits] = [min(least, abs(value)), max(most, abs(value))]
+
+    def check(self, source: str) -> None:
+        """InputError where heights are whole numbers below 1000 or have three decimals: 5.003 may mean 5003."""
+        if set(self.usual) == {0, 3} and min(self.usual.values()) > 2:
+            whole, parted = self.sizes[0], self.sizes[3]
+            if 100 <= whole[1] < 1000 and 1 <= parted[0] <= parted[1] < 0.2 * whole[1]:
+                raise InputError(
+                    f"{source}: heights are whole numbers up to {whole[1]:g} and numbers with three decimals from {parted[0]:.3f} "
+                    "on: do points or commas part thousands? Write the numbers without them"
+                )
 
     def codes(self) -> list[float]:
         """Special numbers that are written with other decimals than the heights, which have all the same."""
