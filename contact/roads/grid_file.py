@@ -26,6 +26,7 @@ from tireroad.contact.roads.grid import (
     Rows,
     Spool,
     check_count,
+    pieces,
 )
 from tireroad.contact.roads.grid_text import Found, Keys, read_csv
 from tireroad.contact.roads.meaning import (
@@ -779,9 +780,7 @@ def _grid(
             (
                 "",
                 "",
-                f"no height: {', '.join(f'{one:g}' for one in coding.missing)}"
-                if coding.missing
-                else "",
+                _gaps(rows, coding.missing),
             ),
             strict=True,
         )
@@ -792,6 +791,23 @@ def _grid(
         *([f"{' and '.join(unsaid)} in {ASSUMED}: assumed"] if unsaid else []),
     )
     return grid
+
+
+COUNTED = 10_000_000  # heights of a file of which the missing ones are counted for the log
+
+
+def _gaps(rows: Rows, missing: tuple[float, ...]) -> str:
+    """How many heights are missing, where they are few enough to be counted, and the numbers that say so."""
+    named = f"no height: {', '.join(f'{one:g}' for one in missing)}" if missing else ""
+    total = rows.shape[0] * rows.shape[1]
+    if total > COUNTED:
+        return named
+    gone = sum(int(np.isnan(part).sum()) for _, part in pieces(rows))
+    return (
+        f"{gone} of {total} missing" + (f" ({named})" if named else "")
+        if gone or named
+        else "none missing"
+    )
 
 
 def counted(axis: Array) -> bool:

@@ -179,6 +179,11 @@ def _list(file: Path, head: list[Line], lines: Iterator[Line], layout: Layout, k
         if layout.headed
         else ("three columns without headings: x, y, height assumed",)
     )
+    others = [
+        f'column {k + 1} "{one.title}"' for k, one in enumerate(layout.columns) if k not in at
+    ]
+    if others:
+        notes = (*notes, f"not used of the file: {', '.join(others)}")
     return Found(
         x,
         y,

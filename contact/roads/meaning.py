@@ -38,14 +38,17 @@ _METRES = re.compile(
 _PREFIXES = 1e3, 0.1, 1e-2, 1e-3, 1e-6, 1e-9
 
 
+def _without_accents(text: str) -> str:
+    return "".join(
+        one for one in unicodedata.normalize("NFD", text) if not unicodedata.combining(one)
+    )
+
+
 def _metres(word: str) -> float | None:
     """Metres of a unit of length in lower case; None where it is none."""
     if word in _LENGTHS:
         return _LENGTHS[word]
-    bare = "".join(
-        one for one in unicodedata.normalize("NFD", word) if not unicodedata.combining(one)
-    )
-    match = _METRES.fullmatch(bare)
+    match = _METRES.fullmatch(_without_accents(word))
     if match is None:
         return None
     return next((size for size, part in zip(_PREFIXES, match.groups(), strict=True) if part), 1.0)
@@ -266,8 +269,8 @@ def _unit_words(name: str) -> list[str]:
         word for word in words[1:] if word == "m"
     ]
     spelled = re.search(
-        r"(?:kilo|de[cz]i|[czs]enti|mill?i|mi[ck]ro|nano)[- ]?m[eèéê]t\w*|\d\s*m\b",
-        name,
+        r"(?:kilo|de[cz]i|[czs]enti|mill?i|mi[ck]ro|nano)[- ]?met\w*|mi[ck]rons?$|\d\s*m\b",
+        _without_accents(name),
         re.IGNORECASE,
     )
     spelled = spelled or re.search(r"(?<=[a-zà-ÿ])[mcdnkμ]m\.?$", name)
@@ -285,7 +288,7 @@ def _without_unit(plain: str) -> tuple[str, list[Unit], list[str]]:
     for mark in _PARTED.finditer(plain):
         name, tail = plain[: mark.start()], plain[mark.end() :]
         unit, sign = unit_of(tail), mark[0].strip()
-        if not name:
+        if not name or (tail in ("'", "''", '"') and re.search("[\"']", name)):  # quotation marks
             continue
         # x_s and n h are names, x, s is a time; Profile 10 mm may be the tenth, in 0.1 mm is a unit.
         if unit and (unit.metres or sign in (",", "/", ":", ";", "|")):

@@ -207,6 +207,8 @@ def _profile(
             notes.append(f"{', '.join(unsaid)}: assumed")
     elif up.assumed:
         notes.append(f"heights in {HEIGHTS}: assumed")
+    if others := [_place(layout, k) for k in range(layout.width) if k not in (at, z)]:
+        notes.append(f"not used of the file: {', '.join(others)}")
     pitch = _stated_pitch(layout, given, at, source)
     if layout.form.comma:
         notes.append("decimal commas")
