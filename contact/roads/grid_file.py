@@ -221,7 +221,8 @@ class _Meaning:
     down: bool = False  # heights are positive downwards
     texts: dict[str, tuple[str, str]] = field(default_factory=dict)  # that mention a unit
     notes: list[str] = field(default_factory=list)
-    unread: dict[str, float] = field(default_factory=dict)  # numbers beside z that may be factors
+    # Numbers that may be factors, by array.
+    unread: dict[str, dict[str, float]] = field(default_factory=dict)
 
     def take(self, whose: str, name: str, value: Any, source: str) -> bool:
         """Take the attribute or entry `name` of the array `whose` ("" for all); False where it says nothing that is known."""
@@ -261,8 +262,8 @@ class _Meaning:
                 f"{source}: {where} = {numbers[0]:g} may be added to heights, and is not known: apply it, or name it add_offset"
             )
         else:
-            if whose in ("", "z") and numbers.size == 1 and numbers[0] % 1.0:
-                self.unread[where] = float(numbers[0])
+            if numbers.size == 1 and numbers[0] % 1.0:
+                self.unread.setdefault(whose, {})[where] = float(numbers[0])
             return False
         return True
 
@@ -313,8 +314,11 @@ class _Meaning:
 
     def check_numbers(self, kind: np.dtype, source: str) -> None:
         """InputError where heights are whole numbers, and a number beside them that may be their factor is not read."""
-        if kind.kind in "iu" and self.unread:
-            name, value = next(iter(self.unread.items()))
+        left = self.unread.get("z", {})
+        if "scale" not in self.codes["z"]:
+            left = {**left, **self.unread.get("", {})}
+        if kind.kind in "iu" and left:
+            name, value = next(iter(left.items()))
             raise InputError(
                 f"{source}: heights are whole numbers, and {name} = {value:g} may be their factor: apply it, name it scale_factor, "
                 "or leave it out"

@@ -515,8 +515,8 @@ def _are_titles(found: Sequence[Column], line: Line, width: int) -> bool:
         return False  # Length 12 m, Speed: 30
     if any(NUMBER.fullmatch(title) for title in titles) and titles[0]:
         return False  # Position;12.5
-    if any(column.title in _WITHIN for column in found):
-        return False  # x in mm and z in um
+    if any(column.title in _WITHIN or column.title.endswith((":", "=")) for column in found):
+        return False  # x in mm and z in um; date: 2021-05-03
     if _UNIT_WORD.search(line.text) and not _BRACKETED.search(line.text):
         return False
     if _STEP.search(line.text) or _SCALE.search(line.text) or _code_in(line.text) is not None:
