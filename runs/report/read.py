@@ -30,7 +30,7 @@ def quantity(value: object, unit: str = "") -> str:
     if value is None:
         return "–"
     if isinstance(value, (list, tuple)):
-        return ", ".join(quantity(part, unit) for part in value)
+        return ", ".join(quantity(part, unit) for part in value) or "–"
     if not isinstance(value, (int, float)):
         return f"{value} {shown_unit(unit)}".rstrip()
     factor, symbol = _prefix(value, unit)
