@@ -182,17 +182,24 @@ def _repeated(z: Array, values: Array, counts: NDArray[np.intp]) -> list[float]:
     for k in np.flatnonzero(inner):
         near = np.r_[max(0, k - _NEAR) : k, k + 1 : min(k + 1 + _NEAR, len(values))]
         expected = counts[near].sum() * quantum / (values[near[-1]] - values[near[0]])
+        if not _unlikely(int(counts[k]), expected, int(counts[near].max())):
+            continue
         _, beside, inside = _runs(z, float(values[k]))
         count = int(inside.sum())
-        if len(inside) < 2 or inside.max() > _SHORT or count <= counts[near].max():
+        if len(inside) < 2 or inside.max() > _SHORT:
             continue
-        improbable = count * np.log(expected) - math.lgamma(count + 1) < _IMPROBABLE
+        improbable = _unlikely(count, expected, int(counts[near].max()))
         # Rough heights have jumps of their own, but no runs.
         runs = (inside > 1).sum() > 1 and count > _OFTEN * counts[near].max()
         least = _IN_RUNS if runs else _STANDS_OUT
         if improbable and np.median(np.abs(beside - values[k])) > least * usual:
             found.append(float(values[k]))
     return found
+
+
+def _unlikely(count: int, expected: float, usual: int) -> bool:
+    """Whether a height is there more often than those near it, and than chance makes (Poisson) where `expected` are."""
+    return count > usual and count * math.log(expected) - math.lgamma(count + 1) < _IMPROBABLE
 
 
 def _quantum(values: Array) -> float:
