@@ -71,7 +71,7 @@ def explain(scene: Scene, processes: int = 1, until: str | None = None) -> str:
         )
     described = [*scene.tire.shape.described(scene.tire), *(remarks(scene) if on_road else [])]
     lines += ["", *described] if described else []
-    read = files.table(scene, until)
+    read = files.table(files.read_of(scene, until))
     lines += ["", *read] if read else []
     if scene.accuracy.searches:
         lines += ["", *bounds(scene)]

@@ -48,6 +48,7 @@ from tireroad.fem.sections.radial import radial, size
 from tireroad.runs.factors import PARAMETERS, PLAUSIBLE, SCALED, construction
 from tireroad.runs.files.names import scene_name
 from tireroad.runs.process import console
+from tireroad.runs.scene import files
 
 LOADS, PRINTS = 0.03, 0.05  # relative tolerance of the load at a deflection, of a footprint's sizes
 ALIKE = 4  # points of a curve from which on their errors are one another's
@@ -821,9 +822,41 @@ def _factor_row(found: Fitted, name: str) -> tuple[str, ...]:
     return f"  {name}", f"{value:.3f}", known, f"{one.doc}{ending}"
 
 
+def read_of(figures: FitFigures, path: Path, changes: Sequence[str] = ()) -> list[files.Row]:
+    """What was read of a file of figures as what, by the head of the table of a run's files."""
+    tir = path.suffix.lower() == ".tir"
+    found: list[tuple[str, str, str, str]] = [
+        ("size", "[DIMENSION]" if tir else "size", "", figures.size),
+        (
+            "inflation",
+            "INFLPRES, IP or NOMPRES" if tir else "inflation",
+            "Pa",
+            f"{figures.inflation:g}",
+        ),
+        ("load", "FNOMIN" if tir else "load", "N", f"{figures.load:g}"),
+    ]
+    for name, value in figures.values.items():
+        key = (KINDS[name].tir or "Q_RA1 to Q_RB2, FNOMIN, VERTICAL_STIFFNESS") if tir else name
+        found.append((name, key, KINDS[name].unit, f"{value:g}"))
+    for name, rows, unit in (
+        ("loads", figures.loads, "m, N"),
+        ("footprints", figures.footprints, "N, m, m"),
+    ):
+        if rows:
+            found.append((name, f"[{_CURVE}]" if tir else name, unit, f"{len(rows)} rows"))
+    given = {change.partition("=")[0].strip() for change in changes}
+    rows_of = [
+        (path.name, name, "--set" if name in given else key, unit, text)
+        for name, key, unit, text in found
+    ]
+    return [*rows_of, *((path.name, "remark", "", "", note) for note in figures.notes)]
+
+
 def command(path: Path, out: Path, changes: Sequence[str] = ()) -> str:
     """Fit the figures in a file; writes out/scene.toml. Returns what to print."""
     figures = read(path, changes)
+    for line in files.table(read_of(figures, path, changes)):
+        console.say(line)
     try:
         found = fit(figures)
     except ConvergenceError as error:

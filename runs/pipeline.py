@@ -205,7 +205,9 @@ def _begun(job: Job, until: str | None) -> tuple[Summary, float, bool]:
         share(scene.road.surface, comm)
         on_root(comm, lambda: check_road(scene))
     if scene.road is not None or scene.pattern is not None or scene.tire.section == "file":
-        for line in on_root(comm, lambda: files.table(scene, until)):
+        read = on_root(comm, lambda: files.read_of(scene, until))
+        on_root(comm, lambda: summary.note_files(read))
+        for line in files.table(read):
             console.say(line)
     wanted = on_root(comm, lambda: estimate(scene, until))  # may read the road's file
     on_disk = on_root(comm, lambda: out_of_core(wanted, comm.size))

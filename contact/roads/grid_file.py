@@ -26,6 +26,7 @@ from tireroad.contact.roads.grid import (
     Rows,
     Spool,
     check_count,
+    pieces,
 )
 from tireroad.contact.roads.grid_text import Found, Keys, read_csv
 from tireroad.contact.roads.meaning import (
@@ -36,6 +37,7 @@ from tireroad.contact.roads.meaning import (
     counts_down,
     downwards_note,
     mentions_unit,
+    role_of,
     unit_of,
 )
 from tireroad.contact.roads.missing import CodeSearch, refused
@@ -174,38 +176,39 @@ def read_numbers(archive: zipfile.ZipFile, name: str, most: int) -> Array:
     return numbers.reshape(header.shape, order="F" if header.by_columns else "C").astype(float)
 
 
-_WHOSE = r"(x|y|z|lengths?|heights?)"
+# Names under which a unit stands: units, x_unit, unit_of_z, height units, UoM; and whose it is by the rest of the name.
 _UNIT_NAME = re.compile(
-    rf"(?:{_WHOSE}[_ -]?)?(?:units?|uom)(?:[_ -](?:of[_ ])?{_WHOSE})?|.*(?:unit|\buom).*",
+    r"(?P<before>.*?)[_ .-]*(?:units?|uom|einheit)(?:[_ -]*(?:of[_ ])?(?P<after>.*))?",
     re.IGNORECASE,
 )
-_MISSING_NAMES = (
-    "_fillvalue",
-    "fill_value",
-    "fillvalue",
-    "missing_value",
-    "missing",
-    "nodata",
-    "no_data",
-    "nodata_value",
+_WHOSE = {
+    "": "xyz", "xy": "xy", "length": "xy", "lengths": "xy", "lateral": "xy", "horizontal": "xy", "planar": "xy", "vertical": "z",
+    "measure": "xyz", "measurement": "xyz", "physical": "xyz", "axis": "xyz", "quantity": "xyz", "data": "xyz", "si": "xyz",
+    "symbol": "xyz", "name": "xyz", "long_name": "xyz", "base": "xyz", "coordinate": "xyz", "coordinates": "xyz",
+}  # fmt: skip
+_MISSING_NAME = re.compile(
+    r"_?(?:[xyz]_)?(?:(?:fill|missing|bad|null|invalid|void|undef(?:ined)?|dummy|nan|blank)[_ -]?(?:value|data|code|flag|height|"
+    r"number|marker)?s?|no_?(?:data|height|value)(?:[_ -]?value)?|(?:error|none)[_ -]?(?:value|code))",
+    re.IGNORECASE,
 )
 _FACTORS = re.compile(
-    r"scale|scaling|factor|gain|multiplier|slope|\blsb|conversion|quant(?:um|isation|ization)",
+    r"scale|scaling|factor|gain|multiplier|slope|\blsb|conv(?:ersion)?\b|quant(?:um|isation|ization)|calib|(?:^|_)per_|"
+    r"(?:^|_)to_m",
     re.IGNORECASE,
 )
-_OFFSETS = re.compile(r"offset|intercept|\bbias|shift", re.IGNORECASE)
+_OFFSETS = re.compile(r"offset|intercept|\bbias|shift|datum|zero|\bz0", re.IGNORECASE)
+# Beside heights alone: a resolution of the file can be that of x.
+_FACTORS_OF_Z = re.compile(r"resolution|step|increment", re.IGNORECASE)
+_OFFSETS_OF_Z = re.compile(r"base|reference", re.IGNORECASE)
 _MASKS = "mask", "z_mask"
-_OTHER_MASKS = re.compile(r"mask|valid|nodata|no_data|missing|flag|quality", re.IGNORECASE)
-_TEXTS = (
-    "long_name",
-    "standard_name",
-    "description",
-    "comment",
-    "title",
-    "name",
-    "note",
-    "notes",
-    "positive",
+_OTHER_MASKS = re.compile(
+    r"mask|valid|nodata|no_data|missing|flag|quality|holes|is_?nan", re.IGNORECASE
+)
+_DIRECTION = re.compile(r"direction|orientation|sign|positive|polarity", re.IGNORECASE)
+_DOWN = re.compile(r"down|inver|neg|flip|-", re.IGNORECASE)
+_OF_FILE = re.compile(
+    r"history|source|conventions|references|institution|creator|author|_nc.*|dimension_labels|name",
+    re.IGNORECASE,
 )
 
 
@@ -218,24 +221,23 @@ class _Meaning:
     down: bool = False  # heights are positive downwards
     texts: dict[str, tuple[str, str]] = field(default_factory=dict)  # that mention a unit
     notes: list[str] = field(default_factory=list)
+    # Numbers that may be factors, by array.
+    unread: dict[str, dict[str, float]] = field(default_factory=dict)
 
     def take(self, whose: str, name: str, value: Any, source: str) -> bool:
         """Take the attribute or entry `name` of the array `whose` ("" for all); False where it says nothing that is known."""
         plain = name.lower()
         numbers = np.asarray(value).ravel()
         where = f"{name} of {whose}" if whose else name
-        if match := _UNIT_NAME.fullmatch(plain):
-            text = _text_of(value)
-            named = (match[1] or match[2] or "").lower()
-            roles = {"l": "xy", "h": "z"}.get(named[:1], named or whose or "xyz")
-            if text and text.strip():
-                for role in roles:
-                    self.units.setdefault(role, (text, where))
-            return True
-        of = self.codes[whose or "z"]
+        if texts := _texts_of(value):
+            return self._take_unit(whose, plain, texts, where, source) or self._take_text(
+                whose, plain, " | ".join(texts), where, source
+            )
         if numbers.dtype.kind not in "iuf" or not numbers.size:
-            return self._take_text(whose, plain, _text_of(value) or "", where, source)
-        if plain in _MISSING_NAMES:
+            return False
+        of = self.codes[whose or "z"]
+        of_z = whose == "z" or plain.startswith(("z_", "height"))
+        if _MISSING_NAME.fullmatch(plain):
             of["missing"] = (*of.get("missing", ()), *(float(one) for one in numbers if one == one))
         elif plain == "scale_factor":
             of["scale"] = of.get("scale", 1.0) * float(numbers[0])
@@ -247,43 +249,80 @@ class _Meaning:
             of["valid"] = float(numbers[0]), of.get("valid", (-np.inf, np.inf))[1]
         elif plain == "valid_max":
             of["valid"] = of.get("valid", (-np.inf, np.inf))[0], float(numbers[0])
-        elif _FACTORS.search(plain) and float(numbers[0]) != 1.0:
+        elif (_FACTORS.search(plain) or of_z and _FACTORS_OF_Z.search(plain)) and (
+            numbers != 1.0
+        ).any():
             raise InputError(
                 f"{source}: {where} = {numbers[0]:g} may be a factor, and is not known: apply it, or name it scale_factor"
             )
-        elif _OFFSETS.search(plain) and float(numbers[0]) != 0.0:
+        elif (_OFFSETS.search(plain) or of_z and _OFFSETS_OF_Z.search(plain)) and (
+            numbers != 0.0
+        ).any():
             raise InputError(
                 f"{source}: {where} = {numbers[0]:g} may be added to heights, and is not known: apply it, or name it add_offset"
             )
         else:
+            if numbers.size == 1 and numbers[0] % 1.0:
+                self.unread.setdefault(whose, {})[where] = float(numbers[0])
             return False
+        return True
+
+    def _take_unit(self, whose: str, name: str, texts: list[str], where: str, source: str) -> bool:
+        """Take a unit by the name under which it stands; False where the name says none."""
+        match = _UNIT_NAME.fullmatch(name)
+        if match is None or not all(text.strip() for text in texts):
+            return False
+        said = f"{match['before']}{match['after'] or ''}".strip("_ .-")
+        roles = _WHOSE.get(said, role_of(said) if said else "")
+        if whose and (roles == "xyz" or roles == ""):
+            roles = whose
+        if len(texts) == len(roles) == 3:
+            for role, text in zip(roles, texts, strict=True):
+                self.units.setdefault(role, (text, where))
+            return True
+        if len(texts) > 1 or (not whose and roles not in ("xyz", "xy", "x", "y", "z")):
+            return False
+        for role in roles:
+            self.units.setdefault(role, (texts[0], where))
         return True
 
     def _take_text(self, whose: str, name: str, text: str, where: str, source: str) -> bool:
         """Take a text beside heights: their direction, and whether it mentions a unit. False where it says neither."""
-        if whose not in ("", "z") or name not in _TEXTS:
+        if _OF_FILE.fullmatch(name):
             return False
-        if name == "positive":
-            if text.lower().strip() not in (
-                "up",
-                "upward",
-                "upwards",
-                "down",
-                "downward",
-                "downwards",
-            ):
+        text = re.sub(
+            r"\\u([0-9a-f]{4})", lambda match: chr(int(match[1], 16)), text
+        )  # as JSON writes è
+        if name == "positive" and whose in ("", "z"):
+            if not re.fullmatch(r"\s*(?:up|down)(?:wards?)?\s*", text, re.IGNORECASE):
                 raise InputError(f'{source}: {where} = "{text}" is neither up nor down')
             self.down |= text.lower().strip().startswith("down")
             return True
-        if counts_down(text):
+        if whose in ("", "z"):
+            if counts_down(text) or (_DIRECTION.search(name) and _DOWN.match(text.strip())):
+                raise InputError(
+                    f'{source}: {where} = "{text}": heights that are counted downwards; say positive = "down" beside them, or write '
+                    "them upwards"
+                )
+            self.notes += downwards_note(text)
+        known = unit_of(text)
+        mentions = mentions_unit(text) or bool(known and known.metres) or "unit" in text.lower()
+        if mentions:
+            for role in whose or "xyz":
+                self.texts.setdefault(role, (text[:60], where))
+        return mentions
+
+    def check_numbers(self, kind: np.dtype, source: str) -> None:
+        """InputError where heights are whole numbers, and a number beside them that may be their factor is not read."""
+        left = self.unread.get("z", {})
+        if "scale" not in self.codes["z"]:
+            left = {**left, **self.unread.get("", {})}
+        if kind.kind in "iu" and left:
+            name, value = next(iter(left.items()))
             raise InputError(
-                f'{source}: {where} = "{text}": heights that are counted downwards; say positive = "down" beside them, or write '
-                "them upwards"
+                f"{source}: heights are whole numbers, and {name} = {value:g} may be their factor: apply it, name it scale_factor, "
+                "or leave it out"
             )
-        self.notes += downwards_note(text)
-        if mentions_unit(text):
-            self.texts.setdefault("z", (text, where))
-        return mentions_unit(text)
 
     def column(self, role: str) -> Column:
         """The unit of x, y or z."""
@@ -300,13 +339,15 @@ class _Meaning:
         return one
 
 
-def _text_of(value: Any) -> str | None:
-    """The text of an attribute; None where it is none."""
+def _texts_of(value: Any) -> list[str]:
+    """The text of an attribute, or its few texts; empty where it is none."""
     one = np.asarray(value)
-    if one.size != 1 or one.dtype.kind not in "USO":
-        return None
-    item = one.ravel()[0]
-    return item.decode("utf-8", "replace") if isinstance(item, bytes) else str(item)
+    if not 0 < one.size <= 9 or one.dtype.kind not in "USO":
+        return []
+    items = one.ravel().tolist()
+    return [
+        item.decode("utf-8", "replace") if isinstance(item, bytes) else str(item) for item in items
+    ]
 
 
 def _found(
@@ -357,12 +398,13 @@ def read_npz(file: Path, keys: Keys) -> Found:
                     continue
                 if name.lower() in _MASKS:
                     mask = _mask(archive, name, rows.shape, source)
-                elif _OTHER_MASKS.search(name) and _shape(archive, name) == rows.shape:
+                elif _OTHER_MASKS.search(name) and _header(archive, name)[0] == rows.shape:
                     raise _unread_mask(name, source)
                 elif not (value := _beside(archive, name)) or not meaning.take(
                     "", name, value[0], source
                 ):
                     unused.append(name)
+            meaning.check_numbers(_header(archive, names["z"] or "")[2], source)
         except InputError:
             raise
         except (ValueError, TypeError) as error:
@@ -401,11 +443,12 @@ def _unread_mask(name: str, source: str) -> InputError:
     )
 
 
-def _shape(archive: zipfile.ZipFile, name: str) -> tuple[int, ...]:
+def _header(archive: zipfile.ZipFile, name: str) -> tuple[tuple[int, ...], bool, np.dtype]:
+    """Shape, order and type of an array as its header announces them."""
     with archive.open(f"{name}.npy") as stream:
         version = np.lib.format.read_magic(stream)
         read = np.lib.format.read_array_header_1_0
-        return (read if version == (1, 0) else np.lib.format.read_array_header_2_0)(stream)[0]
+        return (read if version == (1, 0) else np.lib.format.read_array_header_2_0)(stream)
 
 
 def _mask(archive: zipfile.ZipFile, name: str, shape: tuple[int, int], source: str) -> Rows:
@@ -525,9 +568,15 @@ def read_hdf5(file: Path, keys: Keys) -> Found:
             and role == "z"
             and np.asarray(value).dtype.kind in "iuf"
         ]
-    for name, value in store.attrs.items():
+    beside = {
+        name: found[()]
+        for name, found in store.items()
+        if _is_small(found) and found not in datasets.values()
+    }
+    for name, value in {**store.attrs, **beside}.items():
         meaning.take("", name, value, source)
     z = datasets["z"]
+    meaning.check_numbers(z.dtype, source)
     if z.fillvalue not in (0, None) and z.fillvalue == z.fillvalue:
         meaning.take("z", "_FillValue", z.fillvalue, source)
     try:
@@ -547,6 +596,13 @@ def read_hdf5(file: Path, keys: Keys) -> Found:
         raise InputError(f"{source}: mask is {other.dtype} of shape {other.shape}, z has {z.shape}")
     mask = None if other is None else Hdf5Rows(other, turned)
     return _found(x, y, Hdf5Rows(z, turned), meaning, keys, source, notes, mask)
+
+
+def _is_small(found: Any) -> bool:
+    """Whether an object of an HDF5 file is a dataset of a few entries."""
+    import h5py
+
+    return isinstance(found, h5py.Dataset) and found.shape is not None and found.size <= 9
 
 
 def _turned(z: h5py.Dataset, shape: tuple[int, int]) -> tuple[bool, tuple[str, ...]]:
@@ -583,6 +639,13 @@ def read_netcdf(file: Path, keys: Keys) -> Found:
                 arrays[role] = np.array(variable.data, dtype=float)
                 for key, value in variable._attributes.items():
                     meaning.take(role, key, value, source)
+            for key, value in store._attributes.items():
+                meaning.take("", key, value, source)
+            whole = store.variables[names["z"]].data
+            meaning.check_numbers(whole.dtype, source)
+            for name, variable in store.variables.items():
+                if _OTHER_MASKS.search(name) and variable.shape == whole.shape:
+                    raise _unread_mask(name, source)
             turned = [name.lower() for name in store.variables[names["z"]].dimensions] == ["y", "x"]
     except InputError:
         raise
@@ -675,7 +738,7 @@ def _grid(
     """The road of what was found in a file."""
     along, across, up = found.scales
     pairs = [(along, across, "x", "length_unit"), (across, along, "y", "length_unit")]
-    pairs += [(up, along, "the heights", "height_unit")]
+    pairs += [(up, along, "the heights", "height_unit"), (up, across, "the heights", "height_unit")]
     pairs += [(along, up, "x", "length_unit")] if found.text else []
     for mine, other, name, key in pairs:
         if mine is None and other is not None and other.stated:
@@ -701,7 +764,7 @@ def _grid(
     if missing is None or len(missing):
         if odd := [one for one in found.odd if one not in coding.missing]:
             raise refused(odd, 0, "written with other decimals than the heights", source)
-        grid.search = CodeSearch(source, metre)
+        grid.search = CodeSearch(source, metre, coding.scale or 1.0, coding.offset)
         grid.look_for_codes()
     check_plausible(
         grid.extent_of_file,
@@ -721,9 +784,7 @@ def _grid(
             (
                 "",
                 "",
-                f"no height: {', '.join(f'{one:g}' for one in coding.missing)}"
-                if coding.missing
-                else "",
+                _gaps(rows, coding.missing),
             ),
             strict=True,
         )
@@ -734,6 +795,23 @@ def _grid(
         *([f"{' and '.join(unsaid)} in {ASSUMED}: assumed"] if unsaid else []),
     )
     return grid
+
+
+COUNTED = 10_000_000  # heights of a file of which the missing ones are counted for the log
+
+
+def _gaps(rows: Rows, missing: tuple[float, ...]) -> str:
+    """How many heights are missing, where they are few enough to be counted, and the numbers that say so."""
+    named = f"no height: {', '.join(f'{one:g}' for one in missing)}" if missing else ""
+    total = rows.shape[0] * rows.shape[1]
+    if total > COUNTED:
+        return named
+    gone = sum(int(np.isnan(part).sum()) for _, part in pieces(rows))
+    return (
+        f"{gone} of {total} missing" + (f" ({named})" if named else "")
+        if gone or named
+        else "none missing"
+    )
 
 
 def counted(axis: Array) -> bool:

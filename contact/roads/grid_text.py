@@ -18,6 +18,7 @@ from tireroad.contact.roads.meaning import (
     Layout,
     Scale,
     Stated,
+    check_flags,
     check_late,
     column_of,
     downwards_note,
@@ -93,11 +94,15 @@ def read_csv(file: Path, keys: Keys) -> Found:
         layout = layout_of(head, source, 2)
         if layout is None:
             raise _too_few([line for line in head if not line.comment], source)
-        if len(layout.of("x")) == len(layout.of("y")) == len(layout.of("z")) == 1:
+        if layout.headed and len(layout.of("x", "y", "z")) > 1:
             return _list(file, head, lines, layout, keys)
         if layout.width == 3 and not layout.headed and _repeats(head, layout):
             return _list(file, head, lines, layout, keys)
-        if layout.width == 1 or (layout.width == 2 and layout.of("z") and not layout.of("y")):
+        if layout.width == 4 and not layout.headed and _repeats(head, layout, 1):
+            raise InputError(
+                f"{source}: four columns without headings, the first of which counts the lines: name them: no,x,y,z"
+            )
+        if layout.width == 1:
             raise InputError(
                 f'{source}: {layout.width} column(s) are a profile along a line, kind = "laser", and no grid; {_LAYOUT}'
             )
@@ -132,28 +137,39 @@ def _data(head: list[Line], lines: Iterator[Line], first: int, source: str) -> I
         yield [begin, *islice(data, count - 1)]
 
 
-def _repeats(head: list[Line], layout: Layout) -> bool:
-    """Whether three columns are a list of points: one of the first two does not ascend all along."""
+def _repeats(head: list[Line], layout: Layout, counts: int = 0) -> bool:
+    """Whether columns are a list of points: one of x and y does not ascend all along.
+
+    `counts`: columns before x; 1: one that counts the lines, and x and y that recur.
+    """
     rows = [
         layout.form.row(line.text)
         for line in head
         if line.number >= layout.first and not line.comment
     ]
-    table = np.array([row for row in rows if row is not None and len(row) == 3])
-    return bool(len(table) > 3 and any((np.diff(table[1:, k]) <= 0).any() for k in (0, 1)))
+    table = np.array([row for row in rows if row is not None and len(row) == 3 + counts])
+    if len(table) < 4:
+        return False
+    if counts:
+        recur = [len(np.unique(table[:, k])) <= len(table) / 2 for k in (1, 2)]
+        return bool((np.diff(table[:, 0]) == 1.0).all() and any(recur))
+    return any(bool((np.diff(table[1:, k]) <= 0).any()) for k in (0, 1))
 
 
 def _list(file: Path, head: list[Line], lines: Iterator[Line], layout: Layout, keys: Keys) -> Found:
     """The grid of a list of points."""
     source = f"road.file {file}"
-    at = [layout.of(role)[0] for role in "xyz"] if layout.headed else [0, 1, 2]
+    at = _headed(layout, source) if layout.headed else [0, 1, 2]
     blocks, count, decimals = [], 0, Decimals()
     for block in _data(head, lines, layout.first, source):
         table = numbers_of(block, layout.form, layout.width, source)
         decimals.count(block, layout.form, table, [at[2]])
+        for k in layout.of("other"):
+            check_flags(layout.columns[k], table[:, k], source)
         blocks.append(table[:, at])
         count += len(block)
         check_count(file, count)
+    decimals.check(source)
     x, y, z = _points(file, np.concatenate(blocks))
     columns = [layout.columns[k] for k in at]
     scales = keys.scales(columns, layout.stated, source)
@@ -163,6 +179,11 @@ def _list(file: Path, head: list[Line], lines: Iterator[Line], layout: Layout, k
         if layout.headed
         else ("three columns without headings: x, y, height assumed",)
     )
+    others = [
+        f'column {k + 1} "{one.title}"' for k, one in enumerate(layout.columns) if k not in at
+    ]
+    if others:
+        notes = (*notes, f"not used of the file: {', '.join(others)}")
     return Found(
         x,
         y,
@@ -176,6 +197,24 @@ def _list(file: Path, head: list[Line], lines: Iterator[Line], layout: Layout, k
     )
 
 
+def _headed(layout: Layout, source: str) -> list[int]:
+    """The columns of x, y and z by their headings; one of them may be named by what is left over."""
+    found = {role: layout.of(role) for role in "xyz"}
+    for role, columns in found.items():
+        if not columns and len(layout.of("")) == 1:
+            found[role] = layout.of("")
+    if (
+        any(len(columns) != 1 for columns in found.values())
+        or len({k for one in found.values() for k in one}) < 3
+    ):
+        titles = ", ".join(repr(one.title) for one in layout.columns)
+        raise InputError(
+            f"{source}: the headings {titles} do not name one column each for x, y and the height: call them x, y, z; x and heights "
+            'alone are a profile, kind = "laser"'
+        )
+    return [found[role][0] for role in "xyz"]
+
+
 def _forms(layout: Layout, notes: tuple[str, ...]) -> tuple[str, ...]:
     return (*notes, "decimal commas") if layout.form.comma else notes
 
@@ -185,6 +224,12 @@ def _matrix(
 ) -> Found:
     """The grid of a matrix: the first line holds y, the first column x."""
     source = f"road.file {file}"
+    if odd := next((one for one in layout.columns[1:] if one.unit or one.unclear), None):
+        raise InputError(
+            f"{source}: {odd.said} states a unit above the columns of a matrix: say road.length_unit and road.height_unit, and take "
+            "the line out"
+        )
+    _check_order(layout, source)
     corner, axis, first, left, places = _across(head, layout, source)
     positions, spool, count, decimals = [], Spool(source), 0, Decimals()
     for block in _data(head, lines, first, source):
@@ -197,6 +242,7 @@ def _matrix(
             spool.add(table[:, left + 1 :])
     if count < 2:
         raise InputError(f"{source}: {count + 1} lines of data, at least 3 are needed")
+    decimals.check(source)
     x = np.concatenate(positions)
     titles = _corner(corner, keys, layout.stated, source)
     scales = keys.scales(titles, layout.stated, source)
@@ -211,6 +257,34 @@ def _matrix(
         odd=tuple(decimals.codes()),
         text=True,
     )
+
+
+_ORDER = re.compile(
+    r"\b(?P<what>(?:first|top|left|1st|erste|header)?[ _-]*(?:rows?|lines?|columns?|cols?|zeilen?|spalten?))\b[^a-z0-9]*"
+    r"(?:(?:are|is|has|holds?|contains?|gives?|along|=|of|the|positions?|values?|coordinates?)[^a-z0-9]*)*\b(?P<axis>[xy])\b"
+    r"|\b(?P<of>[xy])\b[^a-z]*(?P<where>across|down|along (?:the )?(?:rows?|columns?)|in (?:the )?(?:first )?(?:rows?|columns?))\b",
+    re.IGNORECASE,
+)
+
+
+def _check_order(layout: Layout, source: str) -> None:
+    """InputError for a line above a matrix by which its rows are along y: `first column y`, `columns: x`, `x across`."""
+    for line in layout.before:
+        if len(layout.form.fields(line.text)) == layout.width:
+            continue  # the corner and the y
+        for match in _ORDER.finditer(line.text):
+            what = (match["what"] or match["where"]).lower()
+            several = (
+                bool(re.search(r"(?:rows|lines|columns|cols|zeilen|spalten)$", what))
+                and "first" not in what
+            )
+            column = bool(re.search(r"col|spalte|down", what))
+            # The first column holds x; columns, one for each y.
+            if ((match["axis"] or match["of"]).lower() == "x") != (column != several):
+                raise InputError(
+                    f"{source}, line {line.number}: by {line.text[:60]!r} the first column is y: it must hold x, the first line y; "
+                    "transpose the matrix"
+                )
 
 
 def _across(
@@ -257,6 +331,11 @@ def _across(
 def _corner(text: str, keys: Keys, stated: Stated, source: str) -> tuple[Column, Column, Column]:
     """x, y and z by the corner of a matrix: x [mm], x/y [m], ... InputError for a unit of which it does not say whose it is."""
     one = column_of(text)
+    units = [unit for word in re.split(r"[\s/\\,;|()\[\]{}]+", text) if (unit := unit_of(word))]
+    if len({unit.metres for unit in units}) > 1 or (one.unit and one.unclear):
+        raise InputError(
+            f'{source}: the corner "{text}" has more than one unit: say road.length_unit and road.height_unit, and leave it empty'
+        )
     named = [
         role
         for word in re.findall(r"[^\W\d_]+", text)

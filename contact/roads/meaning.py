@@ -9,30 +9,51 @@ a default, what contradicts a key is an error that names both, and what is assum
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tireroad.contact.roads.text_table import NUMBER, Form, Line, first_row, form_of, quoted
 from tireroad.fem.errors import InputError
+
+Array = NDArray[np.float64]
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
 """Metres of the units that a scene can name."""
 
 _LENGTHS = {
-    "m": 1.0, "meter": 1.0, "meters": 1.0, "metre": 1.0, "metres": 1.0, "mtr": 1.0,
-    "dm": 0.1, "decimeter": 0.1, "decimeters": 0.1, "decimetre": 0.1, "decimetres": 0.1, "dezimeter": 0.1,
-    "cm": 1e-2, "centimeter": 1e-2, "centimeters": 1e-2, "centimetre": 1e-2, "centimetres": 1e-2, "zentimeter": 1e-2,
-    "mm": 1e-3, "millimeter": 1e-3, "millimeters": 1e-3, "millimetre": 1e-3, "millimetres": 1e-3,
-    "um": 1e-6, "μm": 1e-6, "μ": 1e-6, "micron": 1e-6, "microns": 1e-6, "micrometer": 1e-6, "micrometers": 1e-6,
-    "micrometre": 1e-6, "micrometres": 1e-6, "mikrometer": 1e-6, "mikron": 1e-6,
-    "nm": 1e-9, "nanometer": 1e-9, "nanometers": 1e-9, "nanometre": 1e-9, "nanometres": 1e-9,
-    "km": 1e3, "kilometer": 1e3, "kilometers": 1e3, "kilometre": 1e3, "kilometres": 1e3,
-    "in": 0.0254, "inch": 0.0254, "inches": 0.0254, "zoll": 0.0254, "''": 0.0254, '"': 0.0254,
-    "ft": 0.3048, "foot": 0.3048, "feet": 0.3048, "yd": 0.9144, "yard": 0.9144, "yards": 0.9144,
-    "mil": 2.54e-5, "mils": 2.54e-5, "thou": 2.54e-5,
+    "m": 1.0, "mtr": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "μm": 1e-6, "μ": 1e-6, "nm": 1e-9, "km": 1e3,
+    "micron": 1e-6, "microns": 1e-6, "mikron": 1e-6,
+    "in": 0.0254, "inch": 0.0254, "inches": 0.0254, "zoll": 0.0254, "''": 0.0254, '"': 0.0254, "″": 0.0254,
+    "ft": 0.3048, "foot": 0.3048, "feet": 0.3048, "fuß": 0.3048, "'": 0.3048, "′": 0.3048,
+    "yd": 0.9144, "yard": 0.9144, "yards": 0.9144, "mil": 2.54e-5, "mils": 2.54e-5, "thou": 2.54e-5,
 }  # fmt: skip
+# Metres in the languages of Europe, without accents, which a wrong encoding may have spoilt: millimètres, milímetros, Zentimeter.
+_METRES = re.compile(
+    r"(?:(kilo)|(de[cz]i)|([czs]enti)|(mill?i)|(mi[ck]ro)|(nano))?[- ]?m(?:et|(?<=[oaei]m)[^\W\d]t)(?:er|re|ro|ri|ra|r)(?:s|ar|ow|y|u)?"
+)
+_PREFIXES = 1e3, 0.1, 1e-2, 1e-3, 1e-6, 1e-9
+
+
+def _without_accents(text: str) -> str:
+    return "".join(
+        one for one in unicodedata.normalize("NFD", text) if not unicodedata.combining(one)
+    )
+
+
+def _metres(word: str) -> float | None:
+    """Metres of a unit of length in lower case; None where it is none."""
+    if word in _LENGTHS:
+        return _LENGTHS[word]
+    match = _METRES.fullmatch(_without_accents(word))
+    if match is None:
+        return None
+    return next((size for size, part in zip(_PREFIXES, match.groups(), strict=True) if part), 1.0)
+
+
 _TIMES = {
     "s", "sec", "secs", "second", "seconds", "sek", "sekunde", "sekunden", "ms", "us", "μs", "ns", "min", "minutes",
     "h", "hour", "hours",
@@ -58,8 +79,7 @@ _POWER = re.compile(r"10\s*([⁻⁺]?[⁰¹²³⁴-⁹]+)")
 def _plain(text: str) -> str:
     """A text with µ as the Greek letter, 10⁻⁶ as 10^-6, and tenths and the like as numbers; lower case."""
     plain = _POWER.sub(lambda match: f"10^{match[1].translate(_RAISED)}", text).replace("µ", "μ")
-    plain = re.sub(r"\b(milli|micro|centi|deci|nano|kilo)[ -](?=met)", r"\1", plain.lower())
-    return _PART.sub(lambda match: f"{_PARTS[match[1]]} ", plain)
+    return _PART.sub(lambda match: f"{_PARTS[match[1]]} ", plain.lower())
 
 
 @dataclass(frozen=True)
@@ -75,14 +95,15 @@ def unit_of(text: str) -> Unit | None:
     """The unit that a text is, also with a factor (0.1 mm, 1/10 mm, 10^-3 m, tenths of mm); None where it is none."""
     shown = text.strip().strip(".").strip()
     word = " ".join(_plain(shown).split())
-    if word in _LENGTHS:
-        return Unit(shown, _LENGTHS[word])
+    if metres := _metres(word):
+        return Unit(shown, metres)
     if word in _TIMES:
         return Unit(shown, None, time=True)
     if word in _OTHERS:
         return Unit(shown, None)
     match = _PER.fullmatch(word)
-    if match is None or match["word"].strip() not in _LENGTHS:
+    metres = _metres(match["word"].strip()) if match else None
+    if match is None or metres is None:
         return None
     if match["power"]:
         times = 10.0 ** int(match["power"])
@@ -91,16 +112,22 @@ def unit_of(text: str) -> Unit | None:
     # 25 mm is a length, not a unit.
     if not (times > 0 and abs(np.log10(times) - round(np.log10(times))) < 1e-9):
         return None
-    return Unit(shown, times * _LENGTHS[match["word"].strip()])
+    return Unit(shown, times * metres)
 
 
 # Headings by what their column holds. The first that fits decides.
 _ROLES: tuple[tuple[str, str], ...] = (
     (
+        "other",  # how exact heights are, and which of them hold
+        r"(?:.*[\W_])?(?:uncert\w*|unsicherheit|incertitude|err|errors?|std|stdev|stddev|sigma|variance|tolerance|accuracy|"
+        r"quality|(?:in)?valid\w*|flags?|mask|status|outliers?|dropouts?)(?:[\W_].*)?",
+    ),
+    (
         "count",
         r"|#|index|idx|no|nr|n|num|number|nummer|samples?|sample[ _-]?(?:no|nr|number|index|id)|points?|point[ _-]?(?:no|nr|"
         r"number|id)|pts?|punkt|id|fid|oid|rows?|lines?|zeile|count(?:er)?|i|j|k|lfd|lfd\.? ?nr|record|scan|frame|unnamed: \d+"
-        r"|messpunkt|pkt|(?:sample|point|record|row|scan|line|data ?point|messung|punkt|zeilen|seq)[ _.-]*(?:#|no|nr|n°|number|nummer)"
+        r"|messpunkt|pkt|\w+(?: \w+)?[ _.-]+(?:#|no|nr|n°|number|nummer)"
+        r"|(?:sample|point|record|row|scan|line|punkt|zeilen|seq)(?:#|no|nr|n°|number|nummer)"
         r"|n°|num[ée]ro|seq(?:uence)?|observation|entry|data ?points?|messung|z[äa]hler|pulses?|ticks?|trigger|encoder|row ?names",
     ),
     (
@@ -129,15 +156,20 @@ _ROLES: tuple[tuple[str, str], ...] = (
         r"gradient|curvature|cross ?fall).*",
     ),
 )
+# Words that lead to another role than the noun behind them.
+_PLACED = re.compile(
+    r"(?:(lateral|transvers\w*|cross[ _-]?\w*|across|quer)|(vertical)|(longitudinal|along))[ _-]?(?:pos(?:ition)?|dist(?:ance)?|"
+    r"offset|coord(?:inate)?|location|axis|abstand|achse|koordinate)s?"
+)
 _MATCHES = tuple((role, re.compile(pattern, re.IGNORECASE)) for role, pattern in _ROLES)
 _HARMLESS = re.compile(
     r"[-+]?\d*|left|right|links|rechts|centre|center|mid(?:dle)?|raw|filtered|measured|laser|calc(?:ulated)?|mean|average|"
     r"forward|lateral|vertical|longitudinal|transversal|up|upward|iso|relative|abs(?:olute)?|wheel ?path",
     re.IGNORECASE,
 )
-_BRACKETED = re.compile(r"[\[({<]([^\])}>]*)[\])}>]")
-_PARTED = re.compile(r"\s+in\s+|\s*[,/_:;|-]\s*|\s+")
-_JOINED = re.compile(r"^(x|y|z|height|depth|dist|distance|elevation|h)(mm|cm|dm|um|μm)$", re.I)
+_BRACKETED = re.compile(r"[\[({<«]([^\])}>»]*)[\])}>»]")
+_PARTED = re.compile(r"\s+in\s+|\s*(?:[,/:;|-]|_+)\s*|\s+")
+_JOINED = re.compile(r"^(x|y|z|height|depth|dist|distance|elevation|h)(\w{2,})$|^(x|y|z)(m)$", re.I)
 _CAMEL = re.compile(r"^(.*[a-z])(MM|Mm|CM|Cm|DM|Dm|UM|Um|μm)$")
 
 
@@ -175,6 +207,8 @@ def downwards_note(title: str) -> list[str]:
 def role_of(name: str) -> str:
     """What a column of that name holds: x, y, z, count, time or other; "" where the name does not tell."""
     plain = name.replace("µ", "μ").strip().strip("\"'*:.").strip().lower()
+    if match := _PLACED.fullmatch(plain):
+        return next(role for role, part in zip("yzx", match.groups(), strict=True) if part)
     words = plain.split()
     if len(words) > 1:
         plain = " ".join(
@@ -201,9 +235,9 @@ class Column:
 
 def column_of(title: str, where: str = "") -> Column:
     """The column under a heading: x [mm], Height (um), z, mm, x_mm, Distance / 0.1 mm, ..."""
-    shown = " ".join(title.strip().strip("\"'").split())
+    shown = " ".join(re.sub(r"^([\"'])(.*)\1$", r"\2", title.strip()).split())
     said = where or f'heading "{shown}"'
-    inside = [text.strip() for text in _BRACKETED.findall(shown)]
+    inside = [text.strip(" [({<") for text in _BRACKETED.findall(shown)]
     name = _BRACKETED.sub(" ", shown).strip()
     units = [unit for text in inside if (unit := unit_of(text))]
     odd = [text for text in inside if not unit_of(text) and not _HARMLESS.fullmatch(text)]
@@ -213,30 +247,56 @@ def column_of(title: str, where: str = "") -> Column:
     role = role_of(name)
     if len({unit.metres for unit in units}) > 1:
         units, odd = [], [", ".join(unit.text for unit in units)]
+    if not units and not odd:
+        odd = _unit_words(name) or re.findall(r"(?:\"|''|″|′)$", shown)
     beside = (name, *(text for text in inside if not unit_of(text)))
     if units and any(_TIMES_IN.search(_plain(text)) for text in beside):  # Height x 10 [mm]
         units, odd = [], [shown]
     unit = units[0] if units else None
     if unit is not None and unit.time and role in ("", "x", "y"):
         role = "time"
-    unclear = "" if unit else "".join(odd[:1])
+    unclear = "".join(odd[:1])
     return Column(shown, role, unit, unclear, said, headed=True, name=name)
+
+
+_WORDS = re.compile(r"[A-ZÀ-Ö]?[a-zß-öø-ÿμ]+|[A-ZÀ-Ö]+")  # of ProfileMM, too
+
+
+def _unit_words(name: str) -> list[str]:
+    """Words of a heading that are units of length, where none stands in a unit's place: mm Profile, Profile.mm, ProfileMM."""
+    words = _WORDS.findall(name)
+    found = [word for word in words if _lengths_in(word)] or [
+        word for word in words[1:] if word == "m"
+    ]
+    spelled = re.search(
+        r"(?:kilo|de[cz]i|[czs]enti|mill?i|mi[ck]ro|nano)[- ]?met\w*|mi[ck]rons?$|\d\s*m\b",
+        _without_accents(name),
+        re.IGNORECASE,
+    )
+    spelled = spelled or re.search(r"(?<=[a-zà-ÿ])[mcdnkμ]m\.?$", name)
+    first = re.match(r"(?:m|in|ft)\b\.?\s+\w", name, re.IGNORECASE)
+    return found or [match[0] for match in (spelled, first) if match]
 
 
 def _without_unit(plain: str) -> tuple[str, list[Unit], list[str]]:
     """A heading without brackets, parted into name and unit, and what stands in the unit's place and is none."""
     for match in (_JOINED.match(plain), _CAMEL.match(plain)):
-        if match and (unit := unit_of(match[2])):
-            return match[1], [unit], []
+        name, unit = [part for part in match.groups() if part] if match else ("", "")
+        if (found := unit_of(unit)) and found.metres:
+            return name, [found], []
     odd: list[str] = []
     for mark in _PARTED.finditer(plain):
         name, tail = plain[: mark.start()], plain[mark.end() :]
         unit, sign = unit_of(tail), mark[0].strip()
-        if not name:
+        if not name or (tail in ("'", "''", '"') and re.search("[\"']", name)):  # quotation marks
             continue
         # x_s and n h are names, x, s is a time; Profile 10 mm may be the tenth, in 0.1 mm is a unit.
         if unit and (unit.metres or sign in (",", "/", ":", ";", "|")):
-            if (not sign and re.match(r"\d+\s*[a-zμ]", tail)) or _HALF.search(_plain(name)):
+            numbered = re.match(r"\d+\s*[a-zμ]", tail) or re.search(
+                r"\d[.,/]\d+$|\b10+$|(?:^|\s)\d\S*[^\s\d.,]\S*$", name
+            )
+            numbered = numbered if not sign else re.match(r"\d", tail) and re.search(r"\d$", name)
+            if numbered or _HALF.search(_plain(name)):
                 return name, [], [tail if not sign else plain]
             return name, [unit], []
         strange = sign in (",", "/", "|", "in") and not unit and not _HARMLESS.fullmatch(tail)
@@ -294,23 +354,35 @@ def layout_of(head: Sequence[Line], source: str, fewest: int = 3) -> Layout | No
     begin = first_row(rows, form, fewest)
     if begin is None:
         return None
+    width = len(form.row(rows[begin].text) or ())
+    while begin and _lacks_last(rows[begin - 1].text, form, width):
+        begin -= 1
     first = rows[begin]
     before = tuple(line for line in head if line.number < first.number)
-    width = len(form.fields(first.text))
     columns, used = _headings(before, form, width)
     across = next((one.number for one in reversed(before) if _is_axis(one, form, width)), None)
     rest = [line for line in before if line.number not in {*used, across}]
-    if (
-        not any(one.headed for one in columns)
-        and width > 1
-        and (odd := next((one for one in rest if _names_columns(one)), None))
-    ):
-        raise InputError(
-            f"{source}, line {odd.number}: {odd.text[:60]!r} may name the columns, and cannot be parted into {width} names: "
-            "separate them as the numbers are"
-        )
+    titles = max(used, default=0)
+    for one in rest if width > 1 else ():
+        nearer = not one.comment and one.number > titles
+        if (nearer or not any(column.headed for column in columns)) and _names_columns(one):
+            raise InputError(
+                f"{source}, line {one.number}: {one.text[:60]!r} may name the columns, and cannot be parted into {width} names: "
+                "separate them as the numbers are"
+            )
     stated = _stated(rest, columns, width, used)
     return Layout(form, first.number, width, columns, stated, before)
+
+
+def _lacks_last(text: str, form: Form, width: int) -> bool:
+    """Whether a line is a row of numbers of which the last is missing: the separator stands at its end."""
+    row = form.row(text)
+    return (
+        row is not None
+        and len(row) == width - 1 > 0
+        and bool(form.separator)
+        and text.endswith(form.separator)
+    )
 
 
 def _is_axis(line: Line, form: Form, width: int) -> bool:
@@ -326,8 +398,12 @@ def _is_axis(line: Line, form: Form, width: int) -> bool:
 def _splits(text: str, form: Form, width: int) -> Iterator[list[str]]:
     """The ways to part a line into one title for each column: by the numbers' own form, else by others."""
     own = form.fields(text)
-    if len(own) == width > 1:
+    if len(own) == width > 1 and (form.separator or not _in_pieces(own)):
         yield own
+        return
+    # The last column has no title.
+    if len(own) == width - 1 > 1 and re.search(r"\"\"\s*$|[;,|\t]\s*$", text):
+        yield [*own, ""]
         return
     for parts in (
         own,
@@ -342,10 +418,12 @@ def _splits(text: str, form: Form, width: int) -> Iterator[list[str]]:
         named = [part.strip() for part in parts]
         if len(named) == width + 1 and not named[-1]:
             named.pop()
-        if len(named) == width:
+        if len(named) == width and not _in_pieces(named):
             yield named
         # x, mm, z, mm: names and units in turn
-        elif len(named) == 2 * width and all(unit_of(part) for part in named[1::2]):
+        elif len(named) == 2 * width > 2 and all(
+            unit_of(part) and re.search(r"[^\W\d]", part) for part in named[1::2]
+        ):
             yield [f"{name} [{unit}]" for name, unit in zip(named[::2], named[1::2], strict=True)]
         # R's write.table: no title over the row names
         elif (
@@ -354,6 +432,12 @@ def _splits(text: str, form: Form, width: int) -> Iterator[list[str]]:
             and all(column_of(name).role in ("x", "y", "z") for name in named)
         ):
             yield ["", *named]
+
+
+def _in_pieces(titles: Sequence[str]) -> bool:
+    """Whether some titles are nothing but a unit in brackets, which belongs to the title before: accel [m/s2] parted."""
+    alone = [bool(re.fullmatch(r"[\[({<].*[\])}>]", title)) for title in titles]
+    return any(alone) and not all(alone)
 
 
 def _is_units(fields: Sequence[str]) -> bool:
@@ -431,19 +515,28 @@ def _are_titles(found: Sequence[Column], line: Line, width: int) -> bool:
         return False  # Length 12 m, Speed: 30
     if any(NUMBER.fullmatch(title) for title in titles) and titles[0]:
         return False  # Position;12.5
+    if any(column.title in _WITHIN or column.title.endswith((":", "=")) for column in found):
+        return False  # x in mm and z in um; date: 2021-05-03
     if _UNIT_WORD.search(line.text) and not _BRACKETED.search(line.text):
         return False
     if _STEP.search(line.text) or _SCALE.search(line.text) or _code_in(line.text) is not None:
         return False  # Sampling interval 0.25 mm
     known = [column.role for column in found if column.role in ("x", "y", "z", "time")]
     if width == 1:
+        if re.search(r"\s\d+(?:[.,]\d+)?\s*[a-zμ]+$", found[0].title, re.I):
+            return False  # Start 100 m
+        if ":" in found[0].title and found[0].unit is None and not found[0].unclear:
+            return False  # Coordinate system: local
         # A sentence is no heading of a single column.
-        return len(line.text.split()) <= 4 and (bool(known) or found[0].unit is not None)
+        return len(line.text.split()) <= 4 and (
+            bool(known) or found[0].unit is not None or bool(found[0].unclear)
+        )
     if known:
         return not line.comment or all(len(column.title.split()) <= 5 for column in found)
     return not line.comment and any(column.title for column in found) and width <= 20
 
 
+_WITHIN = {"in", "and", "is", "are", "the", "und"}
 _NUMBERED = re.compile(
     r"^\W*(?:col(?:umn)?|spalte|colonne|field|channel|kanal)\.?\s*(\d+)\s*[:=.)-]?\s+(.+)$", re.I
 )
@@ -498,6 +591,9 @@ _MULTIPLIED = re.compile(
 
 def _names_columns(line: Line) -> bool:
     """Whether the words of a line that is no headings name two columns or more."""
+    if re.search(r"\b(?:rows?|lines?|zeilen?)\b.*\b(?:col|spalte)|\b(?:col|spalte).*\b(?:rows?|lines?|zeilen?)\b|\bacross\b.*\bdown\b|"
+                 r"\bdown\b.*\bacross\b", line.text, re.I):  # fmt: skip
+        return False  # the order of a matrix
     words = re.findall(r"[^\W\d_]+", line.text)
     roles = [role for word in words if (role := role_of(word)) in ("x", "y", "z")]
     if re.search(r"\d[.,]\d", line.text) or len(set(roles)) < 2 or len(words) > 12:
@@ -633,9 +729,19 @@ def _mentions_unit(text: str) -> bool:
         return True
     if len(roles) > 1:
         return _has_unit(text)
-    if re.search(r"[:=]\s*[-+]?\d", text) or re.search(r"\d\s*(?:mm|cm|dm|[uμµ]m|m)\b", text):
+    if re.search(r"[:=]\s*[-+]?\d[\d.,e+-]*\s*[^\s\d]{0,4}\s*$", text, re.I):
         return False  # Lane width: 3.5 m
-    return _has_unit(text)
+    spot = r"\d[\d.,]*(?:e[-+]?\d+)?\s*(?:[mcdkn]m|[uμµ]m|m|ft|inch)\b"  # of 0.2 mm
+    inside = [
+        part for part in _BRACKETED.findall(text) if not re.fullmatch(spot, part.strip(), re.I)
+    ]
+    named = [
+        unit
+        for part in inside
+        for word in re.split(r"[\s=:,\[({<]+", part)
+        if (unit := unit_of(word)) and unit.metres
+    ]
+    return bool(named) or _has_unit(re.sub(spot, " ", _BRACKETED.sub(" ", text), flags=re.I))
 
 
 def _has_unit(text: str) -> bool:
@@ -644,11 +750,10 @@ def _has_unit(text: str) -> bool:
 
 def _lengths_in(text: str) -> set[float]:
     """Metres of the units of length that stand in a line: in brackets, or a word such as mm."""
-    words = re.findall(r"[^\W\d_]+", text.replace("µ", "μ").lower())
+    text = re.sub(r"[^\W\d_]+\s*/\s*(?:h|hr|s|min)\b", " ", text)  # Speed 80 km/h
+    words = [word.lower() for word in _WORDS.findall(text.replace("µ", "μ"))]
     inside = [unit.metres for part in _BRACKETED.findall(text) if (unit := unit_of(part))]
-    plain = [
-        _LENGTHS[word] for word in words if word in _LENGTHS and len(word) > 1 and word != "in"
-    ]
+    plain = [_metres(word) for word in words if len(word) > 1 and word != "in"]
     return {metres for metres in (*inside, *plain) if metres}
 
 
@@ -674,7 +779,7 @@ def _units_in(text: str, width: int) -> list[tuple[str, Unit]]:
     rest = re.sub(
         r"^\s*(?:are|is|in|of(?= \w+ (?:is|are)))?\s*[:=;,\t]?\s*", "", text[match.end() :]
     )
-    rest = rest.strip(" ;,\t\"'")
+    rest = re.sub(r"^([\"'])(.*)\1$", r"\2", rest.strip(" ;,\t"))
     who = re.sub(r"[_\s-]+$", "", who)
     whose = _UPRIGHT.get(who.lower(), role_of(who)) if who else ""
     if re.fullmatch(r"(?:.*[ _-])?lengths?|horizontal|x/?y|xy", who, re.I) and (
@@ -726,9 +831,25 @@ def late_statement(line: Line) -> bool:
     return any((unit := unit_of(inside)) and unit.metres for inside in _BRACKETED.findall(text))
 
 
-def check_late(lines: Iterable[Line], source: str) -> Iterator[Line]:
-    """The lines that are no comments. InputError for a comment that states a unit below the numbers' beginning."""
+def check_late(lines: Iterable[Line], source: str, *, alone: bool = False) -> Iterator[Line]:
+    """The lines that are no comments. InputError for a comment that states a unit below the numbers' beginning.
+
+    `alone`: each line is one height, and an empty one among them may be a height that is missing: an error, too.
+    """
+    last, empty = 0, 0
+    usual: int | None = (
+        None  # empty lines between two heights: some programs write every line end twice
+    )
+    begun = False
     for line in lines:
+        empty += line.number - last - 1 if last else 0
+        last = line.number
+        if alone and not line.comment:
+            if begun and usual not in (None, empty):
+                raise InputError(
+                    f"{source}, line {line.number - 1}: is empty: if it stands for a height that is missing, write nan"
+                )
+            usual, begun, empty = (empty if begun else None), True, 0
         if not line.comment:
             yield line
         elif late_statement(line):
@@ -791,8 +912,9 @@ def scale_of(
         )
     if unit is None:
         if column.unclear and value is None:
+            odd = "may be their unit" if _lengths_in(column.unclear) else "is no unit that is known"
             raise InputError(
-                f'{source}: "{column.unclear}" in the {column.said} is no unit that is known: say what {what} are in, '
+                f'{source}: "{column.unclear}" in the {column.said} {odd}: say what {what} are in, '
                 f'{name} = "mm" for example'
             )
         return None if value is None else Scale(UNITS[value], f"{value} (road.{key})")
@@ -803,6 +925,20 @@ def scale_of(
             "or correct the file"
         )
     return Scale(unit.metres, f"{unit.text} ({said})", stated=True)
+
+
+_FLAGS = re.compile(
+    r"(?:.*[\W_])?(?:(?:in)?valid\w*|flags?|mask|status|outliers?|dropouts?)(?:[\W_].*)?",
+    re.IGNORECASE,
+)
+
+
+def check_flags(column: Column, values: Array, source: str) -> None:
+    """InputError where a column may say which heights hold: it is called so, and its values are not all the same."""
+    if _FLAGS.fullmatch(column.title) and len(np.unique(values[np.isfinite(values)])) > 1:
+        raise InputError(
+            f'{source}: the column "{column.title}" may say which heights are missing: write nan for these, and leave the column out'
+        )
 
 
 @dataclass(frozen=True)

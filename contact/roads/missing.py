@@ -7,6 +7,7 @@ are of one length; and not a clipped plateau, which the heights beside it lead u
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +24,14 @@ _DEEPEST = 2.0  # m: no kerb, whatever part of the road lies there
 _GAP = 5.0  # largest spacings between the other heights
 _JUMP = 20.0  # usual differences of neighbours
 _RUNS = 3
+_MOST = 3  # codes in runs; more are a road that has heights again and again
+_TAPER, _FADING = 2.0, 0.2  # last digits, usual differences of neighbours
 _CHANCE = 8.0  # as many equal neighbours as expected
+_NEAR = 10  # values below and above, by which the usual count of a height is known
+_SHORT = 12  # heights in a row: more are a plate
+_STANDS_OUT, _IN_RUNS = 3.0, 0.5  # usual differences of neighbours, for heights alone and in runs
+_OFTEN = 5  # as many as of any height near it
+_IMPROBABLE = math.log(1e-5)
 _PIECE = 500_000  # heights that are compared at a time
 _LARGE = 1e6  # and more: 1e10, 1.70141e38, 9.96921e36
 
@@ -65,8 +73,10 @@ def codes(z: Array, metre: float, *, single: bool = False) -> list[float]:
         kept = ~np.isin(values, more)
         values, counts = values[kept], counts[kept]
     if counts.sum() >= _FEWEST and len(values) > 2:
-        found += _in_runs(np.where(known & ~np.isin(z, found), z, np.nan), values, counts)
-    return sorted(found)
+        others = np.where(known & ~np.isin(z, found), z, np.nan)
+        more = _in_runs(others, values, counts)
+        found += more or _repeated(others, values, counts) or _repeated(others.T, values, counts)
+    return sorted(one + 0.0 for one in found)  # no -0
 
 
 def _far(values: Array, counts: NDArray[np.intp], metre: float, spike: int) -> list[float]:
@@ -105,7 +115,10 @@ def _apart(value: float, count: int, gap: float, rest: Array, metre: float, spik
     if spread == 0:  # on an even plate
         return (
             bool(special(np.float64(value)))
-            and (gap * metre > _FAR or gap > 100 * max(abs(rest[0]), 1e-12) > 0)
+            and (
+                gap * metre > _FAR
+                or (gap > 100 * abs(rest[0]) and np.log10(abs(value) or 1.0) % 1.0)
+            )  # a cleat of 10 mm
             and abs(value) >= 99
         )
     if not special(np.float64(value)):
@@ -129,7 +142,7 @@ def _in_runs(z: Array, values: Array, counts: NDArray[np.intp]) -> list[float]:
     moves = differ[np.isfinite(differ) & (differ > 0)]
     if not moves.size:
         return []
-    usual = float(np.median(moves))
+    usual, quantum = float(np.median(moves)), _quantum(values)
     pairs = np.zeros(len(values))
     which, often = np.unique(z[:, 1:][same], return_counts=True)
     pairs[np.searchsorted(values, which)] = often
@@ -150,9 +163,54 @@ def _in_runs(z: Array, values: Array, counts: NDArray[np.intp]) -> list[float]:
             continue  # clipped, or a plate
         between_jumps = apart > _JUMP * usual and long.sum() >= _RUNS and (irregular or marked)
         by_no_chance = pairs[k] > max(_CHANCE * (expected + 0.1), 0.3 * counts[k])
-        if between_jumps or (marked and by_no_chance):
+        tapered = apart <= max(_TAPER * quantum, _FADING * usual)  # heights that fade out to it
+        if between_jumps or (marked and by_no_chance and not tapered):
             found.append(one)
+    return found if len(found) <= _MOST else []
+
+
+def _repeated(z: Array, values: Array, counts: NDArray[np.intp]) -> list[float]:
+    """Special numbers within the range of heights that repeat in several places, as no other height near them does."""
+    differ = np.abs(np.diff(z, axis=1))
+    moves = differ[np.isfinite(differ) & (differ > 0)]
+    inner = special(values) & (counts > 1) & (counts <= _SHARE * counts.sum())
+    inner[[0, -1]] = False
+    if not moves.size or not inner.any():
+        return []
+    usual, quantum = float(np.median(moves)), _quantum(values)
+    found = []
+    for k in np.flatnonzero(inner):
+        near = np.r_[max(0, k - _NEAR) : k, k + 1 : min(k + 1 + _NEAR, len(values))]
+        expected = counts[near].sum() * quantum / (values[near[-1]] - values[near[0]])
+        if not _unlikely(int(counts[k]), expected, int(counts[near].max())):
+            continue
+        _, beside, inside = _runs(z, float(values[k]))
+        count = int(inside.sum())
+        if len(inside) < 2 or inside.max() > _SHORT:
+            continue
+        improbable = _unlikely(count, expected, int(counts[near].max()))
+        # Rough heights have jumps of their own, but no runs.
+        runs = (inside > 1).sum() > 1 and count > _OFTEN * counts[near].max()
+        least = _IN_RUNS if runs else _STANDS_OUT
+        if improbable and np.median(np.abs(beside - values[k])) > least * usual:
+            found.append(float(values[k]))
     return found
+
+
+def _unlikely(count: int, expected: float, usual: int) -> bool:
+    """Whether a height is there more often than those near it, and than chance makes (Poisson) where `expected` are."""
+    return count > usual and count * math.log(expected) - math.lgamma(count + 1) < _IMPROBABLE
+
+
+def _quantum(values: Array) -> float:
+    """The power of ten of which all values are multiples, 1e-9 at least."""
+    places = range(10)
+    whole = (
+        k
+        for k in places
+        if np.allclose(values * 10.0**k, np.round(values * 10.0**k), rtol=0, atol=1e-4)
+    )
+    return float(10.0 ** -next(whole, 9))
 
 
 def _leads_up(values: Array, k: int) -> bool:
@@ -191,17 +249,25 @@ def refused(found: list[float], count: int, where: str, source: str) -> InputErr
 
 @dataclass(frozen=True)
 class CodeSearch:
-    """Searches rows of heights (m) for codes, which it names in the file's unit of `metre` m; picklable."""
+    """Searches rows of heights for codes among the numbers of the file; picklable.
+
+    A height is (number * `scale` + `offset`) * `metre` m.
+    """
 
     source: str
     metre: float
+    scale: float = 1.0
+    offset: float = 0.0
 
     def __call__(self, z: Array, x: Array, y: Array) -> None:
         """InputError for a code among z (nx, ny) m at x (nx,), y (ny,) m."""
         most = max(_PIECE // max(len(y), 1), 2)
         for first in range(0, len(x), most):
-            part = np.round(z[first : first + most] / self.metre, 9)  # as written
-            if found := codes(part, self.metre, single=True):
+            heights = z[first : first + most] / self.metre
+            part = np.round(
+                (heights - self.offset) / self.scale, 9 if self.scale == 1.0 else 5
+            )  # as written
+            if found := codes(part, self.metre * abs(self.scale), single=True):
                 at = np.isin(part, found)
                 i, j = np.argwhere(at)[0]
                 where = f"at x = {x[first + i]:.6g} m, y = {y[j]:.4g} m"

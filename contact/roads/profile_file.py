@@ -22,6 +22,7 @@ from tireroad.contact.roads.meaning import (
     Layout,
     ReadAs,
     Scale,
+    check_flags,
     check_late,
     downwards_note,
     layout_of,
@@ -45,6 +46,7 @@ Array = NDArray[np.float64]
 _FEWEST = 3  # heights
 _BLOCK = 65536  # lines read at a time
 _MOST_COLUMNS = 8
+_SAME = 0.02  # of a distance between heights that is stated twice
 _SAMPLE = 400  # lines that tell how x is rounded
 HEIGHTS, LENGTHS = "mm", "mm"  # assumed where neither file nor scene says
 
@@ -93,12 +95,14 @@ def read_profile(path: Path, source: str, given: Given = Given()) -> Profile:
                 raise InputError(f"{source}: none of the {count} heights is a number")
             raise InputError(f"{source}: {_no_rows(rows)}")
         data = check_late(
-            chain((line for line in head if line.number >= layout.first), lines), source
+            chain((line for line in head if line.number >= layout.first), lines),
+            source,
+            alone=layout.width == 1,
         )
-        table, numbers, odd = _table(path, data, layout, source)
+        table, numbers, decimals = _table(path, data, layout, source)
     if len(table) < _FEWEST:
         raise InputError(f"{source}: only {len(table)} heights: too few for a road")
-    return _profile(table, numbers, odd, layout, rows, given, source)
+    return _profile(table, numbers, decimals, layout, rows, given, source)
 
 
 def _no_rows(rows: Sequence[Line]) -> str:
@@ -118,8 +122,8 @@ def _no_rows(rows: Sequence[Line]) -> str:
 
 def _table(
     path: Path, data: Iterator[Line], layout: Layout, source: str
-) -> tuple[Array, NDArray[np.intp], list[list[float]]]:
-    """All rows, their lines, and of each column numbers that are written otherwise than the rest."""
+) -> tuple[Array, NDArray[np.intp], list[Decimals]]:
+    """All rows, their lines, and of each column how its numbers are written."""
     blocks: list[Array] = []
     decimals = [Decimals() for _ in range(layout.width)]
     numbers: list[int] = []
@@ -131,13 +135,13 @@ def _table(
         check_count(path, len(numbers))
     if not blocks:
         return np.empty((0, layout.width)), np.empty(0, dtype=int), []
-    return np.concatenate(blocks), np.array(numbers), [one.codes() for one in decimals]
+    return np.concatenate(blocks), np.array(numbers), decimals
 
 
 def _profile(
     table: Array,
     numbers: NDArray[np.intp],
-    odd: list[list[float]],
+    decimals: list[Decimals],
     layout: Layout,
     rows: list[Line],
     given: Given,
@@ -145,6 +149,9 @@ def _profile(
 ) -> Profile:
     """Columns, units and missing heights of a table."""
     at, z, notes = _columns(table, layout, given, source)
+    for k in layout.of("other"):
+        check_flags(layout.columns[k], table[:, k], source)
+    decimals[z].check(source)
     notes += downwards_note(layout.columns[z].title)
     stated = layout.stated
     height = scale_of("z", layout.columns[z], stated, ("height_unit", given.height_unit), source)
@@ -163,7 +170,9 @@ def _profile(
     heights[gone] = np.nan
     if given.missing is None or len(given.missing):
         found = codes(heights[None, :], up.metres)
-        found += [code for code in odd[z] if code not in found and (heights == code).any()]
+        found += [
+            code for code in decimals[z].codes() if code not in found and (heights == code).any()
+        ]
         if found:
             same = np.isin(heights, found)
             where = f"in line {numbers[np.flatnonzero(same)[0]]}"
@@ -184,6 +193,11 @@ def _profile(
         notes += more
         x, rounding = along.metres * place, along.metres * rounding
         step = (place[-1] - place[0]) / max(len(place) - 1, 1)
+        if given.pitch and abs(along.metres * step / given.pitch - 1) > _SAME:
+            raise InputError(
+                f"{source}: heights are every {1e3 * along.metres * step:.4g} mm by {_place(layout, at)}, in {along.text}, and "
+                f"road.pitch = {given.pitch:g} m: take the key out, or say road.length_unit"
+            )
         readings.append(
             ReadAs("x", _place(layout, at), along.text, f"every {step:.4g} of the file")
         )
@@ -193,6 +207,8 @@ def _profile(
             notes.append(f"{', '.join(unsaid)}: assumed")
     elif up.assumed:
         notes.append(f"heights in {HEIGHTS}: assumed")
+    if others := [_place(layout, k) for k in range(layout.width) if k not in (at, z)]:
+        notes.append(f"not used of the file: {', '.join(others)}")
     pitch = _stated_pitch(layout, given, at, source)
     if layout.form.comma:
         notes.append("decimal commas")
@@ -275,6 +291,9 @@ def _columns(
         return None, 0, []
     if width == 3 and _is_count(table[:, 0]):
         return _ordered(table, columns, (1, 2), ["the first column counts the lines"])
+    unsaid = not given.length_unit and not layout.stated.units
+    if width == 2 and given.pitch and unsaid and _consecutive(table[:, 0]):
+        return None, 1, ["the first column counts the heights"]
     if width == 2:
         return _ordered(table, columns, (0, 1), [])
     raise _many(table, "", source)
@@ -319,7 +338,7 @@ def _by_headings(
     counts = [k for k in layout.of("count") if _consecutive(table[:, k])]
     unknown = [k for k in range(width) if columns[k].role == ""]
     if z and not x and width == 2:  # whatever it is called, it counts
-        counts += [k for k in unknown if _is_count(table[:, k]) and columns[k].unit is None]
+        counts += [k for k in unknown if _consecutive(table[:, k]) and columns[k].unit is None]
         unknown = [k for k in unknown if k not in counts]
     if width == 1:
         if columns[0].role in ("x", "time", "other"):

@@ -21,8 +21,8 @@ from tireroad.fem.errors import InputError
 
 # What programs print instead of a number that they do not have; 1.#QNAN is of older Windows.
 MISSING = re.compile(
-    r"[+-]?(?:nan(?:\(\w*\))?|n/?a|<na>|null|none|missing|void|inf(?:inity)?|\d*[.,]?#(?:q?nan|snan|ind|inf)\w*|#n/?a|#nv"
-    r"|\*+|-+|\?+)?",
+    r"[+-]?(?:nan(?:\(\w*\))?|n/?a|<na>|null|none|missing|void|inf(?:inity)?|\d*[.,]?#(?:q?nan|snan|ind|inf)\w*"
+    r"|#(?:n/?a|nv|(?:num|wert|value|ref|bezug|div/0|name|null|zahl)[!?])|\*+|-+|\?+)?",
     re.IGNORECASE,
 )
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?")
@@ -165,8 +165,10 @@ def lines_of(stream: TextIO, source: str) -> Iterator[Line]:
                 )
             text = line.translate(_TYPED).strip(" \r\n\f\v")
             mark = next((mark for mark in COMMENTS if text.lstrip().startswith(mark)), None)
-            # "#" alone over a column is a heading: #;x;z
-            if mark == "#" and re.match(r"#\s*[;\t,]", text):
+            # "#" alone over a column is a heading: #;x;z; #N/A is no height.
+            if mark == "#" and (
+                re.match(r"#\s*[;\t,]", text) or MISSING.fullmatch(re.split(r"[;,\t ]", text)[0])
+            ):
                 mark = None
             if mark:
                 yield Line(number, text.lstrip().lstrip("#%/!").strip(), True)
@@ -178,10 +180,10 @@ def lines_of(stream: TextIO, source: str) -> Iterator[Line]:
 
 
 def _bare(line: str) -> str:
-    """Without a comment at its end; `#` within a word or at the end of a heading (Sample #, z) is part of that."""
+    """Numbers without a comment at their end; in a heading (Sample #, z) `#` is part of it."""
     if "#" not in line and "//" not in line:
         return line
-    return re.sub(r"\s+(?:#(?!\s*(?:[;,\t|]|$))|//).*$", "", line)
+    return re.sub(r"^([^A-Za-z]*(?:\d|nan)[^#/]*?)\s+(?:#|//).*$", r"\1", line, flags=re.IGNORECASE)
 
 
 def quoted(text: str, separator: str) -> list[str]:
@@ -286,6 +288,7 @@ def numbers_of(lines: Sequence[Line], form: Form, width: int, source: str) -> ND
     return table
 
 
+_COUNTED = 64  # lines of a block: where trailing zeros are dropped, one in ten has fewer decimals
 _INTEGER_OR_FIXED = re.compile(r"[+-]?\d*(?:[.,](\d*))?$")
 
 
@@ -297,13 +300,14 @@ class Decimals:
     """
 
     usual: dict[int, int] = field(default_factory=dict)
+    sizes: dict[int, list[float]] = field(default_factory=dict)  # smallest and largest magnitude
     odd: dict[float, dict[int, int]] = field(default_factory=dict)
 
     def count(
         self, lines: Sequence[Line], form: Form, table: NDArray[np.float64], columns: Sequence[int]
     ) -> None:
         """Count in a block of rows `table` (lines, width), of its columns that hold heights."""
-        few = range(0, len(lines), -(-len(lines) // 16))
+        few = range(0, len(lines), -(-len(lines) // _COUNTED))
         z = table[:, list(columns)]
         marked = special(z)
         rows = np.flatnonzero(marked.any(axis=1))
@@ -320,6 +324,18 @@ class Decimals:
                     of[digits] = of.get(digits, 0) + 1
                 elif row in few:
                     self.usual[digits] = self.usual.get(digits, 0) + 1
+                    least, most = self.sizes.get(digits, (np.inf, 0.0))
+                    self.sizes[digits] = [min(least, abs(value)), max(most, abs(value))]
+
+    def check(self, source: str) -> None:
+        """InputError where heights are whole numbers below 1000 or have three decimals: 5.003 may mean 5003."""
+        if set(self.usual) == {0, 3} and min(self.usual.values()) > 2:
+            whole, parted = self.sizes[0], self.sizes[3]
+            if 100 <= whole[1] < 1000 and 1 <= parted[0] <= parted[1] < 0.2 * whole[1]:
+                raise InputError(
+                    f"{source}: heights are whole numbers up to {whole[1]:g} and numbers with three decimals from {parted[0]:.3f} "
+                    "on: do points or commas part thousands? Write the numbers without them"
+                )
 
     def codes(self) -> list[float]:
         """Special numbers that are written with other decimals than the heights, which have all the same."""
@@ -327,5 +343,7 @@ class Decimals:
             return []
         (digits,) = self.usual
         return sorted(
-            value for value, of in self.odd.items() if sum(of.values()) - of.get(digits, 0) > 1
+            value + 0.0
+            for value, of in self.odd.items()
+            if sum(of.values()) - of.get(digits, 0) > 1
         )

@@ -7,7 +7,7 @@ import math
 import os
 import tempfile
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -303,6 +303,10 @@ class Summary:
         if self._of_another:
             self._set_aside()
         self.data["stages"].pop("report", None)  # it tells a finished run
+
+    def note_files(self, rows: Sequence[Sequence[str]]) -> None:
+        """Keep what the run reads of files (runs.scene.files) for those that read the results; written with the next stage."""
+        self.data["files"] = [list(row) for row in rows]
 
     def begin(self) -> None:
         """Write scene.toml, after the summary if it has results of another scene to set aside."""

@@ -33,6 +33,7 @@ from tireroad.runs.report.realism import unusual
 from tireroad.runs.report.scene_keys import scene_keys
 from tireroad.runs.report.sections import forces, modes, sound, spectra, tire
 from tireroad.runs.report.sections.speeds import speeds
+from tireroad.runs.scene.files import HEAD
 from tireroad.runs.scene.parts import Listing, listed
 from tireroad.runs.version import PROGRAM
 
@@ -246,6 +247,7 @@ def render(directory: Path) -> str:
         if warning != short
     ]
     remarked += [(section.title, warning) for section in sections for warning in section.warnings]
+    tables = [*files_read(summary), *built_of(scene)]
     program = {"name": PROGRAM, "version": ""} | summary.get("program", {})
     return page_of(
         "report",
@@ -263,7 +265,7 @@ def render(directory: Path) -> str:
         judged=judged,
         costs=costs(stages),
         parameters=parameters(scene),
-        built_of=[(title, TextTable(head, rows)) for title, head, rows in built_of(scene)],
+        built_of=[(title, TextTable(head, rows)) for title, head, rows in tables],
         provenance=provenance,
         sections=sections,
         left_out=left_out,
@@ -400,6 +402,17 @@ def costs(stages: Mapping) -> list[dict]:
     return rows
 
 
+def files_read(summary: Mapping) -> list[Listing]:
+    """What the run read of its files as what; empty for a scene without files, and for a damaged table."""
+    rows = summary.get("files") or []
+    whole = isinstance(rows, list) and all(
+        isinstance(row, list) and len(row) == len(HEAD) for row in rows
+    )
+    if not whole:
+        return []
+    return [("Files: what was read as what", HEAD, rows)] if rows else []
+
+
 def built_of(scene: Mapping) -> list[Listing]:
     """Compounds and cords of a tire that has them all in its scene; empty for others, and for a damaged scene."""
     try:
@@ -419,7 +432,8 @@ def parameters(scene: Mapping) -> list[tuple[str, list[tuple[str, str]]]]:
     found: dict[tuple, list[tuple[str, str]]] = {}
     for one in scene_keys(scene):
         rows = found.setdefault(one.table, [])
-        rows.append((one.name.replace("_", " "), quantity(one.value, one.unit)))
+        unit = "" if isinstance(one.value, str) else one.unit  # "auto" has none
+        rows.append((one.name.replace("_", " "), quantity(one.value, unit)))
     return [(_title(table), rows) for table, rows in found.items() if table]
 
 

@@ -30,7 +30,7 @@ def quantity(value: object, unit: str = "") -> str:
     if value is None:
         return "–"
     if isinstance(value, (list, tuple)):
-        return ", ".join(quantity(part, unit) for part in value)
+        return ", ".join(quantity(part, unit) for part in value) or "–"
     if not isinstance(value, (int, float)):
         text = str(value)  # with the unit of the numbers in it; "auto" has none
         return f"{text} {shown_unit(unit)}".rstrip() if any(map(str.isdigit, text)) else text

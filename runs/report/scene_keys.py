@@ -24,20 +24,27 @@ class SceneKey(NamedTuple):
 
 
 def scene_keys(
-    scene: Mapping[str, Any], table: tuple[str | int, ...] = (), kind: type | None = Scene
+    scene: Mapping[str, Any],
+    table: tuple[str | int, ...] = (),
+    kind: type | None = Scene,
+    unit: str = "",
 ) -> Iterator[SceneKey]:
-    """All keys of a scene, or of one of its tables of a `kind`, sub-tables after the keys beside them."""
+    """All keys of a scene, or of one of its tables of a `kind`, sub-tables after the keys beside them.
+
+    `unit`: that of a key whose value is a table, such as contact.points = { dx, dy }.
+    """
     known = every_field(kind) if kind else {}
     below = []
     for name, value in scene.items():
         part = table_of(known[name]) if name in known else None
         of = part.of if part else None
+        key = key_of(known[name]) if name in known else None
+        mine = key.unit if key else unit
         if isinstance(value, Mapping):
-            below.append((value, (*table, name), of))
+            below.append((value, (*table, name), of, mine))
         elif isinstance(value, list) and value and isinstance(value[0], Mapping):
-            below += [(one, (*table, name, number), of) for number, one in enumerate(value)]
+            below += [(one, (*table, name, number), of, "") for number, one in enumerate(value)]
         else:
-            key = key_of(known[name]) if name in known else None
-            yield SceneKey(table, name, value, key.unit if key else "")
+            yield SceneKey(table, name, value, mine)
     for one in below:
         yield from scene_keys(*one)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from tireroad.fem.decks.compounds import SYSTEMS
@@ -14,11 +15,16 @@ HEAD = ("file", "quantity", "read from", "unit", "gaps, remarks")
 Row = tuple[str, str, str, str, str]
 
 
-def table(scene: Scene, until: str | None = None) -> list[str]:
-    """One line for each quantity that a run to stage `until` reads of a file; none of a scene without files."""
+def read_of(scene: Scene, until: str | None = None) -> list[Row]:
+    """What a run to stage `until` reads of files, by HEAD: one row for each quantity; none of a scene without files."""
     rows = [*_of_tire(scene), *(_of_road(scene) if meets_road(until) else [])]
     if scene.pattern is not None and scene.pattern.file:
         rows.append((Path(scene.pattern.file).name, "depth of the pattern", "", "m", ""))
+    return rows
+
+
+def table(rows: Sequence[Row]) -> list[str]:
+    """These rows as lines of text under a title; none of no rows."""
     if not rows:
         return []
     widths = [max(len(row[k]) for row in (HEAD, *rows)) for k in range(len(HEAD))]

@@ -141,10 +141,10 @@ class LaserFile(Levelled):
             line = int(found.lines[np.flatnonzero(~np.isfinite(x))[0]])
             raise InputError(f"{source}, line {line}: x is missing")
         pitch = (x[-1] - x[0]) / (len(x) - 1)
-        if found.x_assumed and 0 < pitch < _FINEST <= 1e3 * pitch:
+        if found.x_assumed and 0 < pitch < _FINEST:
             raise InputError(
                 f"{source}: heights every {1e6 * pitch:.3g} um, {x[-1] - x[0]:.3g} m long, where x is read in mm: is it in m? "
-                'Then road.length_unit = "m"'
+                "Say road.length_unit"
             )
         off = np.abs(x - x[0] - pitch * np.arange(len(x)))
         # Both ends are rounded, too. Few places tell no rounding from uneven steps.

@@ -149,4 +149,6 @@ def test_a_road_of_micrometres_is_refused_at_once(tmp_path: Path) -> None:
     rows = "\n".join(f"{a:.7e} {1.3e-3 * (1 + np.sin(k)):.7e}" for k, a in enumerate(x))
     (tmp_path / "scan.txt").write_text(rows)
     with pytest.raises(InputError, match="too short a road"):
+        LaserFile(file=str(tmp_path / "scan.txt"), length_unit="mm", height_unit="mm").make()
+    with pytest.raises(InputError, match=r"x is read in mm.*road\.length_unit"):
         LaserFile(file=str(tmp_path / "scan.txt"), height_unit="mm").make()

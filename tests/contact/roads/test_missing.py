@@ -114,3 +114,28 @@ def test_what_is_missing_already_is_no_neighbour() -> None:
     z[100:105], z[300:330], z[700:703] = 0.0, 0.0, 0.0
     z[98:100] = z[105:107] = np.nan
     assert codes(z[None, :], 1e-3) == [0.0]
+
+
+@pytest.mark.parametrize("code", [0.0, -1.0])
+@pytest.mark.parametrize("rough", [SMOOTH, NOISE], ids=["smooth", "white"])
+def test_a_code_within_the_range_of_heights(code: float, rough: np.ndarray) -> None:
+    """One number in several short runs where no other height repeats."""
+    z = np.round(rough, 6)
+    for begin, count in ((300, 2), (900, 3), (1500, 1), (2200, 2)):
+        z[begin : begin + count] = code
+    assert codes(z[None, :], 1e-3) == [code]
+
+
+@pytest.mark.parametrize("digits", [2, 3, 4, 6])
+def test_heights_that_pass_or_fade_out_to_zero_are_no_codes(digits: int) -> None:
+    window = np.hanning(N)
+    for z in (
+        SMOOTH * window,
+        SMOOTH - SMOOTH[0],
+        5 * np.sin(X / 20 * 2 * np.pi),
+        NOISE * window,
+        np.sin(X / 10 * np.pi) + np.sin(X / 15 * np.pi),
+        np.tile(SMOOTH[:750], 4),
+        np.where(X % 40 < 20, 10.0, 0.0),
+    ):
+        assert codes(np.round(z, digits)[None, :], 1e-3) == []  # fmt: skip

@@ -215,3 +215,16 @@ def test_steep_stones_are_no_outliers(tmp_path: Path) -> None:
     for heights, count in ((z, "0 outliers"), (spiked, "1 outliers")):
         made = road(tmp_path, "\n".join(f"{a},{b:.4f}" for a, b in zip(x, heights, strict=True)))
         assert any(count in note for note in made.notes)
+
+
+def test_points_that_part_thousands_are_refused(tmp_path: Path) -> None:
+    """5.003 among 512 is 5003: it was read as 5."""
+    z = np.round(2500 * np.sin(np.arange(200) / 9)).astype(int)
+    rows = [f"{k};{one:,}".replace(",", ".") for k, one in enumerate(z)]
+    (tmp_path / "road.csv").write_text("x [mm];z [um]\n" + "\n".join(rows))
+    with pytest.raises(InputError, match="part thousands"):
+        read_profile(tmp_path / "road.csv", "F")
+    for digits in (3, 4):  # as programs that drop trailing zeros write them
+        rows = [f"{k};{round(one / 7, digits):g}" for k, one in enumerate(z)]
+        (tmp_path / "road.csv").write_text("x [mm];z [um]\n" + "\n".join(rows))
+        assert len(read_profile(tmp_path / "road.csv", "F").heights) == 200

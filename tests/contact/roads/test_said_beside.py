@@ -176,11 +176,27 @@ def test_a_mask_by_another_name_is_refused(tmp_path: Path) -> None:
             read_grid(tmp_path / "road.npz")
 
 
-def test_positions_that_count_are_refused_in_every_format(tmp_path: Path) -> None:
-    np.savez(tmp_path / "road.npz", x=np.arange(120), y=Y, z=G)
-    with pytest.raises(InputError, match="may count the heights"):
+@pytest.mark.parametrize("first", [0, 1])
+@pytest.mark.parametrize("kind", [int, float])
+def test_positions_that_count_are_refused_in_every_format(
+    tmp_path: Path, kind: type, first: int
+) -> None:
+    """0, 1, 2, ... is an index as much as a metre; with a unit, or as another ramp, it is a length."""
+    x = (first + np.arange(120)).astype(kind)
+    np.savez(tmp_path / "road.npz", x=x, y=Y, z=G)
+    with pytest.raises(InputError, match=r"may count the heights.*road\.length_unit"):
         read_grid(tmp_path / "road.npz")
     assert read_grid(tmp_path / "road.npz", length_unit="m", height_unit="m").steps[0] == 1.0
+    with h5py.File(tmp_path / "road.h5", "w") as out:
+        out["x"], out["y"], out["z"] = x, Y, G
+        for name in "xyz":
+            out[name].attrs["units"] = "m"
+    assert read_grid(tmp_path / "road.h5").steps[0] == 1.0
+    for ramp in (x + 5, x - 60, 0.5 * x, 2 * x):
+        np.savez(tmp_path / "road.npz", x=ramp, y=Y, z=G)
+        grid = read_grid(tmp_path / "road.npz")
+        assert grid.measured == (ramp[0], ramp[-1])
+        assert any("in m: assumed" in note for note in grid.notes)
 
 
 @pytest.mark.parametrize("code", [-999.0, -99.0, 888.8, -999.25, 99.99, -9.99])
@@ -206,3 +222,178 @@ def test_powers_and_parts_are_units() -> None:
         found = unit_of(text)
         assert found is not None and found.metres == pytest.approx(metres), text
     assert unit_of("25 mm") is None and unit_of("10-6 m") is None
+
+
+@pytest.mark.parametrize(
+    ("unit", "metres"),
+    [("millimètres", 1e-3), ("centimètres", 1e-2), ("milímetros", 1e-3), ("Zentimeter", 1e-2), ("decimetri", 0.1),
+     ("mikrometr", 1e-6), ("Kilometers", 1e3), ("milli-metres", 1e-3), ("Fuß", 0.3048), ("′", 0.3048), ("″", 0.0254)],
+)  # fmt: skip
+@pytest.mark.parametrize("form", ["z [{}]", "z «{}»", "z [[{}]]", "z / {}"])
+def test_units_in_the_languages_of_europe(
+    tmp_path: Path, unit: str, metres: float, form: str
+) -> None:
+    found = profile(tmp_path, f"x [mm];{form.format(unit)}\n", z=metres)
+    np.testing.assert_allclose(found.heights, Z, rtol=1e-7, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "title",
+    ["cm Profile", "Profile.cm", "profilecm", "Profilecentimetres", "m. Profile", 
+     "Profile [cm] x 10", "Profile~cm", "Profile 0.1 [cm x 10]"],
+)  # fmt: skip
+def test_a_unit_in_an_unusual_place_is_refused(tmp_path: Path, title: str) -> None:
+    with pytest.raises(InputError, match="may be their unit|no unit that is known"):
+        profile(tmp_path, f"x [mm];{title}\n", z=1e-2)
+
+
+def test_titles_are_not_shifted(tmp_path: Path) -> None:
+    """A last column without a title; a unit alone that takes the place of a title."""
+    rows = [f"{1e3 * b:.6f}|{1e3 * a:.1f}|{k}" for k, (a, b) in enumerate(zip(X, Z, strict=True))]
+    (tmp_path / "road.csv").write_text('"Height [mm]"|"Weg [mm]"|""\n' + "\n".join(rows))
+    np.testing.assert_allclose(read_profile(tmp_path / "road.csv", "F").heights, Z, atol=1e-9)
+    rows = [
+        f"{k} {1e3 * a:.1f} {1e3 * b:.6f} 0.1" for k, (a, b) in enumerate(zip(X, Z, strict=True))
+    ]
+    (tmp_path / "road.csv").write_text(" Distance Texture accel [m/s2]\n" + "\n".join(rows))
+    with pytest.raises(InputError, match="headings|columns"):
+        read_profile(tmp_path / "road.csv", "F")
+
+
+@pytest.mark.parametrize(
+    "name", ["z_err", "std_z", "height uncertainty [um]", "sigma", "height error"]
+)
+def test_how_exact_heights_are_is_no_height(tmp_path: Path, name: str) -> None:
+    rows = "".join(f"{1e3 * a:.1f};{1e3 * b:.6f};0.5\n" for a, b in zip(X, Z, strict=True))
+    (tmp_path / "road.csv").write_text(f"x [mm];Macrotexture [mm];{name}\n{rows}")
+    np.testing.assert_allclose(read_profile(tmp_path / "road.csv", "F").heights, Z, atol=1e-9)
+
+
+def test_a_column_of_flags_is_refused_where_it_changes(tmp_path: Path) -> None:
+    for flags in (np.ones(120), np.arange(120) % 7 > 0):
+        rows = "".join(
+            f"{1e3 * a:.1f};{1e3 * b:.6f};{int(c)}\n" for a, b, c in zip(X, Z, flags, strict=True)
+        )
+        (tmp_path / "road.csv").write_text(f"x [mm];z [mm];valid\n{rows}")
+        if flags.all():
+            np.testing.assert_allclose(
+                read_profile(tmp_path / "road.csv", "F").heights, Z, atol=1e-9
+            )
+        else:
+            with pytest.raises(InputError, match='"valid" may say which heights are missing'):
+                read_profile(tmp_path / "road.csv", "F")
+
+
+@pytest.mark.parametrize("word", ["", "#N/A", "#WERT!", "#DIV/0!"])
+def test_a_height_that_is_missing_in_a_single_column(tmp_path: Path, word: str) -> None:
+    """Empty lines and words that begin like a comment were left out, which moved all heights behind them."""
+    rows = [f"{1e3 * z:.6f}" for z in Z]
+    rows[40:43] = [word] * 3
+    (tmp_path / "road.csv").write_text("z [mm]\n" + "\n".join(rows) + "\n\n")
+    if not word:
+        with pytest.raises(InputError, match="line 4[1-4]: is empty"):
+            read_profile(tmp_path / "road.csv", "F", Given(pitch=1e-3))
+        (tmp_path / "road.csv").write_text("z [mm]\n\n" + "\n\n".join(rows[:40]) + "\n\n")
+        assert len(read_profile(tmp_path / "road.csv", "F", Given(pitch=1e-3)).heights) == 40
+        return
+    found = read_profile(tmp_path / "road.csv", "F", Given(pitch=1e-3)).heights
+    assert np.flatnonzero(np.isnan(found)).tolist() == [40, 41, 42]
+
+
+def test_a_pitch_that_contradicts_x_is_refused(tmp_path: Path) -> None:
+    assert profile(tmp_path, "x [mm];z [mm]\n", pitch=1e-3).x is not None
+    with pytest.raises(InputError, match=r"heights are every 1 mm .* road\.pitch = 0\.002 m"):
+        profile(tmp_path, "x [mm];z [mm]\n", pitch=2e-3)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "first row x, first column y",
+        "rows: y, columns: x",
+        "x across, y down",
+        "rows = y, columns = x",
+    ],
+)
+def test_a_line_that_puts_y_down_is_refused(tmp_path: Path, line: str) -> None:
+    with pytest.raises(InputError, match="the first column is y"):
+        read_grid(matrix(tmp_path, "", f"# {line}\n"), length_unit="mm", height_unit="mm")
+    for fine in ("first column x, first row y", "rows: x, columns: y", "x down, y across"):
+        read_grid(matrix(tmp_path, "", f"# {fine}\n"), length_unit="mm", height_unit="mm")
+
+
+@pytest.mark.parametrize("corner", ["x y z / mm mm um", "x/y [mm] z [um]", "x [mm] z [foo]"])
+def test_a_corner_of_two_units_is_refused(tmp_path: Path, corner: str) -> None:
+    with pytest.raises(InputError, match="more than one unit"):
+        read_grid(matrix(tmp_path, corner))
+
+
+@pytest.mark.parametrize(
+    ("titles", "order"),
+    [("transverse position;vzdálenost;hauteur", "yxz"), ("No;Distance;width;výška", "kxyz"), ("lateral distance;x;z", "yxz")],
+)  # fmt: skip
+def test_points_under_other_names(tmp_path: Path, titles: str, order: str) -> None:
+    """One name that is not known is what is left over; a list with an index was read as a matrix."""
+    rows = []
+    for x, row in zip(X, G, strict=True):
+        for y, z in zip(Y, row, strict=True):
+            of = {"k": f"{len(rows)}", "x": f"{x:.4f}", "y": f"{y:.3f}", "z": f"{z:.9f}"}
+            rows.append(";".join(of[one] for one in order))
+    (tmp_path / "road.csv").write_text("\n".join([titles, *rows]), encoding="utf-8")
+    grid = read_grid(tmp_path / "road.csv")
+    np.testing.assert_allclose(grid.height(X[:, None] + 0 * Y, Y + 0 * X[:, None]), G, atol=1e-9)
+    (tmp_path / "road.csv").write_text("\n".join(rows))
+    if order == "kxyz":
+        with pytest.raises(InputError, match="name them"):
+            read_grid(tmp_path / "road.csv")
+
+
+@pytest.mark.parametrize(
+    "beside",
+    [{"meta": '{"units": {"x": "mm", "z": "um"}}'}, {"meta": '{"x_unit": "millim\\u00e8tres"}'}, {"readme": "all lengths in mm"},
+     {"labels": ["x (mm)", "y (mm)", "z (um)"]}, {"m_per_unit_x": 0.001}, {"to_metres": [1e-3, 1e-3, 1e-6]}, {"zero_level": 0.01},
+     {"orientation": "down"}, {"sign": "inverted"}, {"calibration": 0.01}, {"dimension": "cm"}],
+)  # fmt: skip
+def test_entries_that_may_change_lengths_or_heights(tmp_path: Path, beside: dict[str, Any]) -> None:
+    np.savez(tmp_path / "road.npz", x=X, y=Y, z=G, **beside)
+    with pytest.raises(InputError, match="unit|may be|downwards"):
+        read_grid(tmp_path / "road.npz")
+    with h5py.File(tmp_path / "road.h5", "w") as out:  # as datasets beside z
+        out["x"], out["y"], out["z"] = X, Y, G
+        for name, value in beside.items():
+            out[name] = value
+    with pytest.raises(InputError, match="unit|may be|downwards"):
+        read_grid(tmp_path / "road.h5")
+
+
+def test_units_of_three_arrays_in_one_entry(tmp_path: Path) -> None:
+    np.savez(tmp_path / "road.npz", x=1e2 * X, y=1e2 * Y, z=1e3 * G, units=["cm", "cm", "mm"])
+    grid = read_grid(tmp_path / "road.npz")
+    np.testing.assert_allclose(grid.height(X[:, None] + 0 * Y, Y + 0 * X[:, None]), G, atol=1e-9)
+    np.savez(
+        tmp_path / "road.npz",
+        x=X,
+        y=Y,
+        z=1e3 * G,
+        lateral_unit="m",
+        vertical_unit="mm",
+        speed_unit="m/s",
+    )
+    grid = read_grid(tmp_path / "road.npz")
+    np.testing.assert_allclose(grid.height(X[:, None] + 0 * Y, Y + 0 * X[:, None]), G, atol=1e-9)
+
+
+def test_whole_numbers_with_a_factor_that_is_not_known(tmp_path: Path) -> None:
+    counts = np.round(G / 1e-7).astype(np.int16)
+    with pytest.raises(InputError, match="whole numbers, and z_per_bit of z|may be a factor"):
+        read_grid(store(tmp_path, counts, {"z_per_bit": 1e-7}))
+    with pytest.raises(
+        InputError, match="whole numbers, and height_of_one of z = 1e-07 may be their factor"
+    ):
+        read_grid(store(tmp_path, counts, {"height_of_one": 1e-7}))
+    counts[40:43, 2] = -32768
+    with pytest.raises(InputError, match="-32768"):
+        read_grid(store(tmp_path, counts, {"scale_factor": 1e-7}))
+    assert read_grid(
+        store(tmp_path, counts, {"scale_factor": 1e-7, "bad_value": -32768}), holes="fill"
+    )

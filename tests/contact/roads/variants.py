@@ -19,7 +19,8 @@ Array = NDArray[np.float64]
 
 UNITS = {
     "mm": 1e-3, "cm": 1e-2, "m": 1.0, "um": 1e-6, "µm": 1e-6, "in": 0.0254, "dm": 0.1, "0.1 mm": 1e-4, "MM": 1e-3,
-    "inch": 0.0254, "Meter": 1.0, "microns": 1e-6, "1/10 mm": 1e-4, "millimetre": 1e-3, "furlong": 201.168,
+    "inch": 0.0254, "Meter": 1.0, "microns": 1e-6, "1/10 mm": 1e-4, "millimetre": 1e-3, "millimètres": 1e-3,
+    "Zentimeter": 1e-2, "ft": 0.3048, "furlong": 201.168,
 }  # fmt: skip
 KEYS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
 NAMES = {
@@ -31,6 +32,7 @@ IN_HEADING: dict[str, str] = {
     "square": "{n} [{u}]", "round": "{n} ({u})", "tight": "{n}[{u}]", "comma": "{n}, {u}", "slash": "{n}/{u}",
     "spaced slash": "{n} / {u}", "underscore": "{n}_{u}", "in": "{n} in {u}", "space": "{n} {u}", "curly": "{n} {{{u}}}",
     "colon": "{n}: {u}", "quoted": '"{n} [{u}]"', "pointed": "{n} <{u}>", "before": "{n} [{u}] raw",
+    "guillemets": "{n} «{u}»",
 }  # fmt: skip
 BESIDE = (
     "unit line", "bracketed unit line", "statement", "statements", "in words", "numbered", "none", "first alone",

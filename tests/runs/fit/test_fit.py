@@ -19,6 +19,7 @@ from tireroad.runs.fit import (
     construction,
     fit,
     read,
+    read_of,
     report,
     tire_table,
 )
@@ -208,6 +209,9 @@ def test_a_tir_file(tmp_path: Path) -> None:
     length = 2 * 0.3135 * (0.733 * x + 0.671 * np.sqrt(x))
     assert found.values["footprint_length"] == pytest.approx(length)
     assert found.pressed and "footprint_width" not in found.values
+    rows = {row[1]: row[2:] for row in read_of(found, tmp_path / "tire.tir", ["load=4000"])}
+    assert rows["mass"] == ("MASS", "kg", "9.3") and rows["load"] == ("--set", "N", "4000")
+    assert rows["footprint_length"][0].startswith("Q_RA1")
     other = read(tmp_path / "tire.tir", ["inflation=2.6e5", "size=215/60 R15"])
     assert (other.size, other.inflation) == ("215/60 R15", 2.6e5)
     curve = "[DEFLECTION_LOAD_CURVE]\n{pen fz}\n0.0 0.0\n0.010 1.5D3 $ N\n0.020 3500.0\n"
@@ -298,7 +302,8 @@ def test_tir_files_that_are_refused(tmp_path: Path, old: str, new: str, words: s
 def test_the_command(tmp_path: Path, coarse: None, capsys: pytest.CaptureFixture) -> None:
     (tmp_path / "mine.toml").write_text('size = "205/60 R15"\ninflation = 2.2e5\nmass = 8.5\n')
     assert main(["fit", str(tmp_path / "mine.toml"), "--out", str(tmp_path / "out")]) == 0
-    assert "mass, kg" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "mass, kg" in told and "files: what was read as what" in told
     assert load(tmp_path / "out" / "scene.toml").static.load == 4000
     assert main(["fit", str(tmp_path / "none.toml")]) == 2
 

@@ -18,8 +18,9 @@ from written_page import page
 
 from tireroad.contact.results.spectra import nominal
 from tireroad.fem.errors import InputError
+from tireroad.runs.files.disk import signed_table
 from tireroad.runs.report import figures, surface_figures
-from tireroad.runs.report.page import write_report
+from tireroad.runs.report.page import parameters, render, write_report
 
 pytestmark = pytest.mark.slow
 
@@ -293,3 +294,38 @@ def test_the_power_of_few_bands_is_a_number(results: Path) -> None:
     assert "radiated power, third octave 100 Hz" in text
     assert "70.2 dB, 51.8 dB(A) re 1 pW" in text
     assert "Equivalent radiated power in third-octave bands" not in text
+
+
+@pytest.mark.usefixtures("blank")
+def test_what_was_read_of_files_stands_in_a_table(results: Path) -> None:
+    """Of a road's columns, units and gaps the page had nothing; points of contact had no unit."""
+    path = results / "summary.json"
+    rows = [["road.csv", "height", "column 3 <z>", "mm", "7 of 7750 missing"]]
+    path.write_text(
+        json.dumps(
+            signed_table(
+                {k: v for k, v in json.loads(path.read_text()).items() if k != "checksum"}
+                | {"files": rows}
+            )
+        )
+    )
+    page = render(results)
+    assert "Files: what was read as what" in page
+    assert "<td>column 3 &lt;z&gt;</td>" in page and "<td>7 of 7750 missing</td>" in page
+    for damaged in ([["road.csv"]], ["road.csv"], 3):
+        path.write_text(
+            json.dumps(
+                signed_table(
+                    {k: v for k, v in json.loads(path.read_text()).items() if k != "checksum"}
+                    | {"files": damaged}
+                )
+            )
+        )
+        assert "Files: what was read as what" not in render(results)
+    points = {
+        "contact": {"points": {"dx": 0.01, "dy": 0.02}, "brush": "rolling"},
+        "time": {"step": "auto"},
+    }
+    found = dict(parameters(points))
+    assert found["contact.points"] == [("dx", "10 mm"), ("dy", "20 mm")]
+    assert found["time"] == [("step", "auto")]
