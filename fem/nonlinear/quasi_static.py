@@ -76,13 +76,20 @@ class Reduced:
         C - W V (1 + J)^-1 J (W V)^T,
 
     so that contact and s are solved for together. J is corrected by Broyden's update after each evaluation
-    and kept from one road to the next; where that fails it is taken by differences.
+    and kept from one road to the next; where that does not do it is taken anew: by `differentiate(load, s)`, or by
+    differences.
     """
 
     def __init__(
-        self, points: ContactPoints, compliance: Array, seen: Array, evaluate: Evaluate
+        self,
+        points: ContactPoints,
+        compliance: Array,
+        seen: Array,
+        evaluate: Evaluate,
+        differentiate: Evaluate | None = None,
     ) -> None:
         self.points, self.compliance, self.seen, self.evaluate = points, compliance, seen, evaluate
+        self._differentiate = differentiate or self._differences
         self.jacobian = np.zeros((seen.shape[1],) * 2)
         self.evaluations = 0
 
@@ -91,32 +98,36 @@ class Reduced:
         still = Linear(self.points, self.compliance).rest()
         return replace(still, s=np.zeros(self.seen.shape[1]))
 
-    def differentiate(self, at: Standing, first: int = 0) -> None:
-        """Take J by differences at a state, its columns from `first` on; it is symmetric."""
-        base = self.evaluate(at.load, at.s)
-        size = _PART * max(float(np.linalg.norm(self.seen.T @ at.load - at.s)), 1.0)
-        for k in range(first, len(at.s)):
-            other = at.s.copy()
+    def differentiate(self, load: Array, s: Array) -> None:
+        """Take J anew at a motion."""
+        jacobian = self._differentiate(load, s)
+        self.jacobian = (jacobian + jacobian.T) / 2
+
+    def _differences(self, load: Array, s: Array) -> Array:
+        base, out = self.evaluate(load, s), np.empty((len(s),) * 2)
+        size = _PART * max(float(np.linalg.norm(self.seen.T @ load - s)), 1.0)
+        for k in range(len(s)):
+            other = s.copy()
             other[k] -= size
-            self.jacobian[:, k] = (self.evaluate(at.load, other) - base) / size
-            self.jacobian[k, :first] = self.jacobian[:first, k]
-        self.evaluations += 1 + len(at.s) - first
-        if not first:
-            self.jacobian = (self.jacobian + self.jacobian.T) / 2
+            out[:, k] = (self.evaluate(load, other) - base) / size
+        self.evaluations += 1 + len(s)
+        return out
 
     def solve(self, road: Feature, before: Standing) -> Standing:
         """On a road, from a state near by. Raises ConvergenceError if it is not near enough."""
         try:
             return self._solve(road, before)
         except (ConvergenceError, np.linalg.LinAlgError):
-            self.differentiate(before)
+            self.differentiate(before.load, before.s)
             return self._solve(road, before)
 
     def _solve(self, road: Feature, before: Standing) -> Standing:
         s, load, w = before.s, before.load, before.w
         value, seen, one = self.evaluate(load, s), self.seen, np.eye(len(s))
         self.evaluations += 1
-        for _ in range(_MOST):
+        for turn in range(_MOST):
+            if turn % _STALE == _STALE - 1:
+                self.differentiate(load, s)
             inverse = np.linalg.inv(one + self.jacobian)
             soft = inverse @ self.jacobian
             start = s + inverse @ (value - s) - soft @ (seen.T @ load)
@@ -139,6 +150,7 @@ class Reduced:
         raise ConvergenceError(f"large motions: the reduced force on a {road} does not settle")
 
 
+_STALE = 8  # evaluations in which J should have done
 _PART, _FLOOR = 1e-5, 0.1  # of the motion, of which a difference is taken; J^(1/2)
 
 

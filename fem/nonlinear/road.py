@@ -198,7 +198,7 @@ class ContactPoints:
         )
 
 
-_MOST, _CLOSE, _REACH = 60, 1e-8, 8e-3  # iterations; m; m of motion in one of them
+_MOST, _CLOSE, _REACH = 60, 1e-7, 8e-3  # iterations; m; m of motion in one of them
 
 
 def contact_points(

@@ -9,9 +9,11 @@ least squares.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy import sparse
 
 from tireroad.fem.collective import summed
 from tireroad.fem.errors import ConvergenceError
@@ -19,7 +21,7 @@ from tireroad.fem.matrices.compliance import factorise, multiply, solve_columns
 from tireroad.fem.nonlinear.cells import cell_forms
 from tireroad.fem.nonlinear.force import RestoringForce
 from tireroad.fem.nonlinear.quasi_static import Elements, Reduced, Standing
-from tireroad.fem.nonlinear.reduced import ReducedForce, reduced_force, shares_outside
+from tireroad.fem.nonlinear.reduced import ReducedForce, outside, reduced_force, sizes
 from tireroad.fem.nonlinear.road import ContactPoints, Feature
 from tireroad.fem.static.symmetric import TURN, looks_the_same
 from tireroad.fem.static.virtual_work import AT_REST, tangent
@@ -29,11 +31,11 @@ Array = np.ndarray
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """Of a training: `share` of K^-1 r outside the vectors at which a state's joins them, `kept` of all states in
-    the vectors kept at last, `tolerance` of the weights; `step` of a road's height, m; `most` vectors at last."""
+    """Of a training: largest `share` (outside over sizes) that the vectors may lack of a state on the way, and that
+    those `kept` at last may; `tolerance` of the weights; `step` of a road's height, m; `most` vectors at last."""
 
-    share: float = 0.03
-    kept: float = 0.015
+    share: float = 0.04
+    kept: float = 0.03
     tolerance: float = 0.01
     step: float = 4e-3
     most: int = 80
@@ -41,7 +43,7 @@ class Settings:
 
 @dataclass
 class Trained:
-    """What was learnt on one road: `lacked` and `left`, shares outside V before and after; how the state was found."""
+    """What was learnt on one road: largest shares `lacked` and `left` before and after; how states were found."""
 
     road: str
     states: int
@@ -54,7 +56,7 @@ class Trained:
 class Training:
     """The reduced force with its vectors V (n, k) on own unknowns and the `record` of each road.
 
-    `states`: used, half-turned copies included; `left`: largest share of K^-1 r outside V over them; `error`: of
+    `states`: used, half-turned copies included; `left`: largest share of them that V lacks; `error`: of
     the weighted force over the states, relative; `tangents` of Newton's method; `evaluations` of all cells.
     """
 
@@ -91,7 +93,9 @@ class Trainer:
             compliance[:, part] = self.elements.seen(self.answer(self._columns[:, part].toarray()))
         n = len(force.at_rest)
         self.vectors = np.zeros((n, 0))
-        self.tire = Reduced(points, compliance, np.zeros((count, 0)), self._evaluate)
+        nothing = np.zeros((count, 0))
+        self.tire = Reduced(points, compliance, nothing, self._evaluate, self._jacobian)
+        self._cells = _Tangents(force)
         self.turn = half_turn(force)
         self.motions: list[Array] = []
         self.answers: list[Array] = []
@@ -112,6 +116,11 @@ class Trainer:
         """V^T r, K q being known: V^T K q = (W V)^T h - s."""
         pushed = summed(self._comm, self.vectors.T @ self.force.change(self.motion(load, s)))
         return pushed - (self.tire.seen.T @ load - s)
+
+    def _jacobian(self, load: Array, s: Array) -> Array:
+        """V^T (dF/dq - K) V."""
+        inside = self._cells.between(self.vectors, self.motion(load, s))
+        return inside - np.eye(len(s))
 
     def visit(self, road: Feature) -> None:
         """Climb a road and learn from the states on the way."""
@@ -138,25 +147,33 @@ class Trainer:
         )
 
     def _learnt(self, road: Feature, before: Standing, found: Trained) -> Standing:
-        """The state on a road, solved for again while its K^-1 r lies outside the vectors."""
+        """The state on a road, solved for again while the vectors lack some of its K^-1 r."""
         for turn in range(_TURNS):
             state = self._solved(road, before, found)
             motion = self.motion(state.load, state.s)
-            share, rest = self._compared(motion)
+            share, answer, rest = self._lacking(motion)
             if not turn:
                 found.lacked = max(found.lacked, share)
-            if share <= self.settings.share or turn == _TURNS - 1:
+            if share <= self.settings.share:
                 break
             before = self._grown(state, rest)
+        else:
+            with suppress(ConvergenceError):
+                state, motion = self._by_elements(road, motion, before, found)
+                share, answer, _ = self._lacking(motion)
+        # States on the way are none of the tire's.
+        self.motions.append(motion)
+        self.answers.append(answer)
         found.left, found.states = max(found.left, share), found.states + 1
         return state
 
     def _compress(self) -> None:
         """Vectors of all answers so far in place of those that joined one by one."""
+        if not self.answers:
+            return
         before = multiply(self._stiffness, self.vectors)
-        self.vectors = decomposed(
-            self.force, self._with_turned(self.answers), self.settings.kept, _MANY
-        )[0]
+        motions, answers = self._with_turned(self.motions), self._with_turned(self.answers)
+        self.vectors, _ = decomposed(self.force, motions, answers, self.settings.share, _MANY)
         overlap = summed(self._comm, self.vectors.T @ before)
         self.tire.seen = self.elements.seen(self.vectors)
         self.tire.jacobian = overlap @ self.tire.jacobian @ overlap.T
@@ -166,34 +183,32 @@ class Trainer:
         own = np.stack(fields, axis=1)
         return own if self.turn is None else np.hstack([own, self.turn(own)])
 
-    def _compared(self, motion: Array) -> tuple[float, Array]:
-        """Record a state; the share of its K^-1 r outside the vectors, and that part."""
+    def _lacking(self, motion: Array) -> tuple[float, Array, Array]:
+        """Share of a state that the vectors lack, its K^-1 r (n,), and the part of it outside them."""
         forces = self.force.nonlinear(motion[:, None])
         answers = self.answer(forces)
-        self.motions.append(motion)
-        self.answers.append(answers[:, 0])
-        share = shares_outside(self.force, self.vectors, answers, forces)[0]
+        off = outside(self.force, self.vectors, answers, forces)
+        share = off / np.maximum(sizes(self.force, motion[:, None], answers), _LEAST)
         inside = summed(self._comm, self.vectors.T @ forces)
-        return float(share), (answers - self.vectors @ inside)[:, 0]
+        return float(share[0]), answers[:, 0], (answers - self.vectors @ inside)[:, 0]
 
     def _solved(self, road: Feature, before: Standing, found: Trained) -> Standing:
         """By the reduced tire, otherwise by the elements from the state before."""
-        tire = self.tire
         try:
-            return tire.solve(road, before)
+            return self.tire.solve(road, before)
         except (ConvergenceError, np.linalg.LinAlgError):
-            found.how = "elements"
-        motion = self.elements.solve(road, self.motion(before.load, before.s), _TANGENTS)
-        stood = self.elements.standing(motion, road)
-        self._compared(motion)
-        self._grown(Standing(stood.w, stood.force, stood.load, before.s), self._lacking(motion))
-        s = summed(self._comm, self.vectors.T @ self.force.nonlinear(motion[:, None]))[:, 0]
-        return Standing(stood.w, stood.force, stood.load, s)
+            return self._by_elements(road, self.motion(before.load, before.s), before, found)[0]
 
-    def _lacking(self, motion: Array) -> Array:
-        answer = self.answers[-1]
-        product = multiply(self._stiffness, answer[:, None])
-        return answer - (self.vectors @ summed(self._comm, self.vectors.T @ product))[:, 0]
+    def _by_elements(
+        self, road: Feature, motion: Array, before: Standing, found: Trained
+    ) -> tuple[Standing, Array]:
+        """The elements' state and motion from one near by, whose K^-1 r the vectors then hold."""
+        found.how = "elements"
+        motion = self.elements.solve(road, motion, _TANGENTS)
+        stood = self.elements.standing(motion, road)
+        self._grown(replace(stood, s=before.s), self._lacking(motion)[2])
+        s = summed(self._comm, self.vectors.T @ self.force.nonlinear(motion[:, None]))[:, 0]
+        return replace(stood, s=s), motion
 
     def _grown(self, state: Standing, rest: Array) -> Standing:
         """Let what the vectors lack join them, with its half-turned copy; the state in the new ones."""
@@ -210,18 +225,17 @@ class Trainer:
         tire.seen = self.elements.seen(self.vectors)
         added = self.vectors.shape[1] - before
         tire.jacobian = np.pad(tire.jacobian, (0, added))
-        grown = Standing(state.w, state.force, state.load, np.append(state.s, np.zeros(added)))
-        tire.differentiate(grown, before)
-        return grown
+        return Standing(state.w, state.force, state.load, np.append(state.s, np.zeros(added)))
 
     def concluded(self) -> Training:
         """Vectors and weights from all states."""
+        force, settings = self.force, self.settings
         motions, answers = self._with_turned(self.motions), self._with_turned(self.answers)
-        vectors, singular = decomposed(self.force, answers, self.settings.kept, self.settings.most)
-        forces = multiply(self._stiffness, answers)
-        left = shares_outside(self.force, vectors, answers, forces)
+        vectors, singular = decomposed(force, motions, answers, settings.kept, settings.most)
+        forces, scale = multiply(self._stiffness, answers), sizes(force, motions, answers)
+        left = outside(force, vectors, answers, forces) / _scale(scale)
         cells, weights, error = weighted_cells(
-            self.force, vectors, motions, forces, self.settings.tolerance
+            force, vectors, motions, forces, _scale(scale), settings.tolerance
         )
         return Training(
             force=reduced_force(self.force, vectors, cells, weights),
@@ -236,7 +250,37 @@ class Trainer:
         )
 
 
-_TURNS, _SMALLEST, _NONE, _BLOCK, _MANY, _TANGENTS = 8, 0.1, 1e-9, 512, 400, 6
+_LEAST = 0.1  # J^(1/2): the size of a motion of hundredths of a joule
+_TURNS, _SMALLEST, _NONE, _BLOCK, _MANY, _TANGENTS = 5, 0.1, 1e-9, 512, 400, 6
+
+
+class _Tangents:
+    """V^T (dF/dq) V from the cells' stiffnesses, some cells at a time. Collective."""
+
+    def __init__(self, force: RestoringForce) -> None:
+        self._force = force
+        whole = cell_forms(force.body, tangent(force.body, force.work), 2)
+        cells, local = len(whole.place), len(force.body.u.x.array)
+        self._parts = []
+        for first in range(0, cells, _CELLS):
+            part = whole.only(np.arange(first, min(first + _CELLS, cells)))
+            place = part.place.ravel()
+            ones = np.ones(len(place)), (place, np.arange(len(place)))
+            self._parts.append((part, sparse.csr_matrix(ones, (local, len(place)))))
+
+    def between(self, vectors: Array, motion: Array) -> Array:
+        """(k, k) of V (n, k) at a motion (n,)."""
+        force, rest = self._force, self._force.body.u.x.array.copy()
+        at_nodes = np.stack([force.local(one) - rest for one in vectors.T], axis=1)
+        here, pushed = force.local(motion), np.zeros(at_nodes.shape)
+        for part, spread in self._parts:
+            size = part.place.shape[1]
+            product = part(here).reshape(-1, size, size) @ at_nodes[part.place]
+            pushed += spread @ product.reshape(-1, vectors.shape[1])
+        return summed(force.body.comm, at_nodes.T @ pushed)
+
+
+_CELLS = 128
 
 
 def train(
@@ -256,35 +300,43 @@ def train(
     return trainer.concluded()
 
 
+def _scale(size: Array) -> Array:
+    """Sizes of states by which errors are divided: those of the smallest motions are not told from none."""
+    return np.maximum(size, _SMALL * size.max())
+
+
+_SMALL = 1 / 20
+
+
 def decomposed(
-    force: RestoringForce, answers: Array, kept: float, most: int
+    force: RestoringForce, motions: Array, answers: Array, kept: float, most: int
 ) -> tuple[Array, Array]:
-    """V (n, k) of answers (n, s), V^T K V = 1, and all singular values J^(1/2): the fewest vectors outside which
-    at most the share `kept` of every answer's norm lies, or `most`. Collective."""
-    comm = force.body.comm
+    """V (n, k), V^T K V = 1, of states' motions and answers K^-1 r (n, s), and the singular values, of answers over
+    sizes: the fewest vectors, at most `most`, that lack no more than the share `kept` of any state. Collective."""
     forces = multiply(force.operators.stiffness, answers)
-    gram = summed(comm, answers.T @ forces)
-    sizes = np.sqrt(np.diag(gram))
-    # Small motions count as large ones do, down to a twentieth of the largest.
-    scale = 1 / np.maximum(sizes, sizes.max() / 20)
+    gram = summed(force.body.comm, answers.T @ forces)
+    scale = 1 / _scale(sizes(force, motions, answers))
     squares, turn = np.linalg.eigh(scale[:, None] * (gram + gram.T) / 2 * scale)
-    squares, turn = squares[::-1], turn[:, ::-1]
-    inside = np.cumsum(squares * turn**2, axis=1) / (sizes * scale)[:, None] ** 2
-    outside = np.sqrt(np.maximum(1 - inside, 0.0)).max(axis=0)
-    enough = np.flatnonzero(outside <= kept)
+    squares, turn = np.maximum(squares[::-1], 0.0), turn[:, ::-1]
+    lacking = (squares * turn**2).sum(axis=1)[:, None] - np.cumsum(squares * turn**2, axis=1)
+    enough = np.flatnonzero(lacking.max(axis=0) <= kept**2)
     count = min(int(enough[0]) + 1 if len(enough) else len(squares), most)
     count = min(count, int((squares > 1e-14 * squares[0]).sum()))
     vectors = answers @ (scale[:, None] * turn[:, :count] / np.sqrt(squares[:count]))
-    return vectors, np.sqrt(np.maximum(squares, 0.0))
+    return vectors, np.sqrt(squares)
 
 
 def weighted_cells(
-    force: RestoringForce, vectors: Array, motions: Array, forces: Array, tolerance: float
+    force: RestoringForce,
+    vectors: Array,
+    motions: Array,
+    forces: Array,
+    scale: Array,
+    tolerance: float,
 ) -> tuple[Array, Array, float]:
     """Numbers (c,) of cells, ascending, their weights (c,), and the relative error of V^T r that is left.
 
-    min |G w - G 1| over w >= 0, G_(s j),e = V_j^T r_e(q_s) with every state s scaled to the size of its V^T r
-    (a twentieth of the largest at least), by the normal equations. Collective.
+    min |G w - G 1| over w >= 0, G_(s j),e = V_j^T r_e(q_s) / scale_s, by the normal equations. Collective.
     """
     body, comm = force.body, force.body.comm
     forms = cell_forms(body, force.work, 1)
@@ -296,8 +348,6 @@ def weighted_cells(
         [force.local(one)[forms.place] - rest[forms.place] for one in vectors.T], axis=-1
     )
     wanted = summed(comm, vectors.T @ forces).T  # (s, k)
-    scale = np.linalg.norm(wanted, axis=1)
-    scale = np.maximum(scale, scale.max() / 20)
     count = comm.allgather(len(at_rest))
     first = sum(count[: comm.rank])
     normal, right = np.zeros((sum(count),) * 2), np.zeros(sum(count))
