@@ -95,7 +95,7 @@ class Trainer:
         self.vectors = np.zeros((n, 0))
         nothing = np.zeros((count, 0))
         self.tire = Reduced(points, compliance, nothing, self._evaluate, self._jacobian)
-        self._cells = _Tangents(force)
+        self._cells = CellTangents(force)
         self.turn = half_turn(force)
         self.motions: list[Array] = []
         self.answers: list[Array] = []
@@ -126,6 +126,7 @@ class Trainer:
         """Climb a road and learn from the states on the way."""
         steps = np.ceil(max(abs(road.rise), abs(road.height)) / self.settings.step - 1e-9)
         done, size, state = 0.0, 1.0 / max(steps, 1.0), self.tire.rest()
+        smallest = _SMALLEST * size
         found = Trained(str(road), 0, 0.0, 0.0, "reduced")
         while done < 1.0 - 1e-9:
             part = min(1.0, done + size)
@@ -133,7 +134,7 @@ class Trainer:
                 state = self._learnt(road.times(part), state, found)
             except (ConvergenceError, np.linalg.LinAlgError) as error:
                 size /= 2
-                if size < _SMALLEST:
+                if size < smallest:
                     found.how = f"to {100 * done:.0f} % of its height: {error}"
                     break
                 continue
@@ -148,6 +149,9 @@ class Trainer:
 
     def _learnt(self, road: Feature, before: Standing, found: Trained) -> Standing:
         """The state on a road, solved for again while the vectors lack some of its K^-1 r."""
+        # Vectors may have joined on the way to a state that was not found.
+        lacking = self.vectors.shape[1] - len(before.s)
+        before = replace(before, s=np.append(before.s, np.zeros(lacking)))
         for turn in range(_TURNS):
             state = self._solved(road, before, found)
             motion = self.motion(state.load, state.s)
@@ -168,12 +172,13 @@ class Trainer:
         return state
 
     def _compress(self) -> None:
-        """Vectors of all answers so far in place of those that joined one by one."""
+        """Vectors of all answers so far in place of those that joined one by one; more of them than are kept at last,
+        with which more roads are climbed to their height."""
         if not self.answers:
             return
         before = multiply(self._stiffness, self.vectors)
         motions, answers = self._with_turned(self.motions), self._with_turned(self.answers)
-        self.vectors, _ = decomposed(self.force, motions, answers, self.settings.share, _MANY)
+        self.vectors, _ = decomposed(self.force, motions, answers, self.settings.share / 4, _MANY)
         overlap = summed(self._comm, self.vectors.T @ before)
         self.tire.seen = self.elements.seen(self.vectors)
         self.tire.jacobian = overlap @ self.tire.jacobian @ overlap.T
@@ -225,7 +230,7 @@ class Trainer:
         tire.seen = self.elements.seen(self.vectors)
         added = self.vectors.shape[1] - before
         tire.jacobian = np.pad(tire.jacobian, (0, added))
-        return Standing(state.w, state.force, state.load, np.append(state.s, np.zeros(added)))
+        return replace(state, s=np.append(state.s, np.zeros(added)))
 
     def concluded(self) -> Training:
         """Vectors and weights from all states."""
@@ -251,10 +256,10 @@ class Trainer:
 
 
 _LEAST = 0.1  # J^(1/2): the size of a motion of hundredths of a joule
-_TURNS, _SMALLEST, _NONE, _BLOCK, _MANY, _TANGENTS = 5, 0.1, 1e-9, 512, 400, 6
+_TURNS, _SMALLEST, _NONE, _BLOCK, _MANY, _TANGENTS = 5, 0.25, 1e-9, 512, 400, 6
 
 
-class _Tangents:
+class CellTangents:
     """V^T (dF/dq) V from the cells' stiffnesses, some cells at a time. Collective."""
 
     def __init__(self, force: RestoringForce) -> None:

@@ -154,7 +154,7 @@ def rows(load: float, all_found: Sequence[Found]) -> list[list]:
                 row += [""] * 3
                 continue
             off = other.total() - true
-            along = percent(off[0] / top[0]) if one.road.height else ""
+            along = percent(off[0] / top[0]) if top[0] > _NONE * top[2] else ""
             change = float(np.linalg.norm(one.exact.load))
             row += [percent(off[2] / top[2]), along]
             row.append(percent(float(np.linalg.norm(other.load - one.exact.load)) / change))
@@ -214,7 +214,7 @@ def run() -> list[Table]:
     ]
 
 
-_TIMES, _RISES = 100, (5e-3, 15e-3)
+_TIMES, _RISES, _NONE = 100, (5e-3, 15e-3), 1e-3
 
 
 def _meshes() -> Table:

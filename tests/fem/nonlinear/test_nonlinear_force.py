@@ -12,7 +12,14 @@ from tireroad.fem.nonlinear.cells import cell_forms
 from tireroad.fem.nonlinear.quasi_static import Elements, Linear, Reduced, climb
 from tireroad.fem.nonlinear.reduced import at_nodes, outside, reduced_force, sizes
 from tireroad.fem.nonlinear.road import Feature, contact_points
-from tireroad.fem.nonlinear.training import Settings, decomposed, half_turn, nonnegative, train
+from tireroad.fem.nonlinear.training import (
+    CellTangents,
+    Settings,
+    decomposed,
+    half_turn,
+    nonnegative,
+    train,
+)
 from tireroad.fem.static.virtual_work import tangent
 
 
@@ -87,6 +94,23 @@ def test_cells_stiffness_is_that_of_small_motions(tire):
     wanted = multiply(force.operators.stiffness, motion[:, None])[:, 0]
     found = total[force.operators.unknowns.free]
     assert np.allclose(found, wanted, rtol=0, atol=1e-10 * np.abs(wanted).max())
+
+
+def test_the_jacobian_is_the_change_of_the_tangent(tire):
+    """By differences of the cells, from the cells' stiffnesses, and from the assembled matrices."""
+    force, _ = tire
+    vectors, motion = smooth(force, 1.0), smooth(force, 4e-3)[:, 0]
+    number = np.sort(cell_forms(force.body, force.work, 1).number)
+    whole = reduced_force(force, vectors, number, np.ones(len(number)))
+    here = at_nodes(force, motion[:, None], whole.nodes)[:, 0]
+    assert len(whole.evaluate(here)) == 3
+    found = whole.jacobian(here, whole.vectors)
+    matrix = force.tangent(motion, motion)
+    inside = vectors.T @ multiply(matrix, vectors)
+    wanted = inside - vectors.T @ multiply(force.operators.stiffness, vectors)
+    assert np.allclose(found, wanted, rtol=0, atol=1e-4 * np.abs(wanted).max())
+    found = CellTangents(force).between(vectors, motion)
+    assert np.allclose(found, inside, rtol=0, atol=1e-10 * np.abs(inside).max())
 
 
 def test_a_half_turned_motion_has_the_half_turned_force(tire):
