@@ -21,7 +21,7 @@ import warnings
 from collections.abc import Callable
 from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import basix
 import cffi
@@ -296,3 +296,61 @@ def cell_facets(mesh: dmesh.Mesh) -> np.ndarray:
 def meshtags(mesh: dmesh.Mesh, dim: int, entities: np.ndarray, values: np.ndarray) -> Any:
     """Integer tags of mesh entities, which must be in ascending order."""
     return dmesh.meshtags(mesh, dim, entities.astype(np.int32), values.astype(np.int32))
+
+
+class Kernels(NamedTuple):
+    """Addresses of a form's compiled element kernels, 0 for none, and the form that keeps them."""
+
+    form: Any
+    cell: int
+    facet: int
+
+
+_CELL, _FACET = 0, 1  # integral types of UFCx
+
+
+def kernels(form: Any) -> Kernels:
+    """The kernels of a compiled form with at most one integral over cells and one over facets."""
+    ufcx, found = form.ufcx_form, []
+    reader = cffi.FFI()
+    for kind in (_CELL, _FACET):
+        if hasattr(ufcx, "form_integral_offsets"):  # from 0.7 on
+            first, last = ufcx.form_integral_offsets[kind], ufcx.form_integral_offsets[kind + 1]
+            every = [ufcx.form_integrals[k] for k in range(first, last)]
+        else:
+            every = [ufcx.integrals(kind)[k] for k in range(ufcx.num_integrals(kind))]
+        if len(every) > 1:
+            raise NotImplementedError("a form with several integrals of one type")
+        pointers = [one.tabulate_tensor_float64 for one in every]
+        found += [int(reader.cast("uintptr_t", pointer)) for pointer in pointers] or [0]
+    return Kernels(form, *found)
+
+
+def cell_coefficients(form: Any) -> np.ndarray:
+    """Values (cells, w) of a compiled form's coefficients in this process's own cells, as its kernels take
+    them."""
+    packed = dolfinx.cpp.fem.pack_coefficients(getattr(form, "_cpp_object", form))
+    kind = dolfinx.cpp.fem.IntegralType.cell
+    return next(np.array(values) for key, values in packed.items() if key[0] == kind)
+
+
+def constants(form: Any) -> np.ndarray:
+    """Values of a compiled form's constants, as its kernels take them."""
+    return np.array(dolfinx.cpp.fem.pack_constants(getattr(form, "_cpp_object", form)), float)
+
+
+def cell_points(mesh: dmesh.Mesh) -> np.ndarray:
+    """Coordinates (cells, nodes, 3) m of this process's cells, ghosts included, in their order."""
+    dofmap = mesh.geometry.dofmap
+    count = mesh.topology.index_map(3).size_local + mesh.topology.index_map(3).num_ghosts
+    nodes = np.asarray(getattr(dofmap, "array", dofmap)).reshape(count, -1)
+    return mesh.geometry.x[nodes]
+
+
+def cell_nodes(space: fem.FunctionSpace) -> np.ndarray:
+    """Local nodes (cells, nodes) of a field in this process's cells, ghosts included."""
+    nodes = space.dofmap.list
+    count = (
+        space.mesh.topology.index_map(3).size_local + space.mesh.topology.index_map(3).num_ghosts
+    )
+    return np.asarray(getattr(nodes, "array", nodes)).reshape(count, -1)

@@ -14,14 +14,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-import ufl
-from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import sparse
-from ufl.core.expr import Expr
 
-from tireroad.fem import compat, kinematics
 from tireroad.fem.cavity import Column
 from tireroad.fem.collective import summed
 from tireroad.fem.errors import ConvergenceError, InputError
@@ -34,14 +30,8 @@ from tireroad.fem.matrices.compliance import (
     solve_columns,
 )
 from tireroad.fem.matrices.operators import Operators, RimMotion, Rotation, carried_pencil
-from tireroad.fem.static.virtual_work import (
-    AT_REST,
-    Rolling,
-    added_energy,
-    added_stress,
-    static_residual,
-)
-from tireroad.fem.tire.body import Body
+from tireroad.fem.nonlinear.force import RestoringForce
+from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.wheel import Axle
 
 
@@ -508,11 +498,8 @@ class NonlinearTire(FullTire):
         modal: ModalDamping | None = None,
         turning: tuple[Rotation, Rolling] | None = None,
     ) -> None:
-        if operators.unknowns.rim:
-            raise InputError(
-                'nonlinear tire in time: modal.rim = "free" is not available; take "fixed"'
-            )
         rolling = turning[1] if turning else AT_REST
+        self._force = RestoringForce(operators, inflation, rolling)
         super().__init__(
             operators=operators,
             rotation=turning[0] if turning else None,
@@ -524,22 +511,8 @@ class NonlinearTire(FullTire):
             spectral_radius=spectral_radius,
             modal=modal,
         )
-        body = operators.body
-        self._body, self._small = body, _FLOOR * body.ring.thickness
-        self._static = body.u.x.array.copy()
-        pressure = fem.Constant(body.mesh, float(inflation))
-        work, potential = static_residual(body, pressure, rolling), _potential(body, pressure)
-        if body.wall.stiffens:
-            before, share = fem.Function(body.space), body.wall.stiffening()
-            before.x.array[:] = self._static
-            work += added_stress(body, share, before)
-            potential += added_energy(body, share, before)
-        self._force_form, self._potential_form = compat.form(work), compat.form(potential)
-        self._assembled = compat.force_vector(self._force_form, body.space)
-        n = len(self._mass)
-        self._rest = self._at(np.zeros(n), self._forces)
-        self._rest_potential = self._at(np.zeros(n), self._stored)
-        self._elastic = np.zeros(n)
+        self._small = _FLOOR * operators.body.ring.thickness
+        self._elastic = np.zeros(len(self._mass))
         self.turns = 0
 
     def predict(self) -> np.ndarray:
@@ -555,7 +528,7 @@ class NonlinearTire(FullTire):
         again. Raises ConvergenceError after MOST_TURNS iterations.
         """
         new = self._free + self._answer @ force
-        elastic = self._at(new, self._forces) - self._rest
+        elastic = self._force.change(new)
         defect = self._dynamic(new) + elastic - self._columns @ force
         change = self._solved(defect)
         largest = (float(abs(v).max(initial=0.0)) for v in (change, new))
@@ -586,44 +559,12 @@ class NonlinearTire(FullTire):
         balanced = (1 - a) * acceleration + a * self.acceleration
         return self._mass * balanced + self._product(rate)
 
-    def _at(self, motion: np.ndarray, work: ufl.Form) -> np.ndarray:
-        """Value of `work()` at the static state plus a motion; the body is restored."""
-        field = self._body.u.x
-        field.array[self._operators.unknowns.free] += motion
-        field.scatter_forward()
-        result = work()
-        field.array[:] = self._static
-        return result
-
-    def _forces(self) -> np.ndarray:
-        """F at the body's displacement, own free rows, N."""
-        with self._assembled.localForm() as local:
-            local.set(0.0)
-        fem.petsc.assemble_vector(self._assembled, self._force_form)
-        self._assembled.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-        return self._assembled.array_r[self._operators.unknowns.free]
-
-    def _stored(self) -> float:
-        return self.comm.allreduce(fem.assemble_scalar(self._potential_form))
-
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """Continue from a snapshot, before `predict`; written by any number of processes."""
         super().restore(state)
-        self._elastic = self._at(self.displacement, self._forces) - self._rest
+        self._elastic = self._force.change(self.displacement)
 
     def energy(self) -> float:
         """Kinetic energy and energy stored since the static state, J; standing wheel only."""
         kinetic = self.comm.allreduce(self._mass @ self.velocity**2) / 2
-        return kinetic + self._at(self.displacement, self._stored) - self._rest_potential
-
-
-def _potential(body: Body, pressure: Expr) -> ufl.Form:
-    """Strain energy of wall and cords plus p V, J, in UFL.
-
-    V(u) is the volume enclosed by the inner face, whose edges are fixed."""
-    F = kinematics.deformation_gradient(body.u)
-    distortion, dilatation = body.wall.energy(F.T * F)
-    place = ufl.SpatialCoordinate(body.mesh) + body.u
-    swept = kinematics.pressure_virtual_work(body.u, place, ufl.FacetNormal(body.mesh)) / 3
-    wall = distortion * body.dx + dilatation * body.reduced_dx
-    return wall + body.plies.energy(body.u) + pressure * swept * body.inner_ds
+        return kinetic + self._force.energy(self.displacement)

@@ -143,7 +143,7 @@ def tangent(body: Body, residual: ufl.Form) -> ufl.Form:
     return ufl.derivative(residual, body.u, body.trial)
 
 
-def stress_prediction(body: Body, before: fem.Function) -> ufl.Form:
+def stress_prediction(body: Body, before: fem.Function, share: Expr | float = 0.0) -> ufl.Form:
     """Correction that turns the tangent into that of a mixed (displacement-stress) Newton method.
 
     There the stresses S at the Gauss points are independent unknowns; S = S(C(u)) is linearised
@@ -151,7 +151,8 @@ def stress_prediction(body: Body, before: fem.Function) -> ufl.Form:
     sym(grad du^T grad v) takes S = S(C_0) + dS/dC [dC], predicted from the last iterate `before`,
     instead of S(C(u)). In a thin or nearly incompressible wall S(C(u)) of an iterate is
     meaningless, as stretch is of second order in the step and is multiplied by the largest
-    stiffness. Source: Magisano, Leonetti, Garcea 2017, doi 10.1016/j.cma.2016.10.023.
+    stiffness. `share`: that of `added_stress` in the residual. Source: Magisano, Leonetti, Garcea
+    2017, doi 10.1016/j.cma.2016.10.023.
     """
     u, v, du = body.u, body.test, body.trial
     F, F0 = kinematics.deformation_gradient(u), kinematics.deformation_gradient(before)
@@ -165,7 +166,8 @@ def stress_prediction(body: Body, before: fem.Function) -> ufl.Form:
             return second_stress(body, part, C)
 
         slope = ufl.diff(stress(F0.T * F0 + reach * rate), reach)
-        return ufl.inner(stress(F0.T * F0) + slope - stress(F.T * F), bending)
+        off = stress(F0.T * F0) + slope - stress(F.T * F)
+        return (1 + share) * ufl.inner(off, bending)
 
     stretch = body.plies.stress_prediction(u, before, du, v)
     return correction(0) * body.dx + correction(1) * body.reduced_dx + stretch
