@@ -57,6 +57,8 @@ _JIT_KEY = (
 )
 _DECLARED = "tireroad_declarations"  # the C declarations of a plain library, kept inside it
 
+_CELL, _FACET = 0, 1  # integral types of UFCx
+
 
 def misfit(version: str, scalar: type, maps: str) -> str:
     """Name the libraries of an environment that do not fit together, and a remedy; "" if all fit.
@@ -304,9 +306,6 @@ class Kernels(NamedTuple):
     form: Any
     cell: int
     facet: int
-
-
-_CELL, _FACET = 0, 1  # integral types of UFCx
 
 
 def kernels(form: Any) -> Kernels:

@@ -823,7 +823,7 @@ def _factor_row(found: Fitted, name: str) -> tuple[str, ...]:
 
 
 def read_of(figures: FitFigures, path: Path, changes: Sequence[str] = ()) -> list[files.Row]:
-    """What was read of a file of figures as what, by the head of the table of a run's files."""
+    """Rows of the table of a run's files: what was read of a file of figures as what."""
     tir = path.suffix.lower() == ".tir"
     found: list[tuple[str, str, str, str]] = [
         ("size", "[DIMENSION]" if tir else "size", "", figures.size),

@@ -90,7 +90,7 @@ def test_who_must_never_import_whom(sentence: str) -> None:
         for imported in imports
         if imported == other or imported.startswith(f"{other}.")
     ]
-    assert wrong == []
+    assert not wrong, "\n".join(wrong)
 
 
 # Modules that other work holds at the moment, for rules of style.
@@ -120,7 +120,7 @@ def test_constants_stand_before_the_first_definition() -> None:
                 if not names & defined:
                     late.append(f"{name}: {ast.unparse(node)[:60]}")
                 defined |= names & _targets(node)
-    assert late == []
+    assert not late, "\n".join(late)
 
 
 def test_docstrings_begin_with_their_subject() -> None:
@@ -133,7 +133,7 @@ def test_docstrings_begin_with_their_subject() -> None:
         if isinstance(node, ast.FunctionDef | ast.ClassDef | ast.Module)
         and (ast.get_docstring(node) or "-").split()[0] in ("Of", "Which", "That", "What")
     ]
-    assert wrong == []
+    assert not wrong, "\n".join(wrong)
 
 
 def _targets(node: ast.Assign | ast.AnnAssign) -> set[str]:
@@ -193,7 +193,7 @@ def test_modules_that_texts_name_exist() -> None:
         ]
         paths = (found[0] for found in files.finditer(text))
         wrong += [f"{file.name}: {one}" for one in paths if not (ROOT / one).exists()]
-    assert wrong == []
+    assert not wrong, "\n".join(wrong)
 
 
 def _journeys() -> list[tuple[str, list[str]]]:

@@ -27,6 +27,15 @@ from tireroad.fem.nonlinear.road import Compliance, ContactPoints, Feature, Touc
 
 Array = np.ndarray
 
+Evaluate = Callable[[Array, Array], Array]
+TOLERANCE = 1e-3  # of s over the tire's whole motion in the same measure
+_MOST = 30
+_STALE = 8  # evaluations in which J should have done
+_PART, _FLOOR = 1e-5, 0.1  # of the motion, of which a difference is taken; J^(1/2)
+_BALANCED, _DIVERGED, _LEAST = 1e-5, 1e4, 10.0  # of the norm of the points' forces; N
+_STEP = 0.012  # m: largest motion in one step
+State = TypeVar("State")
+
 
 @dataclass(frozen=True)
 class Standing:
@@ -60,11 +69,6 @@ class Linear:
         plain = Compliance(self.compliance, np.zeros((len(nothing), 0)), np.zeros((0, 0)))
         w, touch = self.points.solve(plain, nothing, road, before.w, self._moved)
         return Standing(w, touch.force, touch.load - self.points.rest, before.s)
-
-
-Evaluate = Callable[[Array, Array], Array]
-TOLERANCE = 1e-3  # of s over the tire's whole motion in the same measure
-_MOST = 30
 
 
 class Reduced:
@@ -150,10 +154,6 @@ class Reduced:
         raise ConvergenceError(f"large motions: the reduced force on a {road} does not settle")
 
 
-_STALE = 8  # evaluations in which J should have done
-_PART, _FLOOR = 1e-5, 0.1  # of the motion, of which a difference is taken; J^(1/2)
-
-
 class Elements:
     """The finite elements under the contact points, by Newton's method. All methods are collective."""
 
@@ -221,10 +221,6 @@ class Elements:
         return Standing(w, touch.force, touch.load - self.points.rest, np.zeros(0))
 
 
-_BALANCED, _DIVERGED, _LEAST = 1e-5, 1e4, 10.0  # of the norm of the points' forces; N
-_STEP = 0.012  # m: largest motion in one step
-
-
 def _on_all(comm: MPI.Comm, own: sparse.csr_matrix) -> sparse.csr_matrix:
     """The rows of all processes on every process. Collective."""
     part = own.tocoo()
@@ -234,9 +230,6 @@ def _on_all(comm: MPI.Comm, own: sparse.csr_matrix) -> sparse.csr_matrix:
     every = allgather_rows(comm, entries)
     index = every[:, 0].astype(int), every[:, 1].astype(int)
     return sparse.csr_matrix((every[:, 2], index), (rows, own.shape[1]))
-
-
-State = TypeVar("State")
 
 
 class Tire(Protocol[State]):

@@ -70,7 +70,7 @@ def at_nodes(force: RestoringForce, fields: Array, nodes: Array) -> Array:
 def reduced_force(
     force: RestoringForce, vectors: Array, cells: Array, weights: Array
 ) -> ReducedForce:
-    """Of `vectors` V (n, k) on own unknowns, V^T K V = 1, and weighted cells, by their numbers. Collective."""
+    """The reduced force of `vectors` V (n, k) on own unknowns, V^T K V = 1, and weighted cells, by their numbers. Collective."""
     body, comm = force.body, force.body.comm
     forces = cell_forms(body, force.work, 1)
     own = np.flatnonzero(np.isin(forces.number, cells))

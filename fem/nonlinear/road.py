@@ -15,6 +15,8 @@ from tireroad.fem.tire.mesh import NodeGrid
 
 Array = np.ndarray
 
+_MOST, _CLOSE, _REACH = 60, 1e-7, 8e-3  # iterations; m; m of motion in one of them
+
 
 class Surface(NamedTuple):
     """Height (n,) m over the static road plane, slopes (n, 2) and curvatures (n, 2, 2) 1/m at n places."""
@@ -196,9 +198,6 @@ class ContactPoints:
         raise ConvergenceError(
             f"large motions: the contact with a {road} does not converge: {size:.1e} m left"
         )
-
-
-_MOST, _CLOSE, _REACH = 60, 1e-7, 8e-3  # iterations; m; m of motion in one of them
 
 
 def contact_points(

@@ -28,10 +28,16 @@ from tireroad.fem.static.virtual_work import AT_REST, tangent
 
 Array = np.ndarray
 
+_LEAST = 0.1  # J^(1/2): the size of a motion of hundredths of a joule
+_TURNS, _SMALLEST, _NONE, _BLOCK, _MANY, _TANGENTS = 5, 0.25, 1e-9, 512, 400, 6
+_CELLS = 128
+_SMALL = 1 / 20
+_SAME = 1e-3  # of a force: that of a half-turned motion and the half-turned force
+
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """Of a training: largest `share` (outside over sizes) that the vectors may lack of a state on the way, and that
+    """Settings of a training: largest `share` (outside over sizes) that the vectors may lack of a state on the way, and that
     those `kept` at last may; `tolerance` of the weights; `step` of a road's height, m; `most` vectors at last."""
 
     share: float = 0.04
@@ -43,7 +49,7 @@ class Settings:
 
 @dataclass
 class Trained:
-    """What was learnt on one road: largest shares `lacked` and `left` before and after; how states were found."""
+    """Outcome of the training on one road: largest shares `lacked` and `left` before and after; how states were found."""
 
     road: str
     states: int
@@ -255,10 +261,6 @@ class Trainer:
         )
 
 
-_LEAST = 0.1  # J^(1/2): the size of a motion of hundredths of a joule
-_TURNS, _SMALLEST, _NONE, _BLOCK, _MANY, _TANGENTS = 5, 0.25, 1e-9, 512, 400, 6
-
-
 class CellTangents:
     """V^T (dF/dq) V from the cells' stiffnesses, some cells at a time. Collective."""
 
@@ -285,9 +287,6 @@ class CellTangents:
         return summed(force.body.comm, at_nodes.T @ pushed)
 
 
-_CELLS = 128
-
-
 def train(
     force: RestoringForce,
     points: ContactPoints,
@@ -308,9 +307,6 @@ def train(
 def _scale(size: Array) -> Array:
     """Sizes of states by which errors are divided: those of the smallest motions are not told from none."""
     return np.maximum(size, _SMALL * size.max())
-
-
-_SMALL = 1 / 20
 
 
 def decomposed(
@@ -404,9 +400,6 @@ def nonnegative(normal: Array, right: Array, total: float, tolerance: float) -> 
             weights[np.setdiff1d(np.arange(len(weights)), chosen)] = 0.0
             if not chosen:
                 return weights, error
-
-
-_SAME = 1e-3  # of a force: that of a half-turned motion and the half-turned force
 
 
 def half_turn(force: RestoringForce) -> Callable[[Array], Array] | None:

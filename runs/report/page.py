@@ -403,7 +403,7 @@ def costs(stages: Mapping) -> list[dict]:
 
 
 def files_read(summary: Mapping) -> list[Listing]:
-    """What the run read of its files as what; empty for a scene without files, and for a damaged table."""
+    """Tables of what the run read of its files as what; none for a scene without files, and for a damaged table."""
     rows = summary.get("files") or []
     whole = isinstance(rows, list) and all(
         isinstance(row, list) and len(row) == len(HEAD) for row in rows

@@ -16,7 +16,7 @@ Row = tuple[str, str, str, str, str]
 
 
 def read_of(scene: Scene, until: str | None = None) -> list[Row]:
-    """What a run to stage `until` reads of files, by HEAD: one row for each quantity; none of a scene without files."""
+    """Rows, by HEAD, of what a run to stage `until` reads of files: one for each quantity; none of a scene without files."""
     rows = [*_of_tire(scene), *(_of_road(scene) if meets_road(until) else [])]
     if scene.pattern is not None and scene.pattern.file:
         rows.append((Path(scene.pattern.file).name, "depth of the pattern", "", "m", ""))

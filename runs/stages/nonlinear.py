@@ -45,7 +45,7 @@ class Nonlinear:
 
 
 def stored(training: Training, restoring: RestoringForce) -> Nonlinear:
-    """What of a training is stored, on every process. Collective."""
+    """The stored part of a training, on every process. Collective."""
     everywhere, spread = restoring.body.everywhere, restoring.operators.spread
     record = training.record
     return Nonlinear(
