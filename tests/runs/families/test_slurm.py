@@ -72,8 +72,8 @@ def test_a_sweep_through_slurm(tmp_path: Path, launch, queue) -> None:
     ended(queue, 600)
     with (out / "sweep.csv").open() as file:
         rows = list(csv.DictReader(file))
-    assert len(rows) == 3 and all(row["modes: lowest (Hz)"] for row in rows)
-    assert len({row["modes: lowest (Hz)"] for row in rows}) == 1
+    assert len(rows) == 3 and all(row["modes: lowest mode (Hz)"] for row in rows)
+    assert len({row["modes: lowest mode (Hz)"] for row in rows}) == 1
     # One member computed what all share; the others, in a later job, took it.
     logs = [file.read_text() for file in sorted((out / "jobs").glob("*.txt"))]
     assert sum("modes     done" in text for text in logs) == 1

@@ -221,8 +221,8 @@ def test_a_sweep_runs_gathers_and_shares(folder: Path, launch) -> None:
     with (out / "sweep.csv").open() as file:
         rows = {row["member"]: row for row in csv.DictReader(file)}
     # Viscous damping takes no part in the state of a standing tire, computed once for both; modes.h5 has its ratios.
-    assert rows["light"]["modes: lowest (Hz)"] == rows["same"]["modes: lowest (Hz)"] != ""
-    assert rows["burst"]["modes: lowest (Hz)"] == ""
+    assert rows["light"]["modes: lowest mode (Hz)"] == rows["same"]["modes: lowest mode (Hz)"] != ""
+    assert rows["burst"]["modes: lowest mode (Hz)"] == ""
     logs = {name: (out / "logs" / f"{name}.txt").read_text() for name in members}
     assert "inflation" in logs["burst"] and "  inflation" not in logs["again"]
     assert "static    done" in logs["light"] and "static    reused" in logs["same"]
