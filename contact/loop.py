@@ -392,6 +392,11 @@ class ContactProblem:
         return self._solver.factorisations
 
     @property
+    def lagging(self) -> int:
+        """Number of steps so far whose normal and horizontal forces were found in turn only (BrushFriction.lagging)."""
+        return self._friction.lagging if self._friction else 0
+
+    @property
     def largest_unique(self) -> float | None:
         """Friction coefficient up to which the points that touch at rest have one solution; None without friction."""
         return (

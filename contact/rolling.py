@@ -189,8 +189,8 @@ class _Rolled:
 
     def freely(self, across: float) -> None:
         """From now on the slip along the road lets the wheel roll freely, with a slip `across`."""
+        self.held((self.slip, across))
         self._across = across
-        self._creep(self.slip, across)
 
     def held(self, slip: tuple[float, float]) -> None:
         """From now on the wheel slips so, reached step by step: a sudden slip moves more than a step can solve."""

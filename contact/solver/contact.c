@@ -122,6 +122,7 @@ typedef struct {
     uint8_t *touched;
     double *horizontal, *before;          /* (2, c) N of the last two steps */
     long turns, products, all_turns;      /* of the last step; of all steps */
+    long lagged, streak;                  /* steps whose forces lag, and how many were the last ones */
     struct brush_work *work;
 } brush;
 
@@ -1085,8 +1086,8 @@ int stick_slip_solve(stick_slip *s, double tolerance) {
 
 /* ---- Both in turn -------------------------------------------------------------------------------------------------- */
 
-/* Turns: at most; in which the normal forces follow in a Newton step; after which stick and slip are solved in each. */
-enum { TURNS = 100, FOLLOWED = 8, FLAT = 30, MIXED = 4, LIFT_PATIENCE = 10 };
+/* Steps in a row whose forces may lag; turns: at most; in which the normal forces follow in a Newton step; after which stick and slip are solved in each. */
+enum { LAGS = 40, TURNS = 40, FOLLOWED = 8, FLAT = 30, MIXED = 4, LIFT_PATIENCE = 10 };
 static const double ENOUGH = 0.1; /* of the tolerance: stick and slip within a turn */
 static const double SHRUNK = 0.03, SMALL = 1e-6; /* of the first residual of a step, down to a share of the largest bound */
 
@@ -1316,6 +1317,34 @@ static int normal_forces(const normal_contact *n, int turn, const double *q, con
     return active_set_solve(n->all, q, guess, reference, force);
 }
 
+/* A step whose normal and tangential forces have no solution together that is found: normal forces with the tangential ones of the
+   last step, and stick and slip under these, which both have one. */
+static int lagging(brush *s, normal_contact *normal, const double *q, const double *at_rest, const double *free,
+                   double *force) {
+    struct brush_work *w = s->work;
+    const int c = s->compliance->points;
+    int failed;
+    memcpy(w->trial, s->horizontal, 2 * c * sizeof(double));
+    do {
+        lifted_by(s, q, w->trial, c, w->every);
+        if ((failed = normal_forces(normal, s->turns, w->q, w->set, at_rest, force))) return failed;
+        failed = normal->others ? normal->others(w->q, force) : SOLVED;
+    } while (failed == AGAIN);
+    if (failed) return failed;
+    drag(s, force, free, w->moved);
+    stick_slip problem = sticking(s, force);
+    const int a = problem.count;
+    for (int d = 0; d < 2; d++)
+        for (int k = 0; k < a; k++) w->force[d * a + k] = w->trial[d * c + w->index[k]];
+    if ((failed = stick_slip_solve(&problem, ENOUGH * s->tolerance))) return failed;
+    memset(w->found, 0, 2 * c * sizeof(double));
+    for (int d = 0; d < 2; d++)
+        for (int k = 0; k < a; k++) w->found[d * c + w->index[k]] = w->force[d * a + k];
+    s->lagged++, s->streak++;
+    finish(s, force, free);
+    return SOLVED;
+}
+
 int brush_solve(brush *s, normal_contact *normal, const double *q, const uint8_t *guess, const double *at_rest,
                 const double *free, double *force) {
     struct brush_work *w = s->work;
@@ -1365,7 +1394,7 @@ int brush_solve(brush *s, normal_contact *normal, const double *q, const uint8_t
                 if (failed == AGAIN) continue; /* with more points */
                 if (failed) return failed;
             }
-            s->products += problem.products, s->all_turns += s->turns;
+            s->products += problem.products, s->all_turns += s->turns, s->streak = 0;
             finish(s, force, free);
             return SOLVED;
         }
@@ -1385,7 +1414,7 @@ int brush_solve(brush *s, normal_contact *normal, const double *q, const uint8_t
         if (follows) memcpy(w->trial, w->found, 2 * c * sizeof(double));
         else held = mix(s, held, w->trial, w->found, w->trial);
     }
-    return UNSOLVED;
+    return unbounded || s->streak >= LAGS ? UNSOLVED : lagging(s, normal, q, at_rest, free, force);
 }
 
 /* ---- Before and after the solution of a step ------------------------------------------------------------------------ */

@@ -18,7 +18,7 @@ from tireroad.fem.errors import ConvergenceError
 _C, _FFI = COMPILED.lib, COMPILED.ffi
 
 SLIDING_TOLERANCE = 1e-10  # of the largest bound, or of the largest force where nothing is bounded
-TURNS = 100
+TURNS = 40  # at most: contact.c
 # Residual of the horizontal forces under the normal ones, relative to the largest bound. On a rough road under a passenger
 # tire at mu = 1 the axle forces in third octaves from 31 to 630 Hz are then within 0.02 dB of those at 1e-8.
 # Beside it, a step leaves at most 3 % of the residual it begins with, down to 1e-6 of that bound.
@@ -205,6 +205,8 @@ class BrushFriction:
     slip are solved in each turn, and Anderson's acceleration (J. ACM 12 (1965) 547) combines the last four results: block
     Gauss-Seidel, which converges while the same points touch and stick; with slip for mu ||A_zz^-1 A_zh|| < 1, where the
     solution is unique too. Turns begin with a linear extrapolation of the last two steps.
+    A step may have no solution beyond mu ||A_zz^-1 A_zh|| = 1: after 40 turns normal forces take the horizontal ones of the step
+    before and stick and slip these normal forces, which both have a solution (`lagging` counts such steps).
     Without a friction coefficient there may be no solution: a point at the edge may bear a force
     that lifts it off the road, where it bears none. In such a step its bristle bears none. Compiled (contact.c).
     """
@@ -265,6 +267,11 @@ class BrushFriction:
         """Turns that the last solution took."""
         return int(self.compiled.turns)
 
+    @property
+    def lagging(self) -> int:
+        """Number of steps so far in which normal and horizontal forces each took the other's of the step before."""
+        return int(self.compiled.lagged)
+
     def largest_unique(self, touching: Mask, normal: ContactSolver) -> float:
         """Largest friction coefficient with a unique solution, with these points touching."""
         index, plane = np.flatnonzero(touching), self._plane
@@ -287,6 +294,7 @@ class BrushFriction:
             "horizontal": self.horizontal,
             "horizontal_before": self._before.T.copy(),
             "held": held,
+            "lagging": np.array([self.compiled.lagged, self.compiled.streak]),
         }
         return self._brush.state() | kept
 
@@ -294,6 +302,7 @@ class BrushFriction:
         """Continue from `state`."""
         self._horizontal[:], self._before[:] = state["horizontal"].T, state["horizontal_before"].T
         self._brush.set_state(state)
+        self.compiled.lagged, self.compiled.streak = state["lagging"].tolist()
         held = np.ascontiguousarray(state["held"], np.int32)
         _C.plane_hold(self._plane.compiled, len(held), COMPILED.ints(held))
 
@@ -302,8 +311,8 @@ class BrushFriction:
     ) -> tuple[Array, Array]:
         """Normal (c,) and horizontal (c, 2) forces, N, the latter until the next call; `free` (2c,) m, x then y.
 
-        `guess`: the points that touch, by default those of the last step. ConvergenceError after 100 turns without
-        convergence.
+        `guess`: the points that touch, by default those of the last step. After 40 turns without convergence the step is
+        split; ConvergenceError after 40 such steps in a row, or where nothing bounds the horizontal forces.
         """
         if static is not self._static:
             self._static = static
@@ -380,14 +389,12 @@ class BrushFriction:
         contact.count, contact.some = len(self._some), COMPILED.ints(self._some)
 
     def _unsolved(self) -> ConvergenceError:
-        law = self._brush.law
-        if law.friction is None:
-            cure = "give contact.friction, which bounds them, or a smaller brush stiffness or time.step"
-        else:
-            cure = (
-                f"lower contact.friction (now {law.friction:g}): a tire that slides as a whole, braked, driven or at a large "
-                "slip angle, may have no steady sliding where friction is near 1"
-            )
+        unbounded = self._brush.law.friction is None
+        cure = (
+            "give contact.friction, which bounds them, or a smaller brush stiffness or time.step"
+            if unbounded
+            else "lower contact.friction, or take a smaller time.step"
+        )
         return ConvergenceError(
             f"contact: normal and horizontal forces do not converge in {TURNS} iterations; the horizontal forces "
             f"are too large for this step: {cure}"

@@ -189,12 +189,30 @@ def test_cattaneo_mindlin() -> None:
 
 
 def test_friction_beyond_any_answer_is_refused() -> None:
-    """Pushed forward, the tire lifts off by a hundred times that, and then is pushed no more."""
+    """Pushed forward, the tire lifts off by a hundred times that, and then is pushed no more: after 40 steps that lag."""
     tire = Rigid(len(PATCH.points))
     c = len(PATCH.points)
     tire.same_step[:c, c : 2 * c] = 100 * np.diag(TREAD.diagonal())
-    with pytest.raises(ConvergenceError, match="friction"):
+    with pytest.raises(ConvergenceError, match="lower contact.friction"):
         run(BrushLaw(3e7, 2.0, (0.1, 0.0)), 50, tire=tire)
+
+
+def test_a_step_without_an_answer_is_split() -> None:
+    """f = 1 N - 5 t with |t| = f: lifted by t > 0 the point bears 1/6 N, wedged by t < 0 no f fits; then it bears 1 N, as
+    with the t = 0 of before, and friction follows."""
+    tire = 1e-6 * np.array([[1.0, 5.0, 0.0], [0.3, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    one = np.zeros(1)
+    for pushed, bears, lagging in ((-1e-4, 1 / 6, 0), (1e-4, 1.0, 1)):
+        brush = Brush(BrushLaw(1e9, 1.0, kind="spring"), one, np.zeros(1, int), 10.0, 1e-4)
+        brush.begin(np.ones(1, bool))
+        friction, solver = BrushFriction(brush, tire, None), ActiveSet(tire[:1, :1])
+        force, t = friction.solve(solver, one - 1e-6, None, one, np.array([pushed, 0.0]))
+        assert force[0] == pytest.approx(bears, rel=1e-3)
+        assert abs(t[0, 0]) == pytest.approx(force[0], rel=1e-3)
+        assert friction.lagging == lagging
+        again = BrushFriction(brush, tire, None)
+        again.set_state(friction.state())
+        assert again.lagging == lagging
 
 
 def test_a_point_that_its_own_bristle_lifts_off_bears_nothing() -> None:
