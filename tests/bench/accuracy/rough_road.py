@@ -51,7 +51,7 @@ residual = "{residual}"
 [contact]
 points = {{ dx = {pitch}, dy = {pitch} }}
 youngs_modulus = 1e7
-friction = 0.0
+friction = {friction}
 [road]
 {road}
 [time]
@@ -78,7 +78,7 @@ def write_scene(file: Path, mesh: Mesh, **keys: object) -> Path:
     `road`: the lines of its table. A key that is None is left out of the scene.
     """
     values: dict[str, object] = {"speed": SPEED, "modes": 100, "residual": "static"}
-    values |= {"pitch": 0.008, "duration": 0.2, "step": 1e-4, "road": TEXTURE}
+    values |= {"pitch": 0.008, "duration": 0.2, "step": 1e-4, "road": TEXTURE, "friction": None}
     values |= vars(mesh) | keys
     absent = {name for name, value in values.items() if value is None}
     lines = [line for line in SCENE.splitlines(True) if not absent & set(_named(line))]
@@ -100,10 +100,11 @@ class Prepared:
 
 
 def prepared(folder: Path, mesh: Mesh, *sets: str, **keys: object) -> Prepared:
-    """A run up to its Green's functions, with settled points; `sets` as for --set. Collective."""
+    """A run without friction up to its Green's functions, with settled points; `sets` as for --set. Collective."""
     from tireroad.runs.scene.load import load
 
     folder.mkdir(parents=True, exist_ok=True)
+    keys = {"friction": 0.0} | keys
     scene = load(write_scene(folder / "given.toml", mesh, **keys), list(sets))
     with console.quiet():
         run = run_scene(
