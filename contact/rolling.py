@@ -154,9 +154,8 @@ def rolling_steadily(
         rolled.until_steady(length)
     contact = rolled.loop.contact
     forces = contact.vertical.copy(), contact.horizontal.T.copy()
-    return replace(
-        found, steady=SteadyRolling(contact.state(), contact.change.copy(), *forces, rolled.way)
-    )
+    state = contact.state() | {"lagging": np.zeros(2, int)}  # counted from the loop's first step on
+    return replace(found, steady=SteadyRolling(state, contact.change.copy(), *forces, rolled.way))
 
 
 class _Rolled:

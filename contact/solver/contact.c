@@ -9,6 +9,7 @@ typedef struct {
 extern blas linked;
 
 enum { SOLVED, SINGULAR, NO_SET, NOT_FINITE, UNSOLVED, REFUSED, AGAIN };
+enum { LAGS = 40, TURNS = 40 };  /* at most: steps in a row whose normal and tangential forces lag; turns of a step */
 
 /* f >= 0, g = A (f - f_ref) + q >= 0, f . g = 0 for a matrix A (n, n), stored by rows and by columns. */
 typedef struct {
@@ -1086,8 +1087,8 @@ int stick_slip_solve(stick_slip *s, double tolerance) {
 
 /* ---- Both in turn -------------------------------------------------------------------------------------------------- */
 
-/* Steps in a row whose forces may lag; turns: at most; in which the normal forces follow in a Newton step; after which stick and slip are solved in each. */
-enum { LAGS = 40, TURNS = 40, FOLLOWED = 8, FLAT = 30, MIXED = 4, LIFT_PATIENCE = 10 };
+/* Turns in which the normal forces follow in a Newton step; after which stick and slip are solved in each. */
+enum { FOLLOWED = 8, FLAT = 30, MIXED = 4, LIFT_PATIENCE = 10 };
 static const double ENOUGH = 0.1; /* of the tolerance: stick and slip within a turn */
 static const double SHRUNK = 0.03, SMALL = 1e-6; /* of the first residual of a step, down to a share of the largest bound */
 
@@ -1317,6 +1318,18 @@ static int normal_forces(const normal_contact *n, int turn, const double *q, con
     return active_set_solve(n->all, q, guess, reference, force);
 }
 
+/* Trial forces (2, c) of the points to be solved for, side by side in `force`; and these back in `found` (2, c), 0 elsewhere. */
+static void gather(struct brush_work *w, int a, int c) {
+    for (int d = 0; d < 2; d++)
+        for (int k = 0; k < a; k++) w->force[d * a + k] = w->trial[d * c + w->index[k]];
+}
+
+static void scatter(struct brush_work *w, int a, int c) {
+    memset(w->found, 0, 2 * c * sizeof(double));
+    for (int d = 0; d < 2; d++)
+        for (int k = 0; k < a; k++) w->found[d * c + w->index[k]] = w->force[d * a + k];
+}
+
 /* A step whose normal and tangential forces have no solution together that is found: normal forces with the tangential ones of the
    last step, and stick and slip under these, which both have one. */
 static int lagging(brush *s, normal_contact *normal, const double *q, const double *at_rest, const double *free,
@@ -1334,12 +1347,9 @@ static int lagging(brush *s, normal_contact *normal, const double *q, const doub
     drag(s, force, free, w->moved);
     stick_slip problem = sticking(s, force);
     const int a = problem.count;
-    for (int d = 0; d < 2; d++)
-        for (int k = 0; k < a; k++) w->force[d * a + k] = w->trial[d * c + w->index[k]];
+    gather(w, a, c);
     if ((failed = stick_slip_solve(&problem, ENOUGH * s->tolerance))) return failed;
-    memset(w->found, 0, 2 * c * sizeof(double));
-    for (int d = 0; d < 2; d++)
-        for (int k = 0; k < a; k++) w->found[d * c + w->index[k]] = w->force[d * a + k];
+    scatter(w, a, c);
     s->lagged++, s->streak++;
     finish(s, force, free);
     return SOLVED;
@@ -1369,8 +1379,7 @@ int brush_solve(brush *s, normal_contact *normal, const double *q, const uint8_t
             }
         stick_slip problem = sticking(s, force);
         const int a = problem.count, follows = own && s->turns <= FOLLOWED;
-        for (int d = 0; d < 2; d++)
-            for (int k = 0; k < a; k++) w->force[d * a + k] = w->trial[d * c + w->index[k]];
+        gather(w, a, c);
         onto_discs(a, w->bound, w->force);
         problem.caution = caution;
         problem.off = residual(&problem, w->ahead, w->off);
@@ -1383,9 +1392,7 @@ int brush_solve(brush *s, normal_contact *normal, const double *q, const uint8_t
         const double shrunk = fmax(SHRUNK * first, SMALL * problem.largest);
         const double limit = fmin(s->tolerance * problem.largest, shrunk);
         double cut = 0.0; /* what the bounds have cut off still acted on the normal forces */
-        memset(w->found, 0, 2 * c * sizeof(double));
-        for (int d = 0; d < 2; d++)
-            for (int k = 0; k < a; k++) w->found[d * c + w->index[k]] = w->force[d * a + k];
+        scatter(w, a, c);
         for (int i = 0; i < 2 * c; i++) cut = fmax(cut, fabs(w->found[i] - w->trial[i]));
         if (fmax(problem.off, cut) <= limit) {
             if (normal->others) {
@@ -1409,8 +1416,7 @@ int brush_solve(brush *s, normal_contact *normal, const double *q, const uint8_t
         }
         s->products += problem.products;
         if (failed) return failed;
-        for (int d = 0; d < 2; d++)
-            for (int k = 0; k < a; k++) w->found[d * c + w->index[k]] = w->force[d * a + k];
+        scatter(w, a, c);
         if (follows) memcpy(w->trial, w->found, 2 * c * sizeof(double));
         else held = mix(s, held, w->trial, w->found, w->trial);
     }

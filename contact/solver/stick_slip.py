@@ -18,7 +18,7 @@ from tireroad.fem.errors import ConvergenceError
 _C, _FFI = COMPILED.lib, COMPILED.ffi
 
 SLIDING_TOLERANCE = 1e-10  # of the largest bound, or of the largest force where nothing is bounded
-TURNS = 40  # at most: contact.c
+TURNS = int(_C.TURNS)
 # Residual of the horizontal forces under the normal ones, relative to the largest bound. On a rough road under a passenger
 # tire at mu = 1 the axle forces in third octaves from 31 to 630 Hz are then within 0.02 dB of those at 1e-8.
 # Beside it, a step leaves at most 3 % of the residual it begins with, down to 1e-6 of that bound.
