@@ -26,6 +26,11 @@ from tireroad.greens.recursion import LoadedColumns, ahead_of_mean
 
 _ROUNDING = 1e-9  # of the number of steps: a duration that is a multiple of the step stays one
 
+# The road is met at places that change no gap by more than this share of the largest deflection of a point under its own force.
+MEETING = 1e-2
+MEETINGS = 20  # solutions of a step, at most
+MIXED = 5  # of them whose places are combined
+
 
 @dataclass(frozen=True)
 class Steps:
@@ -63,7 +68,8 @@ def check_times(duration: float, size: float) -> None:
 class Solved(NamedTuple):
     """The solution at the contact points, and the residual and `penetration` (m) of it.
 
-    `force` (c,) N, `gap` (c,) m, `horizontal` (2, c) N, or (2, 0) without friction.
+    `force` (c,) N, `gap` (c,) m, `horizontal` (2, c) N, or (2, 0) without friction, `slope` (c, 2) of the road that
+    the points meet, None where it is level.
     """
 
     force: Array
@@ -71,6 +77,7 @@ class Solved(NamedTuple):
     horizontal: Array
     residual: float
     penetration: float
+    slope: Array | None = None
 
 
 class Ahead(Protocol):
@@ -92,25 +99,32 @@ class RootSolve:
         self._comm, self._count, self._ahead = comm, count, ahead
 
     def __call__(
-        self, predict: Callable[[], Array], solve: Callable[[Array], Solved], horizontal: bool
+        self,
+        predict: Callable[[], Array],
+        solve: Callable[[Array], Solved],
+        horizontal: bool,
+        leans: bool,
     ) -> tuple[Array, Solved]:
         """The tire's prediction, and the solution that `solve` finds for it on the root process.
 
-        `horizontal`: whether the solution has horizontal forces. A ConvergenceError or InputError on the
-        root is raised on all processes. Collective.
+        `horizontal`: whether the solution has horizontal forces; `leans`: whether it has slopes. A ConvergenceError or
+        InputError on the root is raised on all processes. Collective.
         """
         if self._comm.size == 1:
             return (free := predict()), solve(free)
         if self._ahead is None:
-            return (free := predict()), self._told(solve, free, horizontal)
+            return (free := predict()), self._told(solve, free, horizontal, leans)
         free = predict() if self._comm.rank == 0 else np.empty(0)
         self._ahead.look_ahead()
-        found = self._told(solve, free, horizontal)
+        found = self._told(solve, free, horizontal, leans)
         self._ahead.exchange()
         return free if self._comm.rank == 0 else predict(), found
 
-    def _told(self, solve: Callable[[Array], Solved], free: Array, horizontal: bool) -> Solved:
-        values, failed = np.empty(2 + (4 if horizontal else 2) * self._count), None
+    def _told(
+        self, solve: Callable[[Array], Solved], free: Array, horizontal: bool, leans: bool
+    ) -> Solved:
+        numbers = 2 + 2 * horizontal + 2 * leans  # of each point
+        values, failed = np.empty(2 + numbers * self._count), None
         if self._comm.rank == 0:
             try:
                 values = _packed(solve(free))
@@ -121,18 +135,21 @@ class RootSolve:
             failed = self._comm.bcast(failed)
             assert failed is not None, "what stopped the root process"
             raise failed
-        return self._unpacked(values)
+        return self._unpacked(values, leans)
 
-    def _unpacked(self, values: Array) -> Solved:
+    def _unpacked(self, values: Array, leans: bool) -> Solved:
         c = self._count
-        force, gap = values[2 : 2 + c], values[2 + c : 2 + 2 * c]
         residual, penetration = values[:2].tolist()
-        return Solved(force, gap, values[2 + 2 * c :].reshape(2, -1), residual, penetration)
+        force, gap, plane = values[2 : 2 + c], values[2 + c : 2 + 2 * c], values[2 + 2 * c :]
+        slope = plane[len(plane) - 2 * c :].reshape(c, 2) if leans else None
+        horizontal = plane[: len(plane) - 2 * c * leans].reshape(2, -1)
+        return Solved(force, gap, horizontal, residual, penetration, slope)
 
 
 def _packed(found: Solved) -> Array:
     scalars = found.residual, found.penetration
-    return np.concatenate([scalars, found.force, found.gap, found.horizontal.ravel()])
+    slope = () if found.slope is None else found.slope.ravel()
+    return np.concatenate([scalars, found.force, found.gap, found.horizontal.ravel(), slope])
 
 
 # What needs no contact is computed for as many steps at once as make this many points, and for at most so many.
@@ -283,30 +300,88 @@ class Drive:
     """The road's approach: `height(x, y)` m over the static plane, pointwise for any shape.
 
     `motion(t)` m is its vertical motion, `speed` in m/s. `slope(x, y)` (..., 2): derivatives of that
-    height along x and y; None for a level road.
+    height along x and y; None for a level road. `relief(x, y)` m: what the tread lacks in height, which moves with it.
     """
 
     height: Callable[[np.ndarray, np.ndarray], np.ndarray]
     motion: Callable[[float], float]
     speed: float
     slope: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None
+    relief: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None
+
+    def roads(
+        self, patch: Patch, step: float, steps: int, done: int, moving: bool
+    ) -> Iterator[tuple[Array, list[RoadMet]]]:
+        """Times (n,) s and the road met at each, for the steps of `step` s after `done`, block by block.
+
+        `moving`: whether the points are followed in the plane, so that a road with a slope is read at their places. Blocks
+        of steps are counted from the first step on, so that a restarted loop finds the same bits.
+        """
+        x, y = patch.points[:, 0], patch.points[:, 1]
+        block = block_size(len(x))
+        for first in range(done - done % block, steps, block):
+            times: Array = step * np.arange(first + 1.0, min(first + block, steps) + 1.0)
+            along = x + self.speed * times[:, None]
+            across = np.broadcast_to(y, along.shape)
+            known = np.zeros(along.shape) + [[self.motion(time)] for time in times.tolist()]
+            if self.relief:
+                known = known - self.relief(along, across)
+            leans = moving and self.slope is not None
+            if not leans:
+                known = known + self.height(along, across)
+            met = [
+                RoadMet(self if leans else None, along[k], y, known[k]) for k in range(len(times))
+            ]
+            skipped = max(done - first, 0)
+            yield times[skipped:], met[skipped:]
+
+
+@dataclass(frozen=True)
+class RoadMet:
+    """The road under the points at the end of a step: `known` (c,) m on a level road, and on one that is `driven` over to be
+    added to its height at the places of the points, `along` and `across` (c,) m of their own."""
+
+    driven: Drive | None
+    along: Array
+    across: Array
+    known: Array
+
+    @staticmethod
+    def level(patch: Patch) -> RoadMet:
+        """A level road at rest."""
+        x, y, _ = patch.points.T
+        return RoadMet(None, x, y, np.zeros(len(x)))
+
+    @property
+    def leans(self) -> bool:
+        """Whether the road has a slope, and is met where the points have moved to."""
+        return self.driven is not None
+
+    def at(self, place: Array) -> tuple[Array, Array]:
+        """Height (c,) m and slope (c, 2) of a road that leans, for points at a `place` (2, c) m beside their own."""
+        assert self.driven is not None and self.driven.slope is not None, "a road that leans"
+        x, y = (self.along + place[0])[None], (self.across + place[1])[None]
+        slope = np.ascontiguousarray(self.driven.slope(x, y)[0], dtype=float)
+        return self.driven.height(x, y)[0] + self.known, slope
 
 
 class ContactProblem:
     """The contact of a step between the `patch`'s points and the road: normal, or with `friction` too.
 
-    `same_step` (r, k) m/N: displacements at the end of a step of the nodes under forces on them, in z, then x, then
-    y: as many displacements as are followed, as many forces as act. `solver` is made for the normal
-    compliance A + C~. Where forces have three components a road with a slope `leans`.
+    `same_step` (k, k) m/N: displacements at the end of a step of the nodes under forces on them, in z, or in z, then x,
+    then y. `solver` is made for the normal compliance A + C~.
 
-    On a slope r = (r_x, r_y) a point with the vertical force f and the bristle's force t bears
+    A point meets the road where it lies, at its place x + u, y + v of the same instant, and on a slope r = (r_x, r_y)
+    there a point with the vertical force f and the bristle's force t bears
 
-        (t - f r,  f + t . r)
+        (t - f r,  f + t . r),
 
-    to first order in r. What the slope adds moves the tire like every other force; within the step
-    it is predicted from the last step's f and t, so that the contact problem stays as it is.
-    Neglected are two terms of second order that belong together, as their work does: the change of
-    gap -u . r by the horizontal motion u, and the slope met there instead of at the point.
+    so that the work of the force is that of the gap's change, -r . (u, v). Both are found by solving the contact again with
+    the road met at the places found and with what the slope added there, until neither changes a gap by more than
+    `tolerance` of the largest deflection of a point under its own force: most steps are solved once, from the
+    displacements (u, v) that the last forces would cause at the new instant. A place is approached by 1 / (1 + r . r B/A)
+    of the way, A and B the compliances of the point normal to the road and in its plane, and by Anderson's acceleration (J. ACM 12
+    (1965) 547). Where the motion in the plane is not followed (one component) the points stay, on a level road.
 
     After `solve` and `commit`: `vertical` (c,), `horizontal` (2, c) N on the tire, `change` (k,) N on the nodes from the
     static state, `resultant` (3,) N. Compiled (contact/solver/contact.c). Not collective.
@@ -318,28 +393,35 @@ class ContactProblem:
         same_step: Array,
         solver: ContactSolver,
         friction: BrushFriction | None = None,
+        tolerance: float = MEETING,
     ) -> None:
         self.patch, self._solver, self._friction = patch, solver, friction
+        self._tolerance = tolerance
         c = len(patch.points)
         p = c if patch.weights is None else patch.weights.shape[1]
-        self.components = 3 if friction else 1
-        followed, pushed = (count // p for count in same_step.shape)
-        self.nodes, self.leans = p, pushed == 3
-        self.answer = np.ascontiguousarray(same_step.T)  # (k, r)
+        self.nodes, self.components = p, len(same_step) // p
+        self.answer = np.ascontiguousarray(same_step.T)  # (k, k)
         weights = sparse.identity(p, format="csr") if patch.weights is None else patch.weights
         up, down = CompressedRows(weights), CompressedRows(weights.T)
         self._q, self._free = np.zeros(c), np.zeros((2, c))
         self._touching: Mask | None = patch.force > 0
         self.vertical, self.horizontal, self.resultant = np.zeros(c), np.zeros((2, c)), np.zeros(3)
         # Changes of the forces from the static state, on the nodes and on the points.
-        self.change, self.at_points = np.zeros(pushed * p), np.zeros(pushed * c)
-        self._force, self._tangential = np.zeros(c), np.zeros((2, c))
+        self.change, self.at_points = np.zeros(len(same_step)), np.zeros(self.components * c)
+        # Normal forces, bristles' forces and shifts in the plane of the last solution, and as they were a step before.
+        self._solution = np.zeros((5, c))
+        self._before = np.zeros((5, c))
+        self._force, self._tangential, self._shift = np.split(self._solution, [1, 3])
+        self._force = self._force[0]
+        self.repeated = self.unsettled = 0
+        if self.components == 3:
+            self._in_plane = _in_plane(same_step, weights, p)
         doubles = {
             "gap0": np.ascontiguousarray(patch.gap), "at_rest": np.ascontiguousarray(patch.force), "q": self._q,
             "free": self._free, "vertical": self.vertical, "horizontal": self.horizontal, "change": self.at_points,
             "nodal": self.change, "resultant": self.resultant, "answer": self.answer, "normal_force": self._force,
-            "tangential": self._tangential, "lifted": np.empty(same_step.shape[0]), "added": np.empty(3 * c),
-            "value": np.empty(3 * p),
+            "tangential": self._tangential, "shift": self._shift, "lifted": np.empty(len(same_step)),
+            "added": np.empty(3 * c), "value": np.empty(3 * p),
         }  # fmt: skip
         self._at_rest = doubles["at_rest"]
         if patch.pull is not None and friction is None:
@@ -348,36 +430,93 @@ class ContactProblem:
             name: COMPILED.doubles(values) for name, values in doubles.items()
         }
         self._held |= {
-            "points": c, "nodes": p, "seen": 3 if friction and followed == 3 else 1, "pushed": pushed,
-            "leans": self.leans, "answer_rows": same_step.shape[0], "which": COMPILED.ints(np.empty(3 * p, np.int32)),
+            "points": c, "nodes": p, "components": self.components, "which": COMPILED.ints(np.empty(3 * p, np.int32)),
             "w_begin": up.begin, "w_column": up.column, "w_value": up.value,
             "t_begin": down.begin, "t_column": down.column, "t_value": down.value,
         }  # fmt: skip
         self._compiled = COMPILED.ffi.new("meeting *", self._held)
 
-    def solve(self, road: Array, slope: Array | None, tread: Array | None, free: Array) -> Solved:
-        """The forces for displacements `free` (r,) m of the nodes without those of the step.
+    @property
+    def has_friction(self) -> bool:
+        """Whether bristles carry horizontal forces."""
+        return self._friction is not None
 
-        `road` (c,) m under the points, `slope` (c, 2) of it, `tread` (1 or 3, c) m: displacements of a tread that
-        creeps due to its past.
+    def solve(self, road: RoadMet, tread: Array | None, free: Array) -> Solved:
+        """The forces on the `road` for displacements `free` (k,) m of the nodes without those of the step.
+
+        `tread` (1 or 3, c) m: displacements of a tread that creeps due to its past.
         """
+        if not road.leans:
+            return self._solve_at(road.known, None, tread, free)
+        nodes, tips = COMPILED.doubles(free), self._friction.compiled if self._friction else _NULL
+        place, found, mixed = np.empty((2, len(self._q))), np.empty((2, len(self._q))), Mixed()
+        last = self._solution.copy()
+        self._solution += last - self._before
+        self._before = last
+        COMPILED.lib.meeting_place(self._compiled, nodes, COMPILED.doubles(place))
+        for turn in range(MEETINGS):
+            height, slope = road.at(place)
+            force, pulled = self._force.copy(), self._tangential.copy()
+            solved = self._solve_at(height, slope, tread, free, again=turn > 0, rough=turn == 0)
+            self.commit(solved)
+            COMPILED.lib.meeting_shift(self._compiled, nodes, tips)
+            COMPILED.lib.meeting_place(self._compiled, nodes, COMPILED.doubles(found))
+            rest = found - place
+            settled = self._settled(solved, rest, self._force - force, self._tangential - pulled)
+            if settled and (turn or not self.has_friction):
+                return solved
+            self.repeated += turn == 0
+            steep = (slope * slope).sum(axis=1)
+            way = np.where(
+                self._force > 0.0, 1.0 / (1.0 + steep * self._in_plane / self._solver.diagonal), 1.0
+            )
+            place = mixed.next(place, way * rest, np.where(self._force > 0.0, slope.T, 0.0))
+        self.unsettled += 1
+        return solved
+
+    def _settled(self, solved: Solved, rest: Array, force: Array, pulled: Array) -> bool:
+        """Whether places that are off by `rest` (2, c) m and a slope's forces of a solution that has changed by `force` (c,)
+        and `pulled` (2, c) N since change no gap by more than the tolerance, nor close one."""
+        assert solved.slope is not None, "of a road that leans"
+        own, r, touches = self._solver.diagonal, solved.slope.T, self._force > 0.0
+        # At a crest the slope is none, but not that of the place it may be off by: that of the steepest point is taken.
+        steepest = float(np.abs(r[:, touches]).max(initial=0.0))
+        read = np.maximum(
+            np.abs((r * rest).sum(axis=0)), steepest * np.abs(rest).max(axis=0) * touches
+        )
+        leant = own * np.abs((r * pulled).sum(axis=0)) + (r * r).sum(
+            axis=0
+        ) * self._in_plane * np.abs(force)
+        limit = self._tolerance * float((own * self._force).max())
+        return bool((read + leant <= np.where(touches, limit, limit + solved.gap)).all())
+
+    def _solve_at(
+        self,
+        road: Array,
+        slope: Array | None,
+        tread: Array | None,
+        free: Array,
+        again: bool = False,
+        rough: bool = False,
+    ) -> Solved:
+        """The forces on a road of heights (c,) m and `slope` (c, 2) under the points, `again` for the same step."""
         given = COMPILED.doubles(free), COMPILED.doubles(road), _pointer(slope), _pointer(tread)
         COMPILED.lib.meeting_prepare(self._compiled, *given)
-        solver, touching = self._solver, self._touching
+        solver, touching = self._solver, self._force > 0.0 if again else self._touching
         if self._friction is None:
             force, tangential = solver.solve(self._q, touching, reference=self._at_rest), _NO_FORCE
         else:
             force, plane = self._friction.solve(
-                solver, self._q, touching, self._at_rest, self._free
+                solver, self._q, touching, self._at_rest, self._free, again, rough
             )
             tangential = plane.T
-        return Solved(force, solver.gap, tangential, solver.residual, solver.penetration)
+        return Solved(force, solver.gap, tangential, solver.residual, solver.penetration, slope)
 
-    def commit(self, solved: Solved, slope: Array | None) -> Array:
+    def commit(self, solved: Solved) -> Array:
         """Set the solution of the step; returns the change (k,) N of the forces on the nodes."""
         tangential = _pointer(solved.horizontal if self._friction else None)
         force = COMPILED.doubles(solved.force)
-        COMPILED.lib.meeting_conclude(self._compiled, force, tangential, _pointer(slope))
+        COMPILED.lib.meeting_conclude(self._compiled, force, tangential, _pointer(solved.slope))
         self._touching = None
         return self.change
 
@@ -408,10 +547,10 @@ class ContactProblem:
     def state(self) -> dict[str, Array]:
         """The state that a checkpoint keeps."""
         kept = self._solver.state() | (self._friction.state() if self._friction else {})
-        if self.leans:
+        if self.components == 3:
             kept |= {
-                "normal_force_before": self._force.copy(),
-                "normal_tangential": self._tangential.T.copy(),
+                "met": np.stack([self._solution, self._before]),
+                "meetings": np.array([self.repeated, self.unsettled]),
             }
         return kept
 
@@ -421,18 +560,50 @@ class ContactProblem:
         self._solver.set_state(state)
         if self._friction:
             self._friction.set_state(state)
-        if self.leans:
-            self._force[:], self._tangential[:] = (
-                state["normal_force_before"],
-                state["normal_tangential"].T,
-            )
+        if self.components == 3:
+            self._solution[:], self._before[:] = state["met"]
+            self.repeated, self.unsettled = (int(count) for count in state["meetings"])
 
 
-_NO_FORCE = np.zeros((2, 0))
+def _in_plane(same_step: Array, weights: sparse.csr_matrix, p: int) -> Array:
+    """Compliance (c,) m/N in the plane of each point of the tire under its own force, the mean of both directions."""
+    blocks = (same_step[d * p : (d + 1) * p, d * p : (d + 1) * p] for d in (1, 2))
+    x, y = (np.asarray(weights.multiply(weights @ block).sum(axis=1)).ravel() for block in blocks)
+    return 0.5 * (x + y)
+
+
+class Mixed:
+    """Anderson's acceleration of places p that are sought where their rest d(p) = 0: the last few are combined so that
+    their rests, weighted, cancel as well as they can."""
+
+    def __init__(self) -> None:
+        self._place: list[Array] = []
+        self._rest: list[Array] = []
+        self._weighted: list[Array] = []
+
+    def next(self, place: Array, rest: Array, weight: Array) -> Array:
+        """The next place, from one and its rest; `weight`: what the rest is judged by."""
+        self._place.append(place)
+        self._rest.append(rest)
+        self._weighted.append((weight * rest).sum(axis=0))
+        for held in (self._place, self._rest, self._weighted):
+            del held[:-MIXED]
+        ahead: Array = place + rest
+        if len(self._place) == 1:
+            return ahead
+        last = self._weighted[-1]
+        apart = np.stack([last - one for one in self._weighted[:-1]], axis=1)
+        share, *_ = np.linalg.lstsq(apart, last, rcond=1e-6)
+        for one, p, d in zip(share, self._place[:-1], self._rest[:-1], strict=True):
+            ahead = ahead - one * (place + rest - p - d)
+        return ahead
+
+
+_NO_FORCE, _NULL = np.zeros((2, 0)), COMPILED.ffi.NULL
 
 
 def _pointer(values: Array | None) -> Any:
-    return COMPILED.ffi.NULL if values is None else COMPILED.doubles(values)
+    return _NULL if values is None else COMPILED.doubles(values)
 
 
 @dataclass(frozen=True)
@@ -458,17 +629,15 @@ class Loop:
         stay unchanged, while tire and `memory` (of a viscoelastic tread, whose response within the step is part of
         the solver) advance on each. A block has at most `at_once` steps; 1: the parts are read after each step.
         """
-        leans, patch = self.contact.leans, self.contact.patch
-        for times, roads, slopes in _roads(drive, patch, step, steps, done, leans):
+        moving, patch = self.contact.components == 3, self.contact.patch
+        for times, roads in drive.roads(patch, step, steps, done, moving):
             for k in range(0, len(times), at_once):
                 some = slice(k, k + at_once)
-                yield self._block(
-                    times[some], roads[some], None if slopes is None else slopes[some]
-                )
+                yield self._block(times[some], roads[some])
 
-    def _block(self, times: Array, roads: Array, slopes: Array | None) -> Block:
+    def _block(self, times: Array, roads: list[RoadMet]) -> Block:
         tire, contact, memory = self.tire, self.contact, self.memory
-        n, count = roads.shape
+        n, count = len(times), len(contact.vertical)
         force, gap, axle = np.empty((n, count)), np.empty((n, count)), np.empty((n, 3))
         horizontal, change = np.empty((n, 2, count)), np.empty((n, len(contact.change)))
         free_all = np.empty((n, contact.answer.shape[1]))
@@ -477,13 +646,12 @@ class Loop:
         iterated = tire if isinstance(tire, IteratedTire) else None
         frames, readings = contact.patch.frames, []
         for k in range(n):
-            slope = None if slopes is None else slopes[k]
             tread = memory.predict() if memory else None
             predict, past = tire.predict, contact.state() if iterated else {}
             while True:
-                solve = partial(contact.solve, roads[k], slope, tread)
-                free, solved = together(predict, solve, contact.components == 3)
-                pushed = contact.commit(solved, slope)
+                solve = partial(contact.solve, roads[k], tread)
+                free, solved = together(predict, solve, contact.has_friction, roads[k].leans)
+                pushed = contact.commit(solved)
                 again = iterated.settle(pushed) if iterated else None
                 if again is None:
                     break
@@ -552,30 +720,6 @@ def looking_ahead(tire: object) -> Ahead | None:
     """The tire's part that looks ahead, if it has one."""
     found: Ahead | None = getattr(tire, "ahead", None)
     return found
-
-
-def _roads(
-    drive: Drive, patch: Patch, step: float, steps: int, done: int, leans: bool
-) -> Iterator[tuple[Any, Any, Any]]:
-    """Times (n,) s, road (n, c) m under the points and, if it `leans`, its slope (n, c, 2), for the steps
-    after `done`, block by block.
-
-    Blocks of steps are counted from the first step on, so that a restarted loop finds the same
-    bits.
-    """
-    x, y = patch.points[:, 0], patch.points[:, 1]
-    block = block_size(len(x))
-    for first in range(done - done % block, steps, block):
-        times = step * np.arange(first + 1.0, min(first + block, steps) + 1.0)
-        along = x + drive.speed * times[:, None]
-        across = np.broadcast_to(y, along.shape)
-        heights = drive.height(along, across)
-        heights = heights + np.array([drive.motion(time) for time in times.tolist()])[:, None]
-        slopes = drive.slope(along, across) if leans and drive.slope else None
-        skipped = max(done - first, 0)
-        if slopes is not None:
-            slopes = np.ascontiguousarray(slopes[skipped:], dtype=float)
-        yield times[skipped:], np.ascontiguousarray(heights[skipped:], dtype=float), slopes
 
 
 class DrivenTire:

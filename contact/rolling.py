@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 
-from tireroad.contact.loop import ContactProblem, LinearTire, Loop
+from tireroad.contact.loop import ContactProblem, LinearTire, Loop, RoadMet
 from tireroad.contact.model import ContactSpec, step_solver, tread_memory, tread_shear
 from tireroad.contact.patch import Patch
 from tireroad.contact.setup import ContactSetup, SteadyRolling
@@ -178,7 +178,7 @@ class _Rolled:
         nodes = share if patch.weights is None else patch.weights.T @ share
         stiffness = 1.0 / float(nodes @ flexibility[p : 2 * p, p : 2 * p] @ nodes)
         self._more = stiffness * way  # N of force along the road for a step at a slip of 1
-        self._road, self._free = np.zeros(len(patch.points)), np.zeros(3 * p)
+        self._road, self._free = RoadMet.level(patch), np.zeros(3 * p)
         self._shape = replace(setup, slip=(0.0, 0.0)).slips
         self._across: float | None = None
         self._slip, self.way, self._before = (0.0, 0.0), 0.0, 0.0
@@ -235,7 +235,7 @@ class _Rolled:
         """A step; the forces (3,) N of the road."""
         contact, memory = self.loop.contact, self.loop.memory
         tread = memory.predict() if memory else None
-        contact.commit(contact.solve(self._road, None, tread, self._free), None)
+        contact.commit(contact.solve(self._road, tread, self._free))
         if memory:
             memory.advance(contact.at_points)
         force, self.way = contact.resultant.copy(), self.way + self._step

@@ -110,25 +110,36 @@ class ContactSetup:
 
         The slope is the road's: a pattern moves with the tread, whose blocks lie on the road.
         """
-        road: CellMean | PreparedRoad = self.road
+        height: Callable[[np.ndarray, np.ndarray], np.ndarray] = self._height
         slope: Callable[[np.ndarray, np.ndarray], np.ndarray] = self._slope
         if self.fine:
-            road = smoothed = CellMean(self.road, self.patch.points[:, 1], self.patch.half_sizes)
-            slope = smoothed.slope
-        level = None if self.relief < NOTHING else slope
-        if self.pattern is None:
-            return Drive(road.height, self.rolled.motion, self.rolled.speed, level)
-        pattern, begun = self.pattern, self.begun
+            smoothed = CellMean(self.road, self.patch.points[:, 1], self.patch.half_sizes)
+            height, slope = smoothed.height, smoothed.slope
+        moved = self.rolled.motion, self.rolled.speed
+        relief = None if self.pattern is None else self._relief
+        return Drive(height, *moved, slope if self.leans else None, relief)
 
-        def height(along: np.ndarray, across: np.ndarray) -> np.ndarray:
-            return road.height(along, across) - (pattern.depth(along, across) - begun)
+    def _relief(self, along: np.ndarray, across: np.ndarray) -> np.ndarray:
+        """Depths (n, c) m of the pattern beyond those at t = 0."""
+        assert self.pattern is not None, "the tread is a slick"
+        return self.pattern.depth(along, across) - self.begun
 
-        return Drive(height, self.rolled.motion, self.rolled.speed, level)
+    def _height(self, along: np.ndarray, across: np.ndarray) -> np.ndarray:
+        """Heights (n, c) m within the prepared strip, at whose borders points that move beyond it stay."""
+        (x0, x1), (y0, y1) = self._bounds
+        return self.road.height(np.clip(along, x0, x1), np.clip(across, y0, y1))
+
+    @property
+    def _bounds(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        x0, x1, y0, y1 = self.patch.extent
+        return (x0, min(x1 + self.rolled.travel, self.road.end)), (y0, y1)
 
     def _slope(self, along: np.ndarray, across: np.ndarray) -> np.ndarray:
         """Slopes (n, c, 2) of a road that is smooth over a point's rectangle, by differences."""
-        x0, x1, y0, y1 = self.patch.extent
-        bounds = (x0, min(x1 + self.rolled.travel, self.road.end)), (y0, y1)
+        bounds = self._bounds
+        along, across = (
+            np.clip(here, *ends) for here, ends in zip((along, across), bounds, strict=True)
+        )
         out, apart = np.zeros((*along.shape, 2)), _APART * self.patch.half_sizes
         for axis, here in enumerate((along, across)):
             ends = [
@@ -165,6 +176,11 @@ class ContactSetup:
         x0, x1, y0, y1 = self.patch.extent
         strip = x0, x1 + self.rolled.travel, y0, y1
         return self.road.highest(*strip) - self.road.lowest(*strip)
+
+    @property
+    def leans(self) -> bool:
+        """Whether the road under the run has slopes."""
+        return self.relief >= NOTHING
 
     @property
     def slips(self) -> np.ndarray:

@@ -229,23 +229,18 @@ class Wheel:
         outputs: Probes,
         loads: Probes,
         option: str,
-        light: Probes | None = None,
     ) -> Response:
         """Response with the residual `option`. Collective.
 
-        The forces of `light` follow those of the `loads`; they act on the states alone, without what
-        these lack.
         `modes` on all unknowns, for attachment modes only, must be the solution that `basis` projects:
         another one has other signs and vectors of repeated frequencies. InputError otherwise."""
         kind = residual_of(option)
         if kind.static:
             whole = self._with_statics(basis, outputs, loads)
-            if light is not None:
-                whole = whole.with_forces(basis.couple(outputs, light))
             moved = outputs.shape[0] - np.count_nonzero(basis.of_hub(outputs).getnnz(axis=1))
             return replace(whole, pulse=moved if kind.pulse else 0)
         assert modes is not None, "attachment modes need the modes on all unknowns"
-        return self.respond_attached(basis, modes, outputs, loads, light)[0]
+        return self.respond_attached(basis, modes, outputs, loads)[0]
 
     def respond_attached(
         self,
@@ -253,13 +248,12 @@ class Wheel:
         modes: Modes,
         outputs: Probes,
         loads: Probes,
-        light: Probes | None = None,
     ) -> tuple[Response, Basis]:
         """`respond` with attachment modes, and the basis of modes with them whose states it has.
         Collective."""
         probes = _together(outputs, loads)
-        whole, grown = self._attached(basis, modes, probes, light)
-        return _between(whole, outputs, loads, light), grown
+        whole, grown = self._attached(basis, modes, probes)
+        return _between(whole, outputs, loads), grown
 
     def _beside(self, hub: Probes) -> Array:
         """Own rows (3, n) of momentum; with A_0 to A_2 of greens.response (12, n) if `hub` is read."""
@@ -287,18 +281,12 @@ class Wheel:
         made = with_static_correction(basis, self.turning, outputs, loads, flexibility, beside)
         return made if self.air is None else replace(made, left_out=None)
 
-    def _attached(
-        self, basis: Basis, modes: Modes, probes: Probes, light: Probes | None
-    ) -> tuple[Response, Basis]:
-        """Response of the modes and the attachment modes of all probes, and their basis; the
-        `light` ones have none. Collective."""
+    def _attached(self, basis: Basis, modes: Modes, probes: Probes) -> tuple[Response, Basis]:
+        """Response of the modes and the attachment modes of all probes, and their basis. Collective."""
         self._check_same(basis, modes)
         if self._drifts:
             drifting = self.standing_attachments(modes, probes)[0]
-            found = drifting.couple(probes, probes)
-            if light is not None:
-                found = found.with_forces(drifting.couple(probes, light))
-            return found, drifting
+            return drifting.couple(probes, probes), drifting
         weights, loads = fewest(probes)
         loads = on_own_rows(self.operators, loads)
         rows = sparse.csr_matrix(self._beside(basis.of_hub(probes)))
@@ -315,10 +303,7 @@ class Wheel:
         if self._apart:
             lacking = regained(grown.held, *self._stiffnesses(grown.projection), probes, probes)
             flexibility, beside = flexibility + lacking.compliance, beside + lacking.momentum
-        found = self._completed(grown, probes, probes, flexibility, beside)
-        if light is not None:
-            found = found.with_forces(grown.couple(probes, light))
-        return found, grown
+        return self._completed(grown, probes, probes, flexibility, beside), grown
 
     def _foremost(self, basis: Basis, probes: Probes, flexibility: Array) -> Array:
         """Load combinations (p, k) whose shapes join the basis, among probes that move anything."""
@@ -414,12 +399,10 @@ def _together(outputs: Probes, loads: Probes) -> Probes:
     return loads if outputs is loads else sparse.vstack([outputs, loads], format="csr")
 
 
-def _between(whole: Response, outputs: Probes, loads: Probes, light: Probes | None) -> Response:
-    """The response between `outputs` and `loads`, then the `light` ones, of that of all together."""
-    same, r = outputs is loads, outputs.shape[0]
-    if same and light is None:
-        return whole
-    return whole.between(slice(r), slice(0 if same else r, None))
+def _between(whole: Response, outputs: Probes, loads: Probes) -> Response:
+    """The response between `outputs` and `loads` of that of both together."""
+    r = outputs.shape[0]
+    return whole if outputs is loads else whole.between(slice(r), slice(r, None))
 
 
 def wheel_of(

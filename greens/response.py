@@ -180,25 +180,6 @@ class Response:
         rotation, and they can gain energy in contact."""
         return self.keeping_where(lambda s: np.abs(s) * step <= limit)
 
-    def with_forces(self, more: Response) -> Response:
-        """Followed by the forces of `more`, a response of the same states and outputs."""
-
-        def beside(mine: np.ndarray | None, theirs: np.ndarray | None) -> np.ndarray | None:
-            """Place this response beside others: terms between them are zero."""
-            if mine is None:
-                return None
-            wide = np.zeros((len(mine), more.input.shape[1])) if theirs is None else theirs
-            return np.hstack([mine, wide])
-
-        return replace(
-            self,
-            input=np.hstack([self.input, more.input]),
-            block_input=np.hstack([self.block_input, more.block_input]),
-            residual=np.hstack([self.residual, more.residual]),
-            left_out=beside(self.left_out, more.left_out),
-            slope=beside(self.slope, more.slope),
-        )
-
     def between(self, outputs: slice, forces: slice | np.ndarray) -> Response:
         """The response for some of the outputs and forces (slices, or indices of forces)."""
         return replace(

@@ -131,26 +131,23 @@ def make_response(
     loads: sparse.csr_matrix,
     residual: str,
     fields: Callable[[], ModalBasis],
-    light: sparse.csr_matrix | None = None,
 ) -> Made:
     """The response (r, k) between probes `outputs` (r, 3 s) and `loads` (k, 3 s) with a residual.
 
-    `light`: further loads, which act on the states alone (coupling.Wheel.respond).
     `wheel` returns the full matrices and `fields` the modes on all unknowns; each is called only if
     the residual needs it. InputError for an unknown residual. Collective.
     """
     kind = residual_of(residual)
     if not kind.solves:
-        every = loads if light is None else sparse.vstack([loads, light], format="csr")
-        return _made(Basis.of(rolling).couple(outputs, every))
+        return _made(Basis.of(rolling).couple(outputs, loads))
     if not kind.joins:
-        arguments = Basis.of(rolling), None, outputs, loads, residual, light
+        arguments = Basis.of(rolling), None, outputs, loads, residual
         return _made(_singular_named(wheel(), lambda: wheel().respond(*arguments)))
     found = fields()
     if found is not rolling.basis:  # a new solution: its states must be its own too
         rolling = rolling_modes(found, rolling.turning, wheel().operators.body.comm)
     assert found.modes is not None, "the modes on all unknowns"
-    joined = Basis.of(rolling), found.modes, outputs, loads, light
+    joined = Basis.of(rolling), found.modes, outputs, loads
     response, basis = _singular_named(wheel(), lambda: wheel().respond_attached(*joined))
     attached = _attached(basis, rolling)
     highest = cutoff(rolling)

@@ -448,16 +448,15 @@ class RollingTire:
         projection = self.standing.basis.projection
         return wheel_of(self.standing.motions, self.states.turning, projection=projection)
 
-    def respond(self, outputs, loads, residual: str = "static", light=None) -> Response:
+    def respond(self, outputs, loads, residual: str = "static") -> Response:
         """Green's functions between probes (r, 3 s) and loads (k, 3 s) on the outer face.
 
         `residual`: kind of residual flexibility that replaces the truncated modes
-        (greens.responses); InputError for an unknown one. `light` (l, 3 s): further loads, which
-        act on the modes alone and need no residual flexibility.
+        (greens.responses); InputError for an unknown one.
         """
         basis = self.standing.basis
         return make_response(
-            lambda: self.wheel, self.states, outputs, loads, residual, lambda: basis, light
+            lambda: self.wheel, self.states, outputs, loads, residual, lambda: basis
         ).response
 
     def at(self, spots: list[tuple[float, float]], residual: str = "static") -> Response:
@@ -649,15 +648,10 @@ def drive(
     spec = TreadContact(law=law, friction=friction)
     if spec.has_friction and rolled.speed > 0:
         setup = freely_rolling(setup, static, motions.lattice.ring, static.rolling_radius())
-    along, across, down = (
-        probe.nodes(setup.patch.index, len(static.points), part) for part in range(3)
-    )
-    aside = sparse.vstack([along, across], "csr")
-    if spec.has_friction:
-        every = sparse.vstack([down, aside], "csr")
-        response = tire.respond(every, every, residual)
-    else:
-        response = tire.respond(down, down, residual, aside)
+    followed = (2, 0, 1) if spec.has_friction or setup.leans else (2,)
+    points = [probe.nodes(setup.patch.index, len(static.points), part) for part in followed]
+    every = sparse.vstack(points, "csr")
+    response = tire.respond(every, every, residual)
     setup, _ = setup.equilibrated(response, static.force, spec)
     fastest = np.abs(response.eigenvalue).max(initial=1.0 / duration)
     largest = min(duration / LEAST_STEPS, TURN / fastest) if step is None else step

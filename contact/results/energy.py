@@ -199,16 +199,14 @@ def own_states(response: Response, rolling: RollingModes) -> bool:
     )
 
 
-def springs(response: Response, force: np.ndarray, own: np.ndarray | None = None) -> float:
+def springs(response: Response, force: np.ndarray) -> float:
     """Elastic energy (J) in the residual flexibility, with static states, at forces (k,) N.
 
-    The first outputs are the displacements of the forces `own`, by default all; readings may follow
-    them (contact.loop). Further forces, of the road's slope, act on the states alone.
+    The first outputs are the displacements of the forces; readings may follow them (contact.loop).
     """
     if response.pulse:
         return 0.0
-    own = np.arange(len(force)) if own is None else own
-    return float(0.5 * force[own] @ response.residual[: len(own), own] @ force[own])
+    return float(0.5 * force @ response.residual[: len(force)] @ force)
 
 
 class StateMotion:

@@ -36,7 +36,7 @@ class Strip(Protocol):
 
 
 class CellMean:
-    """Smoothed heights at c points with y (c,) m and rectangles of half sizes (c, 2) m, for any x.
+    """Smoothed heights at c points with y (c,) m and rectangles of half sizes (c, 2) m, for any x and, by the slope, beside y.
 
     Along, the road is sampled every `spacing` at fixed positions, so that the result does not
     depend on how a run is divided; each sample counts by the part of its length within the
@@ -51,6 +51,7 @@ class CellMean:
         self._road = road
         rows, row = np.unique(np.column_stack([y, half]), axis=0, return_inverse=True)
         widest, broadest = half.max(axis=0)
+        self._points_y = y
         self._step = min(max(road.spacing, 2 * widest / MOST), widest / 4)
         self._reach = reach = int(np.ceil(2 * widest / self._step + 0.5))
         offset = self._step * np.arange(-reach, reach + 1)
@@ -71,12 +72,16 @@ class CellMean:
         # What is known: sums over the strips at the positions from begin - reach on, and means from begin on.
         self._begin, self._sums, self._means = 0, *_nothing(len(rows))
 
-    def height(self, x: Array, _: Array) -> Array:
-        """Heights (n, c) m with the points at x (n, c) m; y is known."""
-        return self._at(x, COMPILED.lib.heights_at, ())
+    def height(self, x: Array, y: Array | None = None) -> Array:
+        """Heights (n, c) m with the points at x, y (n, c) m; None: each at its own y."""
+        height = self._at(x, COMPILED.lib.heights_at, ())
+        aside = None if y is None else y - self._points_y
+        return (
+            height if aside is None or not aside.any() else height + aside * self.slope(x)[..., 1]
+        )
 
-    def slope(self, x: Array, _: Array) -> Array:
-        """Slopes (n, c, 2) along and across; that along is the derivative of `height`."""
+    def slope(self, x: Array, _: Array | None = None) -> Array:
+        """Slopes (n, c, 2) along and across, at each point's own y; that along is the derivative of `height` there."""
         return self._at(x, COMPILED.lib.slopes_at, (2,))
 
     def _at(self, x: Array, function: Any, more: tuple[int, ...]) -> Array:

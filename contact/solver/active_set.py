@@ -71,9 +71,9 @@ class ActiveSet:
         self.active: Mask = np.zeros(n, dtype=bool)
         self.gap: Array = np.zeros(n)
         self._base: Mask = np.zeros(n, dtype=bool)
-        self._signs, self._before, self._diagonal = np.zeros(n), np.zeros(n), matrix.diagonal
+        self._signs, self._before, self.diagonal = np.zeros(n), np.zeros(n), matrix.diagonal
         doubles = {
-            "rows": rows, "columns": columns, "diagonal": self._diagonal, "gap": self.gap,
+            "rows": rows, "columns": columns, "diagonal": self.diagonal, "gap": self.gap,
             "signs": self._signs, "signs_before": self._before,
         }  # fmt: skip
         self._held: dict[str, Any] = {
@@ -272,8 +272,8 @@ class UsualSet:
 
     def __init__(self, compliance: Compliance) -> None:
         self._compliance = compliance
-        self._diagonal = compliance.diagonal
-        n = len(self._diagonal)
+        self.diagonal = compliance.diagonal
+        n = len(self.diagonal)
         self.active: Mask = np.zeros(n, dtype=bool)
         self.gap: Array = np.zeros(n)
         self.penetration = 0.0
@@ -336,7 +336,7 @@ class UsualSet:
         assert pivot is not None, "after a solution"
         self.iterations = pivot.exchanged.iterations
         gap = q + self._compliance.apply(force - self._base)
-        scale = float(np.abs(q).max() + (self._diagonal * force).max())
+        scale = float(np.abs(q).max() + (self.diagonal * force).max())
         if (gap[~pivot.taken] < -ROUNDING * scale).any():
             self._widen(pivot.taken, pivot.base, gap)
             return False
@@ -390,7 +390,7 @@ class UsualSet:
         return self._pivot
 
     def _finish(self, force: Array, gap: Array, scale: float) -> Array:
-        self.residual = complementarity_residual(force, gap, self._diagonal, scale)
+        self.residual = complementarity_residual(force, gap, self.diagonal, scale)
         check_residual("active-set", self.residual)
         self.penetration = penetration(gap)
         self.active = force > 0.0

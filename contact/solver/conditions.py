@@ -18,10 +18,11 @@ TOLERANCE = 1e-9
 class ContactSolver(Protocol):
     """The interface that the time loop needs; `active`, `gap` (m), ... are of the last solve.
 
-    `gap` is 0 at touching points; `penetration` (m) is that of the deepest point in the solution
+    `diagonal` (n,) m/N is the compliance of each point under its own force. `gap` is 0 at touching points; `penetration` (m) is that of the deepest point in the solution
     itself.
     """
 
+    diagonal: Array
     active: Mask
     gap: Array
     penetration: float

@@ -124,6 +124,8 @@ typedef struct {
     double *horizontal, *before;          /* (2, c) N of the last two steps */
     long turns, products, all_turns;      /* of the last step; of all steps */
     long lagged, streak;                  /* steps whose forces lag, and how many were the last ones */
+    int again;                            /* whether the next solution is of the step of the last one */
+    int rough;                            /* whether one turn is enough for it */
     struct brush_work *work;
 } brush;
 
@@ -134,23 +136,25 @@ int brush_solve(brush *s, normal_contact *normal, const double *q, const uint8_t
 
 /* Tire at its nodes and contact at the points: what a step needs before and after its solution. */
 typedef struct {
-    int points, nodes, seen, pushed, leans;  /* seen, pushed: components 1 or 3 of displacements and forces */
+    int points, nodes, components;        /* 1, z, or 3, z, x and y, of displacements and forces */
     const int *w_begin, *w_column, *t_begin, *t_column;
     const double *w_value, *t_value;
-    const double *answer;                 /* (k, r): same-step displacement of all nodes, by columns */
-    int answer_rows;
+    const double *answer;                 /* (k, k): same-step displacement of all nodes, by columns */
     const double *gap0, *at_rest, *rest;  /* (c,) m, N; (2, c) N of a static state with friction, or 0 */
-    double *normal_force, *tangential;    /* (c,), (2, c) N of the last step: what leans predicts from */
+    double *normal_force, *tangential;    /* (c,), (2, c) N of the last solution */
     double *q, *free;                     /* (c,) m, (2, c) m: gaps at rest forces; displacements in the plane */
+    double *shift;                        /* (2, c) m in the plane by the forces of the last solution */
     double *vertical, *horizontal;        /* (c,), (2, c) N on the tire */
-    double *change, *nodal;               /* (pushed c,) and (pushed p,) N from the static state */
+    double *change, *nodal;               /* (components c,) and (components p,) N from the static state */
     double *resultant;                    /* (3,) N */
-    double *lifted, *added;               /* workspace: (r,), (3 c,) */
+    double *lifted, *added;               /* workspace: (k,), (3 c,) */
     int *which; double *value;            /* workspace: (k,) */
 } meeting;
 
 void meeting_prepare(meeting *s, const double *moved, const double *road, const double *slope, const double *tread);
 void meeting_conclude(meeting *s, const double *force, const double *tangential, const double *slope);
+void meeting_place(const meeting *s, const double *moved, double *place);
+void meeting_shift(meeting *s, const double *moved, const brush *tips);
 // end
 
 typedef void (*gemv)(char *, int *, int *, double *, const double *, int *, const double *, int *, double *, double *,
@@ -1096,6 +1100,8 @@ struct brush_work {
     double *share, *past, *trial, *moved, *some, *found, *q, *mixed;
     double *spring, *inverse, *constant, *bound, *force, *ahead, *off;
     double *results[MIXED], *residuals[MIXED];
+    double *deflection, *base, *horizontal; /* of the bristles at the end of the step before */
+    uint8_t *touched;
     int *index, *every;
     int touches, *touch, reaches, *reach; /* the points that touch, and with those next ahead of them; ascending */
     uint8_t *lifted, *touching, *set;
@@ -1106,19 +1112,20 @@ void brush_begin(brush *s) {
     struct brush_work *w = s->work = room(1, sizeof *w);
     double **doubles[] = {&w->share, &w->past, &w->trial, &w->moved, &w->some, &w->found, &w->q,
                           &w->mixed, &w->spring, &w->inverse, &w->constant, &w->bound, &w->force,
-                          &w->ahead, &w->off};
-    for (int i = 0; i < 15; i++) *doubles[i] = DOUBLES(2 * c);
+                          &w->ahead, &w->off, &w->deflection, &w->base, &w->horizontal};
+    for (int i = 0; i < 18; i++) *doubles[i] = DOUBLES(2 * c);
     for (int i = 0; i < MIXED; i++) w->results[i] = DOUBLES(2 * c), w->residuals[i] = DOUBLES(2 * c);
     w->index = INTS(c), w->every = INTS(c), w->touch = INTS(c), w->reach = INTS(c);
     for (int i = 0; i < c; i++) w->every[i] = i;
-    w->lifted = room(c, 1), w->touching = room(c, 1), w->set = room(c, 1);
+    w->lifted = room(c, 1), w->touching = room(c, 1), w->set = room(c, 1), w->touched = room(c, 1);
 }
 
 void brush_end(brush *s) {
     struct brush_work *w = s->work;
     for (int i = 0; i < MIXED; i++) free(w->results[i]), free(w->residuals[i]);
     void *all[] = {w->share, w->past, w->trial, w->moved, w->some, w->found, w->q, w->mixed, w->spring, w->inverse,
-                   w->constant, w->bound, w->force, w->ahead, w->off, w->index, w->every, w->touch, w->reach, w->lifted, w->touching, w->set, w};
+                   w->constant, w->bound, w->force, w->ahead, w->off, w->index, w->every, w->touch, w->reach, w->lifted, w->touching, w->set,
+                   w->deflection, w->base, w->horizontal, w->touched, w};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) free(all[i]);
 }
 
@@ -1268,21 +1275,16 @@ static void finish(brush *s, const double *force, const double *free) {
     struct brush_work *w = s->work;
     plane *compliance = s->compliance;
     const int c = compliance->points;
-    memcpy(s->before, s->horizontal, 2 * c * sizeof(double));
+    memcpy(s->before, w->horizontal, 2 * c * sizeof(double));
     memcpy(s->horizontal, w->found, 2 * c * sizeof(double));
-    if (compliance->lift && w->reaches) { /* on the rows between the first and the last */
+    if (compliance->lift) { /* of all points: where the road is met */
         struct plane_work *p = compliance->work;
-        const int low = w->reach[0], high = w->reach[w->reaches - 1];
-        for (int half = 0; half < 2; half++) {
-            double *moved = s->moved + half * c + low;
-            for (int i = low; i <= high; i++) moved[i - low] = free[half * c + i] - s->dragged[half * c + i];
-            int count = nonzero(c, force, p->which, p->value);
-            for (int k = 0; k < 2 * c; k++)
-                if (w->found[k] != 0.0) p->which[count] = c + k, p->value[count++] = w->found[k];
-            const double *rows = compliance->beside + half * c + low;
-            add_columns(high - low + 1, 2 * c, rows, count, p->which, p->value, moved);
-        }
-    } else if (!compliance->lift) {
+        int count = nonzero(c, force, p->which, p->value);
+        for (int k = 0; k < 2 * c; k++)
+            if (w->found[k] != 0.0) p->which[count] = c + k, p->value[count++] = w->found[k];
+        for (int i = 0; i < 2 * c; i++) s->moved[i] = free[i] - s->dragged[i];
+        add_columns(2 * c, 2 * c, compliance->beside, count, p->which, p->value, s->moved);
+    } else {
         plane_shear(compliance, w->found, w->reaches, w->reach, w->some);
         for (int d = 0; d < 2; d++)
             for (int a = 0; a < w->reaches; a++) {
@@ -1337,7 +1339,7 @@ static int lagging(brush *s, normal_contact *normal, const double *q, const doub
     struct brush_work *w = s->work;
     const int c = s->compliance->points;
     int failed;
-    memcpy(w->trial, s->horizontal, 2 * c * sizeof(double));
+    memcpy(w->trial, w->horizontal, 2 * c * sizeof(double));
     do {
         lifted_by(s, q, w->trial, c, w->every);
         if ((failed = normal_forces(normal, s->turns, w->q, w->set, at_rest, force))) return failed;
@@ -1355,6 +1357,18 @@ static int lagging(brush *s, normal_contact *normal, const double *q, const doub
     return SOLVED;
 }
 
+/* The bristles at the end of the step before are kept; a step that is solved again begins from them. */
+static void retrace(brush *s) {
+    struct brush_work *w = s->work;
+    const size_t size = 2 * s->compliance->points * sizeof(double), flags = s->compliance->points;
+    if (s->again) {
+        memcpy(s->deflection, w->deflection, size), memcpy(s->moved, w->base, size), memcpy(s->touched, w->touched, flags);
+        return;
+    }
+    memcpy(w->deflection, s->deflection, size), memcpy(w->base, s->moved, size), memcpy(w->touched, s->touched, flags);
+    memcpy(w->horizontal, s->horizontal, size);
+}
+
 int brush_solve(brush *s, normal_contact *normal, const double *q, const uint8_t *guess, const double *at_rest,
                 const double *free, double *force) {
     struct brush_work *w = s->work;
@@ -1362,9 +1376,10 @@ int brush_solve(brush *s, normal_contact *normal, const double *q, const uint8_t
     const int c = compliance->points, unbounded = s->friction < 0.0, own = normal->all || normal->usual;
     int held = 0, failed;
     double before = INFINITY, first = INFINITY, caution = 1.0;
+    retrace(s);
     offer(s, w->share, w->past);
     memset(w->lifted, 0, c);
-    for (int i = 0; i < 2 * c; i++) w->trial[i] = 2.0 * s->horizontal[i] - s->before[i]; /* saves a turn */
+    for (int i = 0; i < 2 * c; i++) w->trial[i] = s->again ? s->horizontal[i] : 2.0 * s->horizontal[i] - s->before[i];
     for (s->turns = 1; s->turns <= TURNS; s->turns++) {
         const int *looked = normal->usual ? normal->usual->places : normal->some ? normal->some : w->every;
         lifted_by(s, q, w->trial, normal->usual ? normal->usual->taken : normal->some ? normal->count : c, looked);
@@ -1417,6 +1432,11 @@ int brush_solve(brush *s, normal_contact *normal, const double *q, const uint8_t
         s->products += problem.products;
         if (failed) return failed;
         scatter(w, a, c);
+        if (s->rough) {
+            s->all_turns++;
+            finish(s, force, free);
+            return SOLVED;
+        }
         if (follows) memcpy(w->trial, w->found, 2 * c * sizeof(double));
         else held = mix(s, held, w->trial, w->found, w->trial);
     }
@@ -1434,24 +1454,23 @@ static void lean(int c, const double *slope, const double *force, const double *
     }
 }
 
-/* q and the free displacements in the plane, from the displacements (r,) of the nodes without new forces; the slope
+/* q and the free displacements in the plane, from the displacements (k,) of the nodes without new forces; the slope
    (c, 2) may be 0, and so may the displacements (1 or 3, c) of a tread that creeps. */
 void meeting_prepare(meeting *s, const double *moved, const double *road, const double *slope, const double *tread) {
-    const int c = s->points, p = s->nodes, three = s->seen == 3;
+    const int c = s->points, p = s->nodes, size = s->components * p;
     const double *nodes = moved;
-    if (s->leans && slope) {
+    if (slope) {
         sparse down = {p, s->t_begin, s->t_column, s->t_value};
         lean(c, slope, s->normal_force, s->tangential, s->added);
         for (int d = 0; d < 3; d++) multiply(&down, s->added + d * c, s->nodal + d * p);
-        memcpy(s->lifted, moved, s->seen * p * sizeof(double));
-        int count = nonzero(3 * p, s->nodal, s->which, s->value);
-        add_columns(s->seen * p, s->answer_rows, s->answer, count, s->which, s->value, s->lifted);
+        memcpy(s->lifted, moved, size * sizeof(double));
+        add_columns(size, size, s->answer, nonzero(size, s->nodal, s->which, s->value), s->which, s->value, s->lifted);
         nodes = s->lifted;
     }
     sparse up = {c, s->w_begin, s->w_column, s->w_value};
     multiply(&up, nodes, s->q);
     for (int i = 0; i < c; i++) s->q[i] = s->gap0[i] + s->q[i] + (tread ? tread[i] : 0.0) - road[i];
-    if (!three) return;
+    if (s->components == 1) return;
     for (int d = 0; d < 2; d++) multiply(&up, nodes + (d + 1) * p, s->free + d * c);
     if (tread)
         for (int i = 0; i < 2 * c; i++) s->free[i] += tread[c + i];
@@ -1464,18 +1483,49 @@ void meeting_conclude(meeting *s, const double *force, const double *tangential,
     if (tangential) memcpy(s->tangential, tangential, 2 * c * sizeof(double));
     memcpy(s->vertical, force, c * sizeof(double));
     memcpy(s->horizontal, s->tangential, 2 * c * sizeof(double));
-    if (s->leans && slope) {
+    if (slope) {
         lean(c, slope, force, s->tangential, s->added);
         for (int i = 0; i < c; i++) s->vertical[i] += s->added[i];
         for (int i = 0; i < 2 * c; i++) s->horizontal[i] += s->added[c + i];
     }
     for (int i = 0; i < c; i++) s->change[i] = s->vertical[i] - s->at_rest[i];
-    if (s->pushed == 3) memcpy(s->change + c, s->horizontal, 2 * c * sizeof(double));
+    if (s->components == 3) memcpy(s->change + c, s->horizontal, 2 * c * sizeof(double));
     if (s->rest)
         for (int i = 0; i < 2 * c; i++) s->horizontal[i] += s->rest[i];
     sparse down = {p, s->t_begin, s->t_column, s->t_value};
-    for (int d = 0; d < s->pushed; d++) multiply(&down, s->change + d * c, s->nodal + d * p);
+    for (int d = 0; d < s->components; d++) multiply(&down, s->change + d * c, s->nodal + d * p);
     double sum[3] = {0.0, 0.0, 0.0};
     for (int i = 0; i < c; i++) sum[0] += s->horizontal[i], sum[1] += s->horizontal[c + i], sum[2] += s->vertical[i];
     memcpy(s->resultant, sum, sizeof sum);
+}
+
+/* place (2, c) = where the points lie in the plane, from the displacements (k,) of the nodes without the forces of the
+   step: under those of the last solution. */
+void meeting_place(const meeting *s, const double *moved, double *place) {
+    const int c = s->points, p = s->nodes;
+    sparse up = {c, s->w_begin, s->w_column, s->w_value};
+    for (int d = 0; d < 2; d++) multiply(&up, moved + (d + 1) * p, place + d * c);
+    for (int i = 0; i < 2 * c; i++) place[i] += s->shift[i];
+}
+
+/* After `meeting_conclude`: how far its forces shift the points in the plane: with the nodes between the first and the
+   last that are loaded or, where there are bristles, with their `tips`, on a grid too large to be dense where they touch. */
+void meeting_shift(meeting *s, const double *moved, const brush *tips) {
+    const int c = s->points, p = s->nodes, size = 3 * p;
+    const int every = tips && tips->compliance->lift, count = every ? 0 : nonzero(size, s->nodal, s->which, s->value);
+    int low = p, high = -1;
+    for (int k = 0; k < count; k++) {
+        const int node = s->which[k] % p;
+        low = node < low ? node : low, high = node > high ? node : high;
+    }
+    memset(s->lifted, 0, size * sizeof(double));
+    for (int d = 1; d < 3 && count; d++)
+        add_columns(high - low + 1, size, s->answer + d * p + low, count, s->which, s->value, s->lifted + d * p + low);
+    sparse up = {c, s->w_begin, s->w_column, s->w_value};
+    for (int d = 0; d < 2; d++) multiply(&up, s->lifted + (d + 1) * p, s->shift + d * c);
+    if (!tips) return;
+    for (int d = 0; d < 2; d++) multiply(&up, moved + (d + 1) * p, s->added + d * c);
+    for (int d = 0; d < 2 * c; d += c)
+        for (int i = 0; i < c; i++)
+            if (every || tips->touched[i]) s->shift[d + i] = tips->moved[d + i] - tips->deflection[d + i] - s->added[d + i];
 }

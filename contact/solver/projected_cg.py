@@ -143,8 +143,8 @@ class ProjectedCG:
 
     def __init__(self, compliance: Compliance) -> None:
         self._compliance = compliance
-        self._diagonal = compliance.diagonal
-        n = len(self._diagonal)
+        self.diagonal = compliance.diagonal
+        n = len(self.diagonal)
         self._grid = compliance if isinstance(compliance, SpreadCompliance) else None
         self._cells = self._grid.cells if self._grid else ()
         self._box = _EMPTY
@@ -193,8 +193,8 @@ class ProjectedCG:
         """Make the forces exact; whether no point beyond the box touches, else the box has grown."""
         largest = self._iterate(q, TARGET)
         gap = _gap(self._compliance, self.force, self._base, q)
-        scale = largest + float((self._diagonal * self.force).max())
-        self.residual = complementarity_residual(self.force, gap, self._diagonal, scale)
+        scale = largest + float((self.diagonal * self.force).max())
+        self.residual = complementarity_residual(self.force, gap, self.diagonal, scale)
         if self.residual > TOLERANCE and self._cover(gap < -TARGET * scale):
             return False
         self._finish(self.force, gap)
@@ -219,7 +219,7 @@ class ProjectedCG:
     def _iterate(self, q: Array, target: float) -> float:
         """Find the forces of the box's points to the `target`; the largest of all gaps q."""
         inner, index, largest = self._inner, self._index, float(np.abs(q).max())
-        diagonal = self._diagonal[index]
+        diagonal = self.diagonal[index]
         force, base, q = self.force[index], self._base[index], q[index]
         gap = _gap(inner, force, base, q)
         touching = (force > 0.0) | (gap < 0.0)

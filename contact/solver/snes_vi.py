@@ -115,8 +115,8 @@ class SnesVI:
             matrix = MatrixCompliance(checked_compliance(matrix))
         self._compliance = matrix
         n = len(matrix.diagonal)
-        self._diagonal = matrix.diagonal.copy()
-        self._unit = float(self._diagonal.max())
+        self.diagonal = matrix.diagonal.copy()
+        self._unit = float(self.diagonal.max())
         self.active: Mask = np.zeros(n, dtype=bool)
         self.gap: Array = np.zeros(n)
         self.penetration = 0.0
@@ -181,7 +181,7 @@ class SnesVI:
         if self._product is not None:
             self._product.reset()
             return
-        every = np.arange(len(self._diagonal), dtype=PETSc.IntType)
+        every = np.arange(len(self.diagonal), dtype=PETSc.IntType)
         jacobian.setValues(every, every, self._dense)
         jacobian.assemble()
 
@@ -229,7 +229,7 @@ class SnesVI:
         force = np.maximum(self._force.array_r, 0.0)
         gap = self._moved(force)
         scale = float(np.abs(self._offset).max() + force.max())
-        diagonal = self._diagonal / self._unit
+        diagonal = self.diagonal / self._unit
         self.residual = complementarity_residual(force, gap, diagonal, scale)
         reason = self._snes.getConvergedReason()
         if reason < 0 and not self.residual <= TOLERANCE:

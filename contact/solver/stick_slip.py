@@ -307,11 +307,19 @@ class BrushFriction:
         _C.plane_hold(self._plane.compiled, len(held), COMPILED.ints(held))
 
     def solve(
-        self, normal: ContactSolver, q: Array, guess: Mask | None, static: Array, free: Array
+        self,
+        normal: ContactSolver,
+        q: Array,
+        guess: Mask | None,
+        static: Array,
+        free: Array,
+        again: bool = False,
+        rough: bool = False,
     ) -> tuple[Array, Array]:
         """Normal (c,) and horizontal (c, 2) forces, N, the latter until the next call; `free` (2c,) m, x then y.
 
-        `guess`: the points that touch, by default those of the last step. After 40 turns without convergence the step is
+        `guess`: the points that touch, by default those of the last step; `again`: the last step is solved once more, from
+        the state of the bristles before it; `rough`: by one turn, as a guess. After 40 turns without convergence the step is
         split; ConvergenceError after 40 such steps in a row, or where nothing bounds the horizontal forces.
         """
         if static is not self._static:
@@ -329,6 +337,7 @@ class BrushFriction:
             COMPILED.doubles(np.ascontiguousarray(static)), COMPILED.doubles(np.ascontiguousarray(free)),
         )  # fmt: skip
         force = np.empty(len(q))
+        self.compiled.again, self.compiled.rough = again, rough
         contact, raised = self._contact(normal)
         failed = _C.brush_solve(self.compiled, contact, *given, COMPILED.doubles(force))
         if raised:

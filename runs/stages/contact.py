@@ -12,7 +12,7 @@ from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
 from tireroad.contact.choices import USABLE
-from tireroad.contact.loop import DrivenTire, Loop
+from tireroad.contact.loop import ContactProblem, DrivenTire, Loop
 from tireroad.contact.model import solver_name
 from tireroad.contact.patch import Patch
 from tireroad.contact.results.chatter import LIMIT, Chatter, Chosen, warning
@@ -31,7 +31,6 @@ from tireroad.contact.setup import ContactSetup
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.static.footprint import Footprint
 from tireroad.fem.static.state import StaticState
-from tireroad.greens.basis import Basis
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.modal.rolling import RollingModes
@@ -59,7 +58,6 @@ from tireroad.runs.stages.rolling import (
     reported,
     shortest_period,
 )
-from tireroad.runs.stages.setup import leaning, leaning_loads
 from tireroad.runs.stages.stage import Record, Result, Stage
 
 # Fewest point spacings per footprint width. Measured on cobblestones on two tires: deviation 23 %
@@ -71,6 +69,7 @@ FEW = 2.2
 # at 3.6; work over the step 127, 78 J and 58, 66 J, where lifting the tire takes 50 J.
 APART = 3.0
 _CREEPING = 0.02
+_ASTRAY = 1e-3  # of the steps
 # Share of the static deflection: motion of the contact up to which a linear tire is trusted.
 LINEAR = 1 / 3
 
@@ -98,6 +97,19 @@ def describe(
     }
     if totals.least == 0:
         record.warnings.append("the tire lost contact with the road for a while")
+
+
+def meeting(record: Record, contact: ContactProblem, steps: int) -> None:
+    """Record how often a step was solved again for where its points lie, and warn where they were not found."""
+    record.indicators |= {
+        "steps solved again where the points have moved to": (contact.repeated, "-"),
+        "steps that do not meet the road where the points lie": (contact.unsettled, "-"),
+    }
+    if contact.unsettled > _ASTRAY * steps:
+        record.warnings.append(
+            f"in {contact.unsettled} of {steps} steps the road is not met where the points lie: on flanks so steep a point can "
+            "rest at several places and slip off; take a smaller time.step, or a road whose flanks are longer"
+        )
 
 
 def rubbing(record: Record, friction: float, scene: Scene, lagging: int) -> None:
@@ -244,32 +256,16 @@ def works(contact: Work, driven: DrivenTire | None) -> Works:
     return Works(contact.total, driven.work if driven else None, lead, contact.begun)
 
 
-@dataclass(frozen=True)
-class Leaning:
-    """The forces of the road's slope among those of the loop, whose points are not followed.
-
-    `own` and `others`: indices of these and of all other forces; `shape` (k, m) kg^-1/2: modal
-    shapes at their points, None where there are none.
-    """
-
-    own: np.ndarray
-    others: np.ndarray
-    shape: np.ndarray | None
-
-
 class Losses:
     """Energy losses of a rolling tire from its states at each step; empty if not known."""
 
-    def __init__(
-        self, chosen: Integration, response: Response, rolling: RollingModes, leaning: Leaning
-    ) -> None:
+    def __init__(self, chosen: Integration, response: Response, rolling: RollingModes) -> None:
         tire = chosen.tire
         self._motion: StateMotion | None = None
-        self._leaning, self._aside = leaning, Work(chosen.scheme)
         if isinstance(tire, Recursion) and StateMotion.known(rolling, response):
             self._motion = StateMotion(rolling, response.slow(chosen.step), chosen.step)
             left_out = response.resolved(chosen.step).residual
-            left_out = left_out[: len(leaning.others), leaning.others]
+            left_out = left_out[: left_out.shape[1]]
             self._circulation = Circulation(left_out * (not response.pulse), chosen.scheme)
             self._tire = tire
             tire.keep_samples()
@@ -286,28 +282,10 @@ class Losses:
         losses, beyond = self._motion.losses, self._circulation
         return losses.lost, losses.drive, beyond.work, beyond.lead
 
-    @property
-    def others(self) -> np.ndarray:
-        """Indices of the forces whose points are followed."""
-        return self._leaning.others
-
-    @property
-    def unknown(self) -> str:
-        """What the works leave out, in words."""
-        if self._motion is not None or self._leaning.shape is None:
-            return ""
-        return ", without the work of the road's slope along it"
-
-    @property
-    def leaning(self) -> tuple[float, float]:
-        """Work (J) of the forces along and across of the road's slope, and their lead, where the
-        losses are known."""
-        return self._aside.total, self._aside.lead
-
     def begin(self) -> None:
         """Begin at the forces that the tire has at t = 0."""
         if self._motion is not None:
-            self._circulation.begin(self._tire.force[self._leaning.others])
+            self._circulation.begin(self._tire.force)
 
     def flush(self) -> None:
         """Account for the steps since the last call. Collective."""
@@ -315,29 +293,22 @@ class Losses:
             return
         states, pushes, every, block = map(list, zip(*samples, strict=True))
         forces, tire = np.array(every), self._tire
-        moved = self._motion.add(
+        self._motion.add(
             tire.everywhere(states), tire.everywhere(pushes), tire.block_everywhere(block)
         )
-        self._circulation.add(forces[:, self._leaning.others])
-        if self._leaning.shape is not None:
-            self._aside.add(forces[:, self._leaning.own] @ self._leaning.shape, moved)
+        self._circulation.add(forces)
 
     def state(self) -> dict[str, np.ndarray]:
         """State for a checkpoint."""
         if self._motion is None:
             return {}
-        aside = {f"leaning_{name}": value for name, value in self._aside.state().items()}
-        return self._motion.losses.state() | self._circulation.state() | aside
+        return self._motion.losses.state() | self._circulation.state()
 
     def set_state(self, state: dict[str, np.ndarray]) -> None:
         """Continue from a `state`."""
         if self._motion is not None:
             self._motion.losses.set_state(state)
             self._circulation.set_state(state)
-            mark = "leaning_"
-            self._aside.set_state(
-                {name.removeprefix(mark): state[name] for name in state if name.startswith(mark)}
-            )
 
 
 def negligible(pressed: float) -> float:
@@ -360,15 +331,13 @@ def describe_energy(
     `kept`: the tire's snapshot; `pressed`: load times deflection of the static state, J.
     """
     slight = negligible(pressed)
-    aside, lead = losses.leaning
-    work = replace(work, contact=work.contact + aside, lead=work.lead + lead)
     total = work.total
     record.indicators["work of contact on the tire"] = (work.contact, "J")
     if work.driven is not None:
         record.indicators["work of the prescribed forces"] = (work.driven, "J")
-    energies = energies_in(rolling, response, kept, losses, step)
+    energies = energies_in(rolling, response, kept, step)
     if energies is None:
-        console.say(f"  energy: contact and forces put {total:.4g} J into the tire{losses.unknown}")
+        console.say(f"  energy: contact and forces put {total:.4g} J into the tire")
         return
     record.indicators |= {
         "energy left in the modes": (energies[0], "J"),
@@ -389,7 +358,6 @@ def energies_in(
     rolling: RollingModes,
     response: Response,
     kept: dict[str, np.ndarray],
-    losses: Losses,
     step: float,
 ) -> tuple[float, float] | None:
     """Energy (J) in the modes and in the residual flexibility by a tire's snapshot; None where they are not known."""
@@ -397,7 +365,7 @@ def energies_in(
     if not own:
         return None
     left = energy_left(rolling, kept, response.slow(step))
-    return left, springs(response.resolved(step), kept["push_force"], losses.others)
+    return left, springs(response.resolved(step), kept["push_force"])
 
 
 def _standing(
@@ -574,7 +542,7 @@ class ContactStage(Stage[ContactHistory]):
             driven = driven_tire(self.job, chosen, setup.patch)
             loop = self._loop(record, setup, driven or chosen.tire, chosen.step)
         totals = Totals(setup.patch, setup.reach, scheme.limit, work=Work(scheme.scheme))
-        losses = Losses(chosen, response, self._states, self._leaning(setup))
+        losses = Losses(chosen, response, self._states)
         with ExitStack() as stack, record.timing("time loop"):
             attributes = {"step": chosen.step, "scheme": chosen.scheme, "road_relief": setup.relief}
             attributes |= {"free_slip": setup.free_slip or 0.0, "scheme_reason": scheme.reason}
@@ -599,6 +567,7 @@ class ContactStage(Stage[ContactHistory]):
             file.finish()
         describe(record, totals, loop.contact.factorisations, chosen, chosen.steps - done)
         rubbing(record, self._coefficient, self.job.scene, loop.contact.lagging)
+        meeting(record, loop.contact, totals.figures.steps)
         alternation(record, totals.alternation.worst, scheme)
         points(record, setup.patch, self.static.product.footprint(), setup.relief)
         highest = self.rotating.product.highest / (2 * np.pi)
@@ -621,7 +590,7 @@ class ContactStage(Stage[ContactHistory]):
         change, moved = loop.begun
         losses.begin()
         kept = loop.tire.snapshot()
-        energies = energies_in(self._states, self.greens.product.contact, kept, losses, step)
+        energies = energies_in(self._states, self.greens.product.contact, kept, step)
         totals.work.begin(change[: len(moved)], moved, sum(energies or (0.0,)))
 
     @property
@@ -636,20 +605,6 @@ class ContactStage(Stage[ContactHistory]):
     def _states(self) -> RollingModes:
         """The modes, with the attachment modes where there are any, whose states the loop has."""
         return self.greens.product.attached or self.rotating.product
-
-    def _leaning(self, setup: ContactSetup) -> Leaning:
-        """The forces of the road's slope among those of the loop."""
-        response, p = self.greens.product.contact, len(setup.patch.index)
-        every = np.arange(response.residual.shape[1])
-        if not leaning(self.job):
-            return Leaning(every[:0], every, None)
-        rolling, shape = self._states, self.greens.product.leaning
-        if shape is None and StateMotion.known(rolling, response):
-            probes = leaning_loads(self.static.product, setup)
-            shape = Basis.of(rolling).seen(probes)
-        if shape is None:
-            shape = np.zeros((2 * p, 0))
-        return Leaning(every[p : 3 * p], np.r_[every[:p], every[3 * p :]], shape)
 
     def _shortest_period(self) -> float:
         """Shortest period of all excitation, s."""

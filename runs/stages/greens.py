@@ -7,11 +7,9 @@ from typing import Any, ClassVar
 
 import h5py
 import numpy as np
-from scipy import sparse
 
 from tireroad.contact.setup import ContactSetup
 from tireroad.fem.static.state import StaticState
-from tireroad.greens.basis import Basis
 from tireroad.greens.coupling import Wheel
 from tireroad.greens.residuals import residual_of
 from tireroad.greens.response import Response
@@ -23,7 +21,7 @@ from tireroad.runs.scene.physics import turning_of
 from tireroad.runs.scene.tables.scene import PointForceTable, has_air
 from tireroad.runs.stages import cavity, corner, rotating
 from tireroad.runs.stages.modes import fill_projection, read_projection
-from tireroad.runs.stages.setup import components, leaning, leaning_loads, points_of, probes
+from tireroad.runs.stages.setup import components, points_of, probes
 from tireroad.runs.stages.stage import MUMPS, Computed, Record, Result
 
 _UNITS = {
@@ -79,14 +77,12 @@ class Responses:
 
     `contact`: between the points of the patch, with the prescribed forces among its inputs;
     `force`: between the points of the prescribed forces. `attached`: the modes with their attachment
-    modes, whose states these are, without their fields; None without the latter. `leaning` (2 p, m)
-    kg^-1/2: their shapes at the forces of the road's slope.
+    modes, whose states these are, without their fields; None without the latter.
     """
 
     contact: Response | None = None
     force: Response | None = None
     attached: RollingModes | None = None
-    leaning: np.ndarray | None = None
 
     @property
     def named(self) -> dict[str, Response]:
@@ -127,7 +123,6 @@ class GreensStage(Computed[Responses]):
             "points": setup.patch.index.tolist() if setup else [],
             "pitch": points_of(self.job, self.static.product) if setup else None,
             "components": components(self.job) if setup else (),
-            "leaning": setup is not None and leaning(self.job),
         }
 
     @property
@@ -139,16 +134,6 @@ class GreensStage(Computed[Responses]):
     def _contact_forces(self) -> int:
         """Number of force components on the nodes of the patch."""
         return len(components(self.job)) * len(self.setup.product.patch.index)
-
-    @property
-    def _leaning(self) -> bool:
-        return self.setup.product is not None and leaning(self.job)
-
-    def _light(self, width: int) -> sparse.csr_matrix | None:
-        """The forces of the road's slope, as wide as the other probes; None if there are none."""
-        if not self._leaning:
-            return None
-        return leaning_loads(self.static.product, self.setup.product, width)
 
     @property
     def _wanted(self) -> Wanted:
@@ -188,7 +173,6 @@ class GreensStage(Computed[Responses]):
                 points.loads,
                 residual,
                 lambda: self.fields.product,
-                self._light(points.loads.shape[1]),
             )
         record.indicators |= response.figures
         record.warnings += response.warnings
@@ -197,24 +181,17 @@ class GreensStage(Computed[Responses]):
     def _of_attached(self, attached: RollingModes) -> dict[str, Any]:
         """The part that the contact needs of the modes with attachment modes: not their fields, which on
         fine meshes take gigabytes."""
-        leaning = None
-        if self._leaning:
-            loads = leaning_loads(self.static.product, self.setup.product)
-            leaning = Basis.of(attached).seen(loads)
         basis = replace(attached.basis, shape=attached.basis.shape[:0])
-        return {"attached": replace(attached, basis=basis), "leaning": leaning}
+        return {"attached": replace(attached, basis=basis)}
 
     def _apart(self, name: str, whole: Response) -> Responses:
         """The contact's response, with prescribed forces as inputs (contact.loop), and theirs."""
         forces, more = len(self.job.scene.force), corner.readings(self.job)
-        light = 2 * len(self.setup.product.patch.index) if self._leaning else 0
-        if name == "force" or not (forces or more or light):
+        if name == "force" or not (forces or more):
             return Responses(contact=whole) if name == "contact" else Responses(force=whole)
-        count, last = self._contact_forces, whole.input.shape[1]
+        count = self._contact_forces
         inputs = count + forces
-        # What leans follows the vertical forces, before the prescribed ones.
-        order = np.r_[:count, last - light : last, count:inputs]
-        contact = whole.between(slice(None), order)
+        contact = whole.between(slice(None), slice(inputs))
         if not forces:
             return Responses(contact=contact)
         held = 0 if self.job.axle else more
@@ -252,8 +229,6 @@ class GreensStage(Computed[Responses]):
             put(file, "contact/index", self.setup.product.patch.index, "-")
         if product.attached is not None:
             group, basis = file.create_group(_ATTACHED), product.attached.basis
-            if product.leaning is not None:
-                put(group, "leaning", product.leaning, "kg^-1/2")
             put(group, "frequency", basis.frequency, "Hz")
             fill_projection(group, basis.projection)
             rotating.fill(group.create_group("states"), product.attached)
@@ -273,8 +248,7 @@ class GreensStage(Computed[Responses]):
             states=rotating.read(group["states"]),
             turning=turning_of(self.job.scene, self.job.speed),
         )
-        leaning = group["leaning"][:] if "leaning" in group else None
-        return replace(responses, attached=attached, leaning=leaning)
+        return replace(responses, attached=attached)
 
 
 def _share_of_residual(record, where: str, response: Response) -> None:

@@ -161,7 +161,7 @@ def driven_tire(job: Job, chosen: Integration, patch: Patch) -> DrivenTire | Non
     if not forces and not corner.readings(job):
         return None
     time = chosen.step * np.arange(chosen.steps + 1)
-    seen = (3 if job.scene.contact.has_friction else 1) * len(patch.index)
+    seen = (3 if job.scene.horizontal_forces else 1) * len(patch.index)
     return DrivenTire(chosen.tire, histories(forces, time), directions(forces), chosen.scheme, seen)
 
 

@@ -218,26 +218,8 @@ def rolling_radius(job: Job, state: StaticState) -> float:
 
 def components(job: Job) -> tuple[int, ...]:
     """Directions in which the motion of the contact points is followed: normal to the road; with a
-    brush also along and across."""
-    return (2, 0, 1) if job.scene.contact.has_friction else (2,)
-
-
-def leaning(job: Job) -> bool:
-    """Whether forces along and across come from the road's slope alone: their points are not
-    followed that way."""
-    return job.scene.horizontal_forces and not job.scene.contact.has_friction
-
-
-def leaning_loads(
-    state: StaticState, setup: ContactSetup, width: int | None = None
-) -> sparse.csr_matrix:
-    """The forces (2 p, 3 s) of the road's slope on the nodes of the patch: all x, then all y.
-
-    `width`: that of other probes beside them, which also read the wheel.
-    """
-    loads = sparse.vstack([_on_nodes(state, setup, part) for part in (0, 1)], format="csr")
-    loads.resize(loads.shape[0], width or loads.shape[1])
-    return loads
+    brush, or on a road that is not level, also along and across."""
+    return (2, 0, 1) if job.scene.horizontal_forces else (2,)
 
 
 def _on_nodes(state: StaticState, setup: ContactSetup, part: int) -> sparse.csr_matrix:

@@ -23,7 +23,7 @@ from tireroad.runs.files.store import opened
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.stages.contact_file import ContactHistory
 from tireroad.runs.stages.rolling import histories, of_given_forces, recursive
-from tireroad.runs.stages.setup import components, leaning, leaning_loads, probes
+from tireroad.runs.stages.setup import components, probes
 from tireroad.runs.stages.spectra import Spectra
 from tireroad.runs.stages.stage import Computed, Job, PipelinePart, Result, Shared
 
@@ -39,11 +39,7 @@ def driven_loads(job: Job, state: StaticState, setup: ContactSetup | None) -> sp
     if setup is None:
         return loads
     patch = len(components(job)) * len(setup.patch.index)
-    forces = loads[patch : patch + len(job.scene.force)]
-    if not leaning(job):
-        return loads[: patch + len(job.scene.force)]
-    aside = leaning_loads(state, setup, loads.shape[1])
-    return sparse.vstack([loads[:patch], aside, forces], format="csr")
+    return loads[: patch + len(job.scene.force)]
 
 
 @dataclass(frozen=True, kw_only=True)

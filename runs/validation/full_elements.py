@@ -29,7 +29,7 @@ from tireroad.runs.pipeline import Finished, run_scene
 from tireroad.runs.process import console
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.physics import turning_of
-from tireroad.runs.stages.setup import leaning, leaning_loads, probes, scene_setup
+from tireroad.runs.stages.setup import probes, scene_setup
 from tireroad.runs.validation.tables import Table
 
 
@@ -161,8 +161,6 @@ class Tires:
         static, contact = self.run.static, self.job.scene.contact
         setup = scene_setup(self.job, static) if contact else None
         self.probes = probes(self.job, static, setup)
-        leans = setup is not None and leaning(self.job)
-        self.aside = leaning_loads(static, setup) if leans else None
         if setup:
             begins = contact.has_friction and self.wheel.speed > 0
             exact = self.response(len(self.modes.frequency), "static") if begins else None
@@ -193,7 +191,7 @@ class Tires:
             self._rolling[count] = rolling_modes(few, turning, self.job.comm)
         rolling, points = self._rolling[count], self.probes
         points = points.on_face if counted else points
-        given = points.outputs, points.loads, residual, lambda: rolling.basis, self.aside
+        given = points.outputs, points.loads, residual, lambda: rolling.basis
         return make_response(lambda: self.wheel, rolling, *given).response
 
     def full(self, step: float, radius: float = RADIUS) -> tuple[FullTire, float, float]:
@@ -220,9 +218,8 @@ class Tires:
 
     @property
     def _all_points(self) -> sparse.csr_matrix:
-        """Outputs and loads of full finite elements: those of the road's slope are outputs, too."""
-        points = self.probes.on_face.loads
-        return points if self.aside is None else sparse.vstack([points, self.aside], "csr")
+        """Outputs and loads of full finite elements."""
+        return self.probes.on_face.loads
 
     def _damping(self) -> tuple[tuple[float, float], ModalDamping | None]:
         """Uniform damping of the full matrices, and additional modal damping. Collective."""

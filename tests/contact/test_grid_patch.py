@@ -13,7 +13,7 @@ from tireroad.contact.grid_patch import (
     spread_pull,
     thinned,
 )
-from tireroad.contact.loop import ContactProblem
+from tireroad.contact.loop import ContactProblem, RoadMet
 from tireroad.contact.model import step_solver
 from tireroad.contact.patch import make_patch
 from tireroad.contact.solver.active_set import ActiveSet, UsualSet
@@ -135,8 +135,8 @@ def test_nodes_and_points_exchange_the_same_work(tread) -> None:
     same_step = 1e-5 * np.eye(p)
     spec = ContactTable(law=HalfSpace(youngs_modulus=5e6), points=Pitch(0.004, 0.004))
     problem = ContactProblem(patch, same_step, step_solver(spec, patch, same_step))
-    free, road = np.linspace(0, 1e-3, p), np.zeros(len(patch.points))
-    pushed = problem.commit(problem.solve(road, None, None, free), None)
+    free = np.linspace(0, 1e-3, p)
+    pushed = problem.commit(problem.solve(RoadMet.level(patch), None, free))
     assert pushed.sum() == pytest.approx(problem.at_points.sum())
     assert pushed @ free == pytest.approx(problem.at_points @ (patch.weights @ free))
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from tireroad.contact.loop import Drive, _roads, roll
+from tireroad.contact.loop import Drive, roll
 from tireroad.contact.results.energy import Work
 from tireroad.contact.roads.kinds.shapes import Flat
 from tireroad.contact.solver.active_set import ActiveSet
@@ -127,11 +127,10 @@ def test_road_heights_do_not_depend_on_where_a_loop_goes_on() -> None:
     assert len(asked) < 100 / 5 and all(shape[1] == len(PATCH.points) for shape in asked)
     drive = Drive(height, lambda t: 0.0, 20.0)
     for done in (0, 37, 99):
-        blocks = list(_roads(drive, PATCH, 1e-4, 100, done, False))
         roads = [
-            (time, road)
-            for times, heights, _ in blocks
-            for time, road in zip(times.tolist(), heights, strict=True)
+            (time, road.known)
+            for times, met in drive.roads(PATCH, 1e-4, 100, done, moving=False)
+            for time, road in zip(times.tolist(), met, strict=True)
         ]
         assert [time for time, _ in roads] == [i.time for i in whole[done:]]
         for (time, road), alone in zip(roads, whole[done:], strict=True):

@@ -1,5 +1,7 @@
 """The time loop in plain NumPy: dense matrices, complex states, each step solved from the last one to rounding."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -123,27 +125,52 @@ class PlainLoop:
         self.force = np.zeros(response.residual.shape[1])
         self.touching, self.tangential, self.normal = at_rest > 0, np.zeros((2, c)), np.zeros(c)
 
-    def step(self, road: Array, slope: Array | None = None) -> tuple[Array, Array]:
-        """Normal (c,) and bristle forces (2, c) at the end of the next step."""
+    def step(
+        self, at: Callable[[Array], tuple[Array, Array | None]]
+    ) -> tuple[Array, Array, Array | None]:
+        """Normal (c,) and bristle forces (2, c) at the end of the next step, and the slope met; `at` a place (2, c) beside the
+        points' own are a road's heights and its slope, None if it is level."""
         c, response = self.c, self.response
         earlier = self.parts[0] * self.push + self.parts[1] * self.before
         moved = self.decay * self.state + self.old * earlier
         nodes = (response.output @ moved).real + self.late @ self.force
-        free = self.up @ nodes
-        if slope is not None:
-            free = free + self.answer @ self._added(slope, self.normal, self.tangential)
-        force, t = self._solve(self.gap + free[:c] - road, free[c:])
-        change = np.zeros(self.down.shape[1])
-        change[:c] = force - self.at_rest
-        if len(change) > c:
-            change[c:] = t.ravel()
-        if slope is not None:
+        free, place, kept = (
+            self.up @ nodes,
+            np.zeros((2, c)),
+            vars(self.bristles or Pressed()).copy(),
+        )
+        for _ in range(200):
+            road, slope = at(place)
+            led = free
+            if slope is not None:
+                led = free + self.answer @ self._added(slope, self.normal, self.tangential)
+            if self.bristles is not None:
+                vars(self.bristles).update(kept)
+            before = self.normal, self.tangential
+            force, t = self._solve(self.gap + led[:c] - road, led[c:])
+            change = np.zeros(self.down.shape[1])
+            change[:c] = force - self.at_rest
+            if len(change) > c:
+                change[c:] = t.ravel()
+            self.normal, self.tangential = force, t
+            if slope is None:
+                break
             change = change + self._added(slope, force, t)
-        self.normal, self.tangential = force, t
+            now = (free + self.answer @ change)[c:].reshape(2, c)
+            if self.bristles is not None:
+                now = self.bristles.moved - self.bristles.deflection
+            off = np.abs(now - place)[:, force > 0].max(initial=0.0)
+            off += (
+                max(np.abs(one - two).max() for one, two in zip(before, (force, t), strict=True))
+                * 1e-6
+            )
+            place = now
+            if off < 1e-15:
+                break
         self.force = self.down @ change
         self.before, self.push = self.push, response.input @ self.force
         self.state = moved + self.new * self.push
-        return force, t
+        return force, t, slope
 
     @staticmethod
     def _added(slope: Array, force: Array, t: Array) -> Array:

@@ -10,6 +10,7 @@ from string import Formatter
 
 import numpy as np
 from mpi4py import MPI
+from scipy import sparse
 from threadpoolctl import threadpool_limits
 
 from tireroad.contact.results.spectra import distance
@@ -23,7 +24,7 @@ from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.files.store import opened
 from tireroad.runs.pipeline import Finished, run_scene
 from tireroad.runs.process import console
-from tireroad.runs.stages.setup import leaning, leaning_loads
+from tireroad.runs.stages.setup import components
 from tireroad.runs.validation.full_elements import Conditions, FullHistory, follow
 
 BAND = 500.0  # Hz: upper frequency of the errors
@@ -168,16 +169,16 @@ def fewer_modes(given: Prepared, count: int, residual: str) -> Response:
     few = fewer(run.fields, run.motions, count, run.wheel.turning, job.axle)
     rolling = rolling_modes(few, run.wheel.turning, job.comm)
     setup = given.trial.setup
-    points = nodes(setup.patch.index, len(run.static.points), 2)
-    aside = leaning_loads(run.static, setup) if leaning(job) else None
-    several = points, points, residual, lambda: rolling.basis, aside
+    parts = [nodes(setup.patch.index, len(run.static.points), part) for part in components(job)]
+    points = sparse.vstack(parts, "csr")
+    several = points, points, residual, lambda: rolling.basis
     return make_response(lambda: run.wheel, rolling, *several).response
 
 
 def modal(given: Prepared, response: Response, step: float) -> FullHistory:
     """The loop on the states that the step resolves, without readings of the wheel."""
-    points = slice(len(given.trial.setup.patch.index))
-    alone = response.between(points, slice(None)).resolved(step)
+    count = response.residual.shape[1]
+    alone = response.between(slice(count), slice(None)).resolved(step)
     tire = Recursion(response=alone, step=step, scheme="linear", comm=MPI.COMM_SELF)
     with threadpool_limits(1, "blas"):
         return follow(given.trial, tire, step, 0.0)

@@ -28,7 +28,7 @@ class Wave:
 
 
 def mean(road, x, y=0.0, half=HALF):
-    return CellMean(road, np.full(1, y), half).height(np.atleast_1d(x)[:, None], None)[:, 0]
+    return CellMean(road, np.full(1, y), half).height(np.atleast_1d(x)[:, None])[:, 0]
 
 
 def left(half, length, across=np.inf):
@@ -69,7 +69,7 @@ def test_the_answer_does_not_depend_on_how_a_run_is_cut() -> None:
     """The same bits, alone or in a block: a loop that goes on finds the same road."""
     road = CellMean(Wave(7e-3), np.array([0.0, 1e-3]), np.repeat(HALF, 2, axis=0))
     x = np.linspace(0.1, 0.2, 64)[:, None] + [0.0, 3e-3]
-    whole = road.height(x, None)
+    whole = road.height(x)
     alone = np.concatenate([road.height(row[None], None) for row in x])
     assert (whole == alone).all()
 
@@ -77,7 +77,7 @@ def test_the_answer_does_not_depend_on_how_a_run_is_cut() -> None:
 def test_points_of_other_sizes_have_means_of_their_own() -> None:
     half = np.array([[2e-3, 1e-3], [1e-3, 1e-3]])
     x = np.full((1, 2), 0.1)
-    found = CellMean(Wave(0.01), np.zeros(2), half).height(x, None)[0]
+    found = CellMean(Wave(0.01), np.zeros(2), half).height(x)[0]
     np.testing.assert_allclose(found, [left(one, 0.01) for one in half], atol=3e-3)
 
 
@@ -94,7 +94,7 @@ def test_waves_that_points_cannot_tell_are_gone() -> None:
     """Points 4 mm apart take a wave of 4.1 mm for one of 164 mm; of what they are given 4 % of it are left."""
     x = 4e-3 * np.arange(41)
     wave = Wave(4.1e-3)
-    means = CellMean(wave, np.zeros(41), np.repeat(HALF, 41, axis=0)).height(x[None], None)[0]
+    means = CellMean(wave, np.zeros(41), np.repeat(HALF, 41, axis=0)).height(x[None])[0]
     false = np.exp(-2j * np.pi * x / 0.164)
     assert 2 * abs(false @ wave.height(x, 0.0)) / 41 == pytest.approx(1.0, abs=0.05)
     assert 2 * abs(false @ means) / 41 < 0.045
@@ -115,7 +115,7 @@ def test_what_a_footprint_was_over_is_asked_for_once_and_to_the_last_bit() -> No
     for start in (0.1, 0.11, 0.12, 0.115, 0.3, 5.0):
         asked.clear()
         x = start + patch[None]
-        found = kept.height(x, None)
+        found = kept.height(x)
         spent.append(sum(asked))
         fresh = CellMean(Wave(0.013), np.zeros(50), np.tile(HALF, (50, 1)))
         assert np.array_equal(found, fresh.height(x, None))
@@ -127,7 +127,7 @@ def test_the_slope_has_no_steps(length) -> None:
     """As points and time steps meet it: straight lines between positions of 0.5 mm were off by 8 % at 20 mm."""
     x = 0.1 + 22.05 * 5.6e-5 * np.arange(200)
     road = CellMean(Wave(length), np.zeros(1), HALF)
-    slope = road.slope(x[:, None], None)[:, 0, 0]
+    slope = road.slope(x[:, None])[:, 0, 0]
     k = 2 * np.pi / length
     exact = -k * left(HALF[0], length) * np.sin(k * x)
     # What is sampled is lowered a little more; that is no step.
@@ -163,7 +163,7 @@ def test_lines_beside_each_other_share_their_strips() -> None:
             return super().height(x, y)
 
     y = 0.1 + 2e-3 * np.arange(20)
-    CellMean(Counted(0.01), y, np.repeat(HALF, 20, axis=0)).height(np.full((1, 20), 0.1), None)
-    CellMean(Counted(0.01), y[:1], HALF).height(np.full((1, 1), 0.1), None)
+    CellMean(Counted(0.01), y, np.repeat(HALF, 20, axis=0)).height(np.full((1, 20), 0.1))
+    CellMean(Counted(0.01), y[:1], HALF).height(np.full((1, 1), 0.1))
     shared, alone = asked
     assert shared == alone + 19 * alone / 2
