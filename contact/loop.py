@@ -320,7 +320,9 @@ class Drive:
         x, y = patch.points[:, 0], patch.points[:, 1]
         block = block_size(len(x))
         for first in range(done - done % block, steps, block):
-            times: Array = step * np.arange(first + 1.0, min(first + block, steps) + 1.0)
+            times: Array = np.float64(step) * np.arange(
+                first + 1.0, min(first + block, steps) + 1.0
+            )
             along = x + self.speed * times[:, None]
             across = np.broadcast_to(y, along.shape)
             known = np.zeros(along.shape) + [[self.motion(time)] for time in times.tolist()]
