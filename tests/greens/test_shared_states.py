@@ -59,7 +59,7 @@ def test_looking_ahead_changes_nothing(scheme) -> None:
         for k, new in enumerate(force[1:]):
             solved = Solved(new, new, np.zeros((0, 2)), 0.0, 0.0)
             together = RootSolve(comm, len(new), tire.ahead)
-            free, _ = together(tire.predict, partial(choose, solved), False)
+            free, _ = together(tire.predict, partial(choose, solved), False, False)
             tire.advance(new)
             found.append(free + tire.same_step @ new)
             rates.append(tire.inertia_force())
@@ -68,7 +68,7 @@ def test_looking_ahead_changes_nothing(scheme) -> None:
                 tire = made()
                 tire.restore(kept)
         tire.keep_samples()
-        RootSolve(comm, len(new), tire.ahead)(tire.predict, partial(choose, solved), False)
+        RootSolve(comm, len(new), tire.ahead)(tire.predict, partial(choose, solved), False, False)
         tire.advance(force[0])
         assert comm.size == 1 or comm.rank or all(len(state) == 0 for state, *_ in tire.samples())
     for values in (found, rates):

@@ -89,14 +89,14 @@ def test_the_chain_gives_what_the_program_gives(tire, tmp_path, launch) -> None:
     setup = contact_setup(
         static, tire.lattice, road, Rolled(speed=speed, duration=0.01, motion=still)
     )
-    along, across, probes = (nodes(setup.patch.index, len(static.points), k) for k in range(3))
-    aside = sparse.vstack([along, across], "csr")
-    given = rolling, probes, probes, "static", lambda: modes, aside
+    parts = [nodes(setup.patch.index, len(static.points), k) for k in (2, 0, 1)]
+    probes = sparse.vstack(parts, "csr")
+    given = rolling, probes, probes, "static", lambda: modes
     greens = make_response(lambda: wheel_of(motions, rolling.turning), *given).response
     march = Recursion(response=greens.resolved(STEP), step=STEP, scheme="linear", comm=COMM)
     tread = SimpleNamespace(law=HalfSpace(youngs_modulus=2e7), solver="active-set")
     count = len(setup.patch.points)
-    solver = step_solver(tread, setup.patch, march.same_step[:, :count])
+    solver = step_solver(tread, setup.patch, march.same_step[:count, :count])
     steps = list(roll(march, solver, setup.patch, setup.drive, STEP, 200))
     force = np.array([[*step.horizontal.sum(axis=0), step.force.sum()] for step in steps])
     frequency, spectrum = amplitudes(force, STEP)
