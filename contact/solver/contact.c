@@ -1508,21 +1508,16 @@ void meeting_place(const meeting *s, const double *moved, double *place) {
     for (int i = 0; i < 2 * c; i++) place[i] += s->shift[i];
 }
 
-/* After `meeting_conclude`: how far its forces shift the points in the plane: with the nodes between the first and the
-   last that are loaded or, where there are bristles, with their `tips`, on a grid too large to be dense where they touch. */
+/* After `meeting_conclude`: how far its forces shift the points in the plane: with the nodes or, where there are bristles, with
+   their `tips`, on a grid too large to be dense where they touch. */
 void meeting_shift(meeting *s, const double *moved, const brush *tips) {
-    const int c = s->points, p = s->nodes, size = 3 * p;
-    const int every = tips && tips->compliance->lift, count = every ? 0 : nonzero(size, s->nodal, s->which, s->value);
-    int low = p, high = -1;
-    for (int k = 0; k < count; k++) {
-        const int node = s->which[k] % p;
-        low = node < low ? node : low, high = node > high ? node : high;
-    }
-    memset(s->lifted, 0, size * sizeof(double));
-    for (int d = 1; d < 3 && count; d++)
-        add_columns(high - low + 1, size, s->answer + d * p + low, count, s->which, s->value, s->lifted + d * p + low);
+    const int c = s->points, p = s->nodes, size = 3 * p, every = tips && tips->compliance->lift;
     sparse up = {c, s->w_begin, s->w_column, s->w_value};
-    for (int d = 0; d < 2; d++) multiply(&up, s->lifted + (d + 1) * p, s->shift + d * c);
+    if (!every) {
+        memset(s->lifted, 0, size * sizeof(double));
+        add_columns(2 * p, size, s->answer + p, nonzero(size, s->nodal, s->which, s->value), s->which, s->value, s->lifted + p);
+        for (int d = 0; d < 2; d++) multiply(&up, s->lifted + (d + 1) * p, s->shift + d * c);
+    }
     if (!tips) return;
     for (int d = 0; d < 2; d++) multiply(&up, moved + (d + 1) * p, s->added + d * c);
     for (int d = 0; d < 2 * c; d += c)
