@@ -274,33 +274,6 @@ class Wheel:
             flexibility, beside = flexibility + lacking.compliance, beside + lacking.momentum
         return self._completed(basis, outputs, loads, flexibility, beside)
 
-    def respond_inside(
-        self,
-        basis: Basis,
-        outputs: Probes,
-        loads: Probes,
-        read: sparse.csr_matrix,
-        driven: sparse.csr_matrix,
-    ) -> Response:
-        """Response of probes of which some lie inside the tire, with the exact static flexibility of what the states lack.
-
-        The shapes of `basis` have further rows for these; `read` (r, n) and `driven` (n, k) are the same `outputs` and `loads` on
-        own unknowns. InputError for a wheel that moves. Collective.
-        """
-        if basis.projection.moves:
-            raise InputError(
-                "large motions: a wheel that moves on an axle is not available; take axle.kind = \"fixed\""
-            )
-        rows = sparse.csr_matrix(self._beside(basis.of_hub(outputs)))
-        shapes = LoadedShapes(self.operators, self.rotating_stiffness, self.air)
-        answers = shapes.readings(sparse.vstack([read, rows], format="csr"), driven)
-        shapes.destroy()
-        flexibility, beside = np.split(answers, [outputs.shape[0]])
-        if self._apart:
-            lacking = regained(basis.held, *self._stiffnesses(basis.projection), outputs, loads)
-            flexibility, beside = flexibility + lacking.compliance, beside + lacking.momentum
-        return self._completed(basis, outputs, loads, flexibility, beside)
-
     def _completed(
         self, basis: Basis, outputs: Probes, loads: Probes, flexibility: Array, beside: Array
     ) -> Response:
