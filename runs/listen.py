@@ -11,6 +11,7 @@ from typing import Any
 from mpi4py import MPI
 
 from tireroad.fem.errors import InputError
+from tireroad.greens.absorbing_road import PorousLayer
 from tireroad.runs.pipeline import PARTS
 from tireroad.runs.results.reader import RunResults
 from tireroad.runs.scene.load import load
@@ -27,11 +28,12 @@ def listen(
     *,
     temperature: float = 293.15,
     up_to: float | None = None,
+    road: PorousLayer | Mapping[str, float] | None = None,
 ) -> SoundPressure:
     """Sound pressure of a finished run at other microphones: its folder, or tireroad.load of it. Not collective.
 
     `microphones`: as sound.microphones in a scene, names or places (x, y, z) in m; `temperature` K of the
-    air; `up_to` Hz. Nothing is written. Raises InputError for a folder without the results of a
+    air; `up_to` Hz; `road`: as sound.road, a porous layer or its keys, None rigid. Nothing is written. Raises InputError for a folder without the results of a
     rolling contact, for places inside the tire or under the road, and values out of range.
     """
     results = run if isinstance(run, RunResults) else RunResults(run)  # type: ignore[arg-type]
@@ -42,7 +44,8 @@ def listen(
             item.name: _read(item, given[item.name])
             for item in fields(SoundTable)
             if item.name in given
-        }
+        },
+        road=_layer(road),
     )
     job = Job(replace(scene, sound=table), results.directory, MPI.COMM_SELF)
     done: dict[str, Result] = {}
@@ -63,6 +66,16 @@ def listen(
             "the scene with [time] and [contact] to its end"
         )
     return done["sound"].product
+
+
+def _layer(road: PorousLayer | Mapping[str, float] | None) -> PorousLayer | None:
+    if road is None or isinstance(road, PorousLayer):
+        return road
+    try:
+        return PorousLayer(**road)
+    except TypeError:
+        names = ", ".join(item.name for item in fields(PorousLayer))
+        raise InputError(f"listen: road has the keys {names}, not {', '.join(road)}") from None
 
 
 def _read(item: Any, value: Any) -> Any:

@@ -15,13 +15,14 @@ from scipy.interpolate import CubicSpline
 from tires import soft_torus
 
 import tireroad
+from tireroad.contact.results.spectra import a_weighting
 from tireroad.greens.outputs import Surface
 from tireroad.greens.tire_sound import directions
 from tireroad.runs.pipeline import run_scene
 from tireroad.runs.report.page import write_report
 from tireroad.runs.results.export import export
 from tireroad.runs.scene.load import load
-from tireroad.runs.stages.sound import SoundStage, _total_error
+from tireroad.runs.stages.sound import SPACING, SoundStage, _total_error, intensity
 
 pytestmark = pytest.mark.slow
 
@@ -178,6 +179,55 @@ def test_what_cannot_be_heard_is_refused(
 ) -> None:
     with pytest.raises(tireroad.InputError, match=message):
         run(tmp_path / "run", change)
+
+
+def test_intensity_of_a_plane_wave_and_of_a_standing_one() -> None:
+    """Outward where the outer microphone lags, p^2 / 2 rho c but for sin(kd) / kd; none where nothing travels."""
+    frequency = np.array([100.0, 500.0, 1000.0])
+    k = 2 * np.pi * frequency / 343.0
+    there, back = np.exp(-1j * k * SPACING), np.exp(1j * k * SPACING)
+    one = np.ones(3, complex)
+    found = intensity(one, there, frequency, 1.2)
+    np.testing.assert_allclose(found, np.sinc(k * SPACING / np.pi) / (2 * 1.2 * 343.0), rtol=1e-12)
+    assert found[2] == pytest.approx(1 / (2 * 1.2 * 343.0), rel=0.015)
+    np.testing.assert_allclose(intensity(one, back, frequency, 1.2), -found)
+    np.testing.assert_allclose(intensity(one, 0.7 * one, frequency, 1.2), 0.0, atol=1e-15)
+
+
+def test_probes_hear_what_the_microphones_of_t_360_hear(results: tireroad.RunResults) -> None:
+    """Intensity near the tire is that of its pressures, and no longer their level in a field that stores energy;
+    over a rigid road the intensity 5 m away is p^2 / 2 rho c."""
+    heard = tireroad.listen(results, ["obsi"], up_to=150.0)
+    assert heard.probes == ["obsi leading", "obsi trailing"] and heard.intensity.shape[0] == 2
+    one, other = heard.pressure[heard.names.index("obsi leading inner")], heard.pressure[1]
+    flux = -(one.conj() * other).imag / (4 * np.pi * heard.frequency * 1.2041 * SPACING)
+    np.testing.assert_allclose(heard.intensity[0], flux, rtol=1e-4)
+    assert heard.intensity_index.shape == (2, len(heard.centre)) and heard.intensity_index.max() > 1
+    total = 10 * np.log10((flux * 10 ** (a_weighting(heard.frequency) / 10)).sum() / 1.5 / 1e-12)
+    assert heard.total_intensity[0] == pytest.approx(total, abs=0.01)
+    ends = [(0.0, 5.0 + side * SPACING / 2, 0.0) for side in (-1, 1)]
+    far = tireroad.listen(results, ends, up_to=150.0)
+    some = far.frequency > 60
+    away = intensity(*far.pressure, far.frequency, 1.2041)[some]
+    plane = np.abs(far.pressure[0, some]) ** 2 / (2 * 1.2041 * 343.23)
+    assert 10 * np.log10(away / plane) == pytest.approx(0.0, abs=0.2)
+
+
+def test_a_road_that_absorbs_is_heard(results: tireroad.RunResults) -> None:
+    """Of a finished run: a hard layer is the rigid road, a soft one another level; its keys are checked."""
+    rigid = tireroad.listen(results, [(3.0, 1.0, 1.0)], up_to=150.0)
+    hard = tireroad.listen(results, [(3.0, 1.0, 1.0)], up_to=150.0, road={"resistivity": 1e15})
+    np.testing.assert_allclose(hard.pressure, rigid.pressure, rtol=1e-4)
+    soft = tireroad.listen(
+        results,
+        [(3.0, 1.0, 1.0)],
+        up_to=150.0,
+        road=tireroad.PorousLayer(resistivity=2e3, porosity=0.3, thickness=0.2),
+    )
+    assert np.abs(soft.level - rigid.level).max() > 1.0
+    for road, why in (({"depth": 0.1}, "road has the keys"), ({"porosity": 2.0}, "porosity must")):
+        with pytest.raises(tireroad.InputError, match=why):
+            tireroad.listen(results, road=road)
 
 
 def test_the_vibration_errs_as_the_contact_force_and_the_axle_force() -> None:
