@@ -36,6 +36,20 @@ def listen(
     air; `up_to` Hz; `road`: as sound.road, a porous layer or its keys, None rigid. Nothing is written. Raises InputError for a folder without the results of a
     rolling contact, for places inside the tire or under the road, and values out of range.
     """
+    return finished(run, microphones, temperature, up_to, road)[1]["sound"].product
+
+
+def finished(
+    run: str | Path | Mapping[str, Any],
+    microphones: Any,
+    temperature: float,
+    up_to: float | None,
+    road: PorousLayer | Mapping[str, float] | None,
+) -> tuple[Job, dict[str, Result]]:
+    """The job of a finished run with a table [sound] of its own, and its results, "sound" among them.
+
+    Arguments and errors are those of `listen`. Not collective.
+    """
     results = run if isinstance(run, RunResults) else RunResults(run)  # type: ignore[arg-type]
     scene = load(results.directory / "scene.toml")
     given = {"microphones": microphones, "temperature": temperature, "up_to": up_to}
@@ -65,7 +79,7 @@ def listen(
             f"{results.directory}: listen needs the results of a tire that rolls or is driven over time: run "
             "the scene with [time] and [contact] to its end"
         )
-    return done["sound"].product
+    return job, done
 
 
 def _layer(road: PorousLayer | Mapping[str, float] | None) -> PorousLayer | None:

@@ -23,7 +23,7 @@ from tireroad.runs.report.figures import (
     third_octaves,
 )
 from tireroad.runs.report.read import Results, Section, TextTable, about, digits, quantity
-from tireroad.runs.results.wave import wave_file
+from tireroad.runs.results.wave import LISTEN, joined, wave_file
 
 FILE = "sound.h5"
 _CHARTED = 4  # microphones in one chart of bars
@@ -52,7 +52,8 @@ def sound(results: Results) -> Section:
     section.facts.append(("sound power", f"{power[0]:.1f} dB, {power[1]:.1f} dB(A) re 1 pW"))
     centre = results.array(FILE, "third_octave/centre")
     for name, one in zip(names, results.array(FILE, "signal/pressure"), strict=True):
-        data, full = wave_file(one, float(results.dataset(FILE, "signal/pressure").attrs["rate"]))
+        rate = float(results.dataset(FILE, "signal/pressure").attrs["rate"])
+        data, full = wave_file(joined(one, max(round(LISTEN * rate), len(one))), rate)
         uri = f"data:audio/wav;base64,{b64encode(data).decode()}"
         section.sounds.append((f"{name}: full scale is {full:g} Pa", uri))
     if len(centre) < FEWEST_BANDS:
