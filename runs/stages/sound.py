@@ -330,7 +330,7 @@ class SoundStage(WholeTire[SoundPressure]):
         """All fields of the product."""
         write_fields(file, product)
         file["microphones"].attrs["names"] = file.attrs["microphone_names"] = product.names
-        file["intensity"].attrs["names"] = product.probes
+        file["intensity"].attrs["names"] = file.attrs["probe_names"] = product.probes
         file["contribution/region"].attrs["names"] = REGIONS
         file["signal/pressure"].attrs["rate"] = product.rate
         elevation, azimuth = angles()
@@ -599,6 +599,13 @@ def _regions(tire: SoundingTire) -> np.ndarray:
     return found
 
 
+def _told(record: Record, name: str, value: float, error: float, unit: str) -> None:
+    """A level and its error in the headline; what is NaN says "unknown"."""
+    for what, number, of in ((name, value, unit), (f"error of the {name}", error, "dB")):
+        known = np.isfinite(number)
+        record.headline[what] = (float(number), of) if known else ("unknown", "-")
+
+
 def _describe(record: Record, found: SoundPressure) -> None:
     """Levels at the microphones with their errors, the CPX level, and the sound power."""
     for k, name in enumerate(found.names):
@@ -611,20 +618,17 @@ def _describe(record: Record, found: SoundPressure) -> None:
                 "dB(A)",
             ),
         ):
-            record.headline[f"{kind} at {name}"] = (float(total[k]), f"{unit} re 20 uPa")
-            known = np.isfinite(error[k])
-            record.headline[f"error of the {kind} at {name}"] = (
-                (float(error[k]), "dB") if known else ("unknown", "-")
-            )
-    if {"cpx front", "cpx rear"} <= set(found.names):
-        both = [found.names.index(name) for name in ("cpx front", "cpx rear")]
-        mean = 10 * np.log10((10 ** (found.total_weighted[both] / 10)).mean())
-        record.headline["A-weighted CPX level"] = (float(mean), "dB(A) re 20 uPa")
+            _told(record, f"{kind} at {name}", total[k], error[k], f"{unit} re 20 uPa")
+    for name, unit in (("CPX", "dB(A) re 20 uPa"), ("OBSI", "dB(A) re 1 pW/m2")):
+        heard = [k for k, one in enumerate(found.names) if one.startswith(f"{name.lower()} ")]
+        if not heard:
+            continue
+        levels = found.total_weighted[heard] if name == "CPX" else found.total_intensity
+        mean = 10 * np.log10((10 ** (levels / 10)).mean())
+        # That of the vibration is the same at all microphones: it does not average out.
+        error = found.total_weighted_error[heard].mean()
+        _told(record, f"A-weighted {name} level", mean, error, unit)
     if found.probes:
-        mean = 10 * np.log10((10 ** (found.total_intensity / 10)).mean())
-        record.headline["A-weighted OBSI level"] = (
-            (float(mean), "dB(A) re 1 pW/m2") if np.isfinite(mean) else ("unknown", "-")
-        )
         index = found.intensity_index
         record.indicators["largest pressure-intensity index of a third octave"] = (
             float(index.max()) if index.size else math.nan,
@@ -636,6 +640,11 @@ def _describe(record: Record, found: SoundPressure) -> None:
             largest,
             "dB",
         )
-    record.headline["sound power level"] = (float(found.total_power[0]), "dB re 1 pW")
-    record.headline["A-weighted sound power level"] = (float(found.total_power[1]), "dB(A) re 1 pW")
+    for name, value, unit in zip(
+        ("sound power level", "A-weighted sound power level"),
+        found.total_power,
+        ("dB re 1 pW", "dB(A) re 1 pW"),
+        strict=True,
+    ):
+        _told(record, name, value, math.nan, unit)
     record.headline["band"] = (f"{found.frequency[0]:.3g} to {found.frequency[-1]:.4g} Hz", "-")

@@ -49,7 +49,9 @@ def sound(results: Results) -> Section:
     power = results.array(FILE, "total/power")
     section.facts.append(("road, to the sound", _road(results)))
     section.facts += _probes(results)
-    section.facts.append(("sound power", f"{power[0]:.1f} dB, {power[1]:.1f} dB(A) re 1 pW"))
+    section.facts.append(
+        ("sound power", f"{power[0]:.1f} dB, {power[1]:.1f} dB(A) re 1 pW, error unknown")
+    )
     centre = results.array(FILE, "third_octave/centre")
     for name, one in zip(names, results.array(FILE, "signal/pressure"), strict=True):
         rate = float(results.dataset(FILE, "signal/pressure").attrs["rate"])

@@ -19,6 +19,7 @@ from tireroad.contact.results.spectra import a_weighting
 from tireroad.greens.outputs import Surface
 from tireroad.greens.tire_sound import directions
 from tireroad.runs.pipeline import run_scene
+from tireroad.runs.report.levels import band_levels, is_drawn
 from tireroad.runs.report.page import write_report
 from tireroad.runs.results.export import export
 from tireroad.runs.scene.load import load
@@ -114,7 +115,7 @@ def test_what_is_not_estimated_is_unknown_everywhere(results: tireroad.RunResult
     assert (results["sound/third_octave/element_error"] > 0).all()
     stage = json.loads((results.directory / "summary.json").read_text())["stages"]["sound"]
     told = {name: entry["value"] for name, entry in stage["headline"].items() if "error" in name}
-    assert len(told) == 6 and set(told.values()) == {"unknown"}
+    assert len(told) == 9 and set(told.values()) == {"unknown"}
     page = write_report(results.directory).read_text()
     assert "error unknown" in page and not re.search(r"± 0\.0(?!\d)", page)
     assert "that of the vibration was not estimated" in page
@@ -215,6 +216,24 @@ def test_probes_hear_what_the_microphones_of_t_360_hear(results: tireroad.RunRes
     away = intensity(*far.pressure, far.frequency, 1.2041)[some]
     plane = np.abs(far.pressure[0, some]) ** 2 / (2 * 1.2041 * 343.23)
     assert 10 * np.log10(away / plane) == pytest.approx(0.0, abs=0.2)
+
+
+def test_probes_stand_under_one_name_everywhere(tmp_path: Path) -> None:
+    """File, headline, levels and pages of a run with probes: their intensity is charted, not its pressures."""
+    run_of = run(tmp_path / "run", 'sound.microphones=["obsi"]')
+    levels = {one.name: one for one in band_levels(run_of)}
+    name = "A-weighted sound intensity level at obsi leading"
+    assert levels[name].unit == "dB(A) re 1 pW/m2" and np.isnan(levels[name].error).all()
+    stored = run_of["sound/third_octave/intensity_level_a"][0]
+    np.testing.assert_array_equal(levels[name].level, stored)
+    drawn = [one for one in levels if is_drawn(one) and "obsi" in one]
+    assert drawn == [name, name.replace("leading", "trailing")]
+    stage = json.loads((run_of.directory / "summary.json").read_text())["stages"]["sound"]
+    told = stage["headline"]["A-weighted OBSI level"]
+    mean = 10 * np.log10((10 ** (run_of["sound/total/intensity_level_a"] / 10)).mean())
+    assert told["value"] == pytest.approx(mean) and told["unit"] == "dB(A) re 1 pW/m2"
+    page = write_report(run_of.directory).read_text()
+    assert "pressure-intensity index to" in page and "dB(A) re 1 pW/m²" in page
 
 
 def test_a_road_that_absorbs_is_heard(results: tireroad.RunResults) -> None:
