@@ -26,6 +26,8 @@ _HOMES = {
     "make_road": "tireroad.contact.roads.road",
     "radiate": "tireroad.greens.sound",
     "listen": "tireroad.runs.listen",
+    "pass_by": "tireroad.runs.pass_by",
+    "PorousLayer": "tireroad.greens.absorbing_road",
     "Material": "tireroad.fem.tire.material",
     "compound": "tireroad.fem.tire.material",
     "Turning": "tireroad.fem.wheel",

@@ -1,4 +1,4 @@
-"""Sound of a vibrating closed surface over a rigid road, by boundary elements and reciprocity.
+"""Sound of a vibrating closed surface over a road, by boundary elements and reciprocity.
 
 With e^{+iwt}, k = w/c and the image x' of x in the road z = 0,
 
@@ -21,6 +21,9 @@ first frequency at which the body's inside could resonate alpha = 0, which is mo
 it alpha = -i / max(k, 25 1/m). Elements that lie on the road are left out: body and image are closed
 without them.
 
+Over a road that absorbs the images have the correction of greens.absorbing_road beside them, whose
+singular part, that of 2 i k b e^{-ikr'} / (4 pi r') in dC/dz, is integrated in closed form too.
+
 Of smooth bodies the pressure is within some 0.5 dB where the longest edge is a tenth of the wave
 length, 1 dB at 1/6.5; beyond a third of it the elements are refused.
 """
@@ -36,6 +39,7 @@ from numpy.typing import NDArray
 from scipy import interpolate, linalg
 
 from tireroad.fem.errors import InputError
+from tireroad.greens.absorbing_road import AbsorbingPlane, Tabulated
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -63,15 +67,19 @@ def radiate(
     road: bool = True,
     speed_of_sound: float = 343.0,
     density: float = 1.2,
+    impedance: Complex | None = None,
 ) -> Complex:
     """Pressure (k, f) Pa at `microphones` (k, 3) m of a vibrating closed surface. Not collective.
 
-    `points` (n, 3) m, with the rigid `road` at z = 0; `quads` (m, 4) of them, outward, triangles with
+    `points` (n, 3) m, with the `road` at z = 0; `quads` (m, 4) of them, outward, triangles with
     a repeated node; `normal_velocity` (m, f) m/s of each element into the air at each `frequency`
     (f,) Hz. Complex amplitudes for e^{+iwt}. `speed_of_sound` m/s and `density` kg/m3 of the air.
-    InputError for a surface that is open, faces inwards or reaches under the road, for microphones
-    inside it, under the road or nearer to an element than its size, and for frequencies that are
-    not positive or whose waves are shorter than three edges.
+    `impedance` (f,): the road's surface impedance over that of air, rho c, at each frequency, with a
+    negative imaginary part where the road is a spring; it reacts locally. None, or infinite, is rigid.
+    With it, every frequency is solved by itself. InputError for a surface that is open, faces
+    inwards or reaches under the road, for microphones inside it, under the road or nearer to an
+    element than its size, for frequencies that are not positive or whose waves are shorter than three
+    edges, and for an impedance that is 0 or has a negative real part.
     """
     body = SoundBody.of(points, quads, road)
     velocity = np.atleast_2d(np.asarray(normal_velocity, complex))
@@ -86,9 +94,32 @@ def radiate(
         raise InputError("radiate: velocities must be finite, speed_of_sound and density positive")
     body.check_frequencies(hertz, speed_of_sound)
     body.check_microphones(listeners)
-    g = transfer(body, hertz, listeners, speed_of_sound)
+    if impedance is None:
+        g = transfer(body, hertz, listeners, speed_of_sound)
+    else:
+        waves = 2 * np.pi * hertz / speed_of_sound
+        admittance = _admittance(impedance, len(hertz), road)
+        g = np.stack([body.solve(k, listeners, b) for k, b in zip(waves, admittance, strict=True)])
     moved = velocity[body.kept] * body.area[:, None]
     return 2j * np.pi * hertz * density * np.einsum("fjk,jf->kf", g, moved)
+
+
+def _admittance(impedance: Complex, count: int, road: bool) -> Complex:
+    """Admittances (f,) of the road over that of air; InputError for what no road has."""
+    given = np.atleast_1d(np.asarray(impedance, complex))
+    if not road:
+        raise InputError("radiate: impedance is that of the road: road = False has none")
+    if given.shape != (count,):
+        raise InputError(
+            f"radiate: impedance has shape {given.shape}; {count} frequencies require {(count,)}"
+        )
+    if np.isnan(given).any() or (given == 0).any() or (given.real < 0).any():
+        raise InputError(
+            "radiate: impedance must be a number other than 0 whose real part is not negative (e^{+iwt}; a soft "
+            "road has a small one)"
+        )
+    rigid = np.isinf(given)
+    return np.where(rigid, 0.0, 1 / np.where(rigid, 1.0, given))
 
 
 def transfer(
@@ -395,8 +426,71 @@ class SoundBody:
             found.append((double.sum(axis=0), second.sum(axis=0) + more))
         return found
 
-    def solve(self, k: float, microphones: Array) -> Complex:
-        """g (e, m) 1/m at the wave number `k` (1/m) for the microphones (m, 3) m."""
+    def _absorbed(self, table: Tabulated, hyper: bool) -> Iterator[tuple[slice, Single, Single]]:
+        """Blocks of rows of what C adds to D and, if wanted, H, of pairs whose images are not near."""
+        place, weight = self.points_and_weights(2)
+        e, q = place.shape[:2]
+        about = self.center.mean(axis=0) * [1, 1, 0]
+        y = np.swapaxes(place * MIRROR - about, 0, 1).reshape(-1, 3).astype(np.float32)
+        w = np.swapaxes(weight, 0, 1).reshape(-1, 3).astype(np.float32)
+        i, j = self._near[0][1], self._near[1][1]
+        size = max(BLOCK // (e * q), 1)
+        for first in range(0, e, size):
+            rows = slice(first, min(first + size, e))
+            x = (self.center[rows] - about).astype(np.float32)
+            n = self.normal[rows].astype(np.float32)
+            square = x @ (-2 * y.T)
+            square += (x * x).sum(axis=1)[:, None]
+            square += (y * y).sum(axis=1)
+            heights = x[:, 2:] - y[:, 2]
+            apart = np.sqrt(np.maximum(square, heights**2))
+            ahead = (y[:, :2] * w[:, :2]).sum(axis=1) - x[:, :2] @ w[:, :2].T
+            normal = None
+            if hyper:
+                along = n[:, :2] @ y[:, :2].T - (n[:, :2] * x[:, :2]).sum(axis=1)[:, None]
+                normal = along, n[:, 2:], n[:, :2] @ w[:, :2].T
+            found = table.at(apart, heights)
+            parts = table.plane.kernels(found, (apart, heights), (ahead, w[:, 2]), normal)
+            own = (i >= rows.start) & (i < rows.stop)
+            out = []
+            for part in parts if hyper else parts[:1]:
+                total = part.reshape(len(x), q, e).sum(axis=1)
+                total[i[own] - rows.start, j[own]] = 0
+                out.append(total)
+            yield rows, out[0], out[-1]
+
+    def _absorbed_near(self, table: Tabulated, hyper: bool) -> tuple[Complex, Complex]:
+        """Parts of D and, if wanted, H, that C adds at the pairs (p,) whose images are near."""
+        place, weight = self.points_and_weights(4)
+        i, j = self._near[0][1], self._near[1][1]
+        x, n = self.center[i], self.normal[i]
+        y, w = np.moveaxis(place[j], 1, 0), np.moveaxis(weight[j], 1, 0)
+        d, heights = (y - x)[..., :2], (y + x)[..., 2]
+        apart, up = np.hypot(np.linalg.norm(d, axis=2), heights), w[..., 2]
+        ahead = (d * w[..., :2]).sum(axis=2)
+        normal = None
+        if hyper:
+            normal = (d * n[:, :2]).sum(axis=2), n[:, 2], (w[..., :2] * n[:, :2]).sum(axis=2)
+        found = table.at(apart.astype(np.float32), heights.astype(np.float32))
+        values = found[0].astype(complex), found[1].astype(complex)
+        parts = table.plane.kernels(values, (apart, heights), (ahead, up), normal)
+        # What is singular in them, and its integral in closed form.
+        turn = 2j * table.plane.k * table.plane.admittance
+        closed, rise = self._closed[1], self.normal[j, 2]
+        single = np.linalg.norm(w, axis=2) * rise / (4 * np.pi * apart)
+        double = (parts[0] - turn * single).sum(axis=0) + turn * rise * closed[2]
+        if not hyper:
+            return double, np.zeros(1, complex)
+        static = -(up * heights + ahead) / (4 * np.pi * apart**3) * n[:, 2]
+        second = (parts[1] - turn * static).sum(axis=0) + turn * n[:, 2] * closed[0]
+        return double, second
+
+    def solve(self, k: float, microphones: Array, admittance: complex = 0.0) -> Complex:
+        """g (e, m) 1/m at the wave number `k` (1/m) for the microphones (m, 3) m.
+
+        `admittance` of the road: rho c over its impedance, e^{+iwt}; 0 of a rigid one.
+        """
+        plane = AbsorbingPlane(k, complex(admittance)) if k and admittance else None
         alpha = 0.0 if k < 2 * np.pi * SAFE * self.resonance() else -1j / max(k, COUPLING)
         e = len(self.area)
         matrix = np.zeros((e, e), np.complex64)
@@ -407,6 +501,14 @@ class SoundBody:
         ):
             part = -(closed[0] + more[0]) - alpha * (closed[1] + more[1])
             np.add.at(matrix, (i, j), part.astype(np.complex64))
+        if plane:
+            farthest = float(np.linalg.norm(np.ptp(self.corners, axis=(0, 1))[:2]))
+            table = plane.tabulated(float(np.hypot(farthest, 2 * self.corners[..., 2].max())))
+            for rows, double, hyper in self._absorbed(table, alpha != 0):
+                matrix[rows] -= double + np.complex64(alpha) * hyper
+            near = self._absorbed_near(table, alpha != 0)
+            part = -near[0] - alpha * near[1]
+            np.add.at(matrix, (self._near[0][1], self._near[1][1]), part.astype(np.complex64))
         own = np.arange(e)
         matrix[own, own] += (0.5 - self.defect + alpha * self._static[1]).astype(np.complex64)
         right = np.zeros((e, len(microphones)), complex)
@@ -416,6 +518,10 @@ class SoundBody:
             wave = np.exp(-1j * k * r) / (4 * np.pi * r)
             slope = (d * self.normal[:, None]).sum(axis=2) / r * (1j * k + 1 / r) * wave
             right += wave + alpha * slope
+        if plane:
+            for m, place in enumerate(microphones):
+                c, rise = plane.source(self.center, place)
+                right[:, m] += c + alpha * (rise * self.normal).sum(axis=1)
         factor = linalg.lu_factor(matrix, overwrite_a=True, check_finite=False)
         return linalg.lu_solve(factor, right.astype(np.complex64), check_finite=False)
 

@@ -24,6 +24,7 @@ from scipy import interpolate, sparse
 from tireroad.fem.errors import InputError
 from tireroad.fem.static.state import StaticState
 from tireroad.fem.tire.mesh import ring_quads
+from tireroad.greens.absorbing_road import AbsorbingPlane, PorousLayer
 from tireroad.greens.outputs import Surface
 from tireroad.greens.sound import APART, MIRROR, ON_ROAD, SoundBody
 
@@ -213,8 +214,11 @@ class SoundingTire:
             found.append(point)
         return np.array(found)
 
-    def flux_of(self, source: Array, k: float) -> Complex:
-        """F (e,): sum_e F_e g_e is minus the integral of g dG/dn of a point source (3,) m inside."""
+    def flux_of(self, source: Array, k: float, admittance: complex = 0.0) -> Complex:
+        """F (e,): sum_e F_e g_e is minus the integral of g dG/dn of a point source (3,) m inside.
+
+        `admittance` of the road, as in `SoundBody.solve`.
+        """
         place, weight = self.body.points_and_weights(4)
         rate = np.zeros(place.shape[:2], complex)
         for mirror in (np.ones(3), MIRROR):
@@ -226,6 +230,9 @@ class SoundingTire:
                 * np.exp(-1j * k * r)
                 / (4 * np.pi * r**2)
             )
+        if k and admittance:
+            _, rise = AbsorbingPlane(k, admittance).source(place.reshape(-1, 3), source)
+            rate += (rise.reshape(place.shape) * weight).sum(axis=2)
         tangent, slopes = self.slopes
         ahead = np.einsum("eqc,etc->eqt", place - self.body.center[:, None], tangent)
         out = rate.sum(axis=1)
@@ -443,18 +450,34 @@ def solved_frequencies(up_to: float) -> Array:
     return APART * np.arange(np.ceil(up_to / APART) + 1.0)
 
 
+def admittances(road: PorousLayer | None, frequency: Array, air: SoundAir) -> Complex:
+    """Admittances (f,) of a road over that of the air at frequencies (f,) Hz: 0 of a rigid one (None), and at 0 Hz."""
+    found = np.zeros(len(frequency), complex)
+    if road is not None:
+        some = frequency > 0
+        found[some] = 1 / road.impedance(frequency[some], air.speed, air.density)
+    return found
+
+
 def transfer(
-    tire: SoundingTire, microphones: Array, frequency: Array, air: SoundAir, comm: MPI.Comm
+    tire: SoundingTire,
+    microphones: Array,
+    frequency: Array,
+    air: SoundAir,
+    comm: MPI.Comm,
+    road: PorousLayer | None = None,
 ) -> NDArray[np.complex64]:
     """g e^{ikR} (f, k, e) 1/m, single precision, at the solved frequencies, on every process. Collective.
 
-    R from the road under the axle to each microphone (k, 3) m. The frequencies are dealt out to the processes.
+    R from the road under the axle to each microphone (k, 3) m. `road`: a layer that absorbs; None is
+    rigid. The frequencies are dealt out to the processes.
     """
-    apart = np.linalg.norm(microphones, axis=1)
+    apart, admittance = np.linalg.norm(microphones, axis=1), admittances(road, frequency, air)
     own = {}
     for n in range(comm.rank, len(frequency), comm.size):
         k = 2 * np.pi * frequency[n] / air.speed
-        own[n] = (tire.body.solve(k, microphones) * np.exp(1j * k * apart)).T.astype(np.complex64)
+        g = tire.body.solve(k, microphones, admittance[n])
+        own[n] = (g * np.exp(1j * k * apart)).T.astype(np.complex64)
     every = {n: g for part in comm.allgather(own) for n, g in part.items()}
     return np.stack([every[n] for n in range(len(frequency))])
 
@@ -486,17 +509,26 @@ class Transfer:
         return -(wave**2) * self.air.density * delay * out
 
 
-def source_errors(tire: SoundingTire, given: Transfer, microphones: Array) -> Array:
+def source_errors(
+    tire: SoundingTire, given: Transfer, microphones: Array, road: PorousLayer | None = None
+) -> Array:
     """Errors (n, k, f) dB of the fields of n sources inside, at the frequencies solved but 0 Hz."""
     sources, frequency = tire.inner_sources(), given.frequency[1:]
+    admittance = admittances(road, frequency, given.air)
     out = np.zeros((len(sources), len(microphones), len(frequency)))
     for a, source in enumerate(sources):
         for b, f in enumerate(frequency):
             k = 2 * np.pi * f / given.air.speed
-            found = given.ahead[b + 1] @ tire.flux_of(source, k) * np.exp(-1j * k * given.distance)
+            found = (
+                given.ahead[b + 1]
+                @ tire.flux_of(source, k, admittance[b])
+                * np.exp(-1j * k * given.distance)
+            )
             exact = np.zeros(len(microphones), complex)
             for mirror in (np.ones(3), MIRROR):
                 r = np.linalg.norm(microphones - source * mirror, axis=1)
                 exact += np.exp(-1j * k * r) / (4 * np.pi * r)
+            if admittance[b]:
+                exact += AbsorbingPlane(k, admittance[b]).source(microphones, source)[0]
             out[a, :, b] = 20 * np.log10(np.abs(found / exact))
     return out

@@ -11,6 +11,7 @@ from typing import Any
 from mpi4py import MPI
 
 from tireroad.fem.errors import InputError
+from tireroad.greens.absorbing_road import PorousLayer
 from tireroad.runs.pipeline import PARTS
 from tireroad.runs.results.reader import RunResults
 from tireroad.runs.scene.load import load
@@ -27,12 +28,27 @@ def listen(
     *,
     temperature: float = 293.15,
     up_to: float | None = None,
+    road: PorousLayer | Mapping[str, float] | None = None,
 ) -> SoundPressure:
     """Sound pressure of a finished run at other microphones: its folder, or tireroad.load of it. Not collective.
 
     `microphones`: as sound.microphones in a scene, names or places (x, y, z) in m; `temperature` K of the
-    air; `up_to` Hz. Nothing is written. Raises InputError for a folder without the results of a
+    air; `up_to` Hz; `road`: as sound.road, a porous layer or its keys, None rigid. Nothing is written. Raises InputError for a folder without the results of a
     rolling contact, for places inside the tire or under the road, and values out of range.
+    """
+    return finished(run, microphones, temperature, up_to, road)[1]["sound"].product
+
+
+def finished(
+    run: str | Path | Mapping[str, Any],
+    microphones: Any,
+    temperature: float,
+    up_to: float | None,
+    road: PorousLayer | Mapping[str, float] | None,
+) -> tuple[Job, dict[str, Result]]:
+    """The job of a finished run with a table [sound] of its own, and its results, "sound" among them.
+
+    Arguments and errors are those of `listen`. Not collective.
     """
     results = run if isinstance(run, RunResults) else RunResults(run)  # type: ignore[arg-type]
     scene = load(results.directory / "scene.toml")
@@ -42,7 +58,8 @@ def listen(
             item.name: _read(item, given[item.name])
             for item in fields(SoundTable)
             if item.name in given
-        }
+        },
+        road=_layer(road),
     )
     job = Job(replace(scene, sound=table), results.directory, MPI.COMM_SELF)
     done: dict[str, Result] = {}
@@ -62,7 +79,17 @@ def listen(
             f"{results.directory}: listen needs the results of a tire that rolls or is driven over time: run "
             "the scene with [time] and [contact] to its end"
         )
-    return done["sound"].product
+    return job, done
+
+
+def _layer(road: PorousLayer | Mapping[str, float] | None) -> PorousLayer | None:
+    if road is None or isinstance(road, PorousLayer):
+        return road
+    try:
+        return PorousLayer(**road)
+    except TypeError:
+        names = ", ".join(item.name for item in fields(PorousLayer))
+        raise InputError(f"listen: road has the keys {names}, not {', '.join(road)}") from None
 
 
 def _read(item: Any, value: Any) -> Any:

@@ -14,6 +14,7 @@ from tireroad.runs.results.reader import RunResults
 Array = NDArray[np.float64]
 AXES = ("x", "y", "z")
 SOUND = "A-weighted sound pressure level at "  # a microphone
+INTENSITY = "A-weighted sound intensity level at "  # an intensity probe
 POWER = "sound power level"
 # Of spectra.h5, by component: quantity, dataset, unit.
 _FORCES = (
@@ -37,16 +38,18 @@ class BandLevels:
 
 
 def is_drawn(name: str) -> bool:
-    """Whether the pages chart the third octaves of a quantity: vertical forces, and sound."""
-    return name in ("axle force z", "contact force z", POWER) or name.startswith(SOUND)
+    """Whether the pages chart the third octaves of a quantity: vertical forces, and sound, of probes their intensity."""
+    if name.startswith(SOUND):
+        return not name.endswith((" inner", " outer"))
+    return name in ("axle force z", "contact force z", POWER) or name.startswith(INTENSITY)
 
 
 def rank(name: str) -> tuple[int, str]:
-    """Sorts quantities as `band_levels` yields them: forces, moments, sound at microphones, its power."""
+    """Sorts quantities as `band_levels` yields them: forces, moments, sound at microphones, intensity at probes, power."""
     for place, (quantity, *_) in enumerate(_FORCES):
         if name.startswith(f"{quantity} "):
             return place, name
-    return len(_FORCES) + (name == POWER), name
+    return len(_FORCES) + name.startswith(INTENSITY) + 2 * (name == POWER), name
 
 
 def band_levels(run: RunResults) -> Iterator[BandLevels]:
@@ -65,6 +68,11 @@ def band_levels(run: RunResults) -> Iterator[BandLevels]:
         error = _error(run, "sound/third_octave/level_error", level)
         for k, name in enumerate(run.attributes("sound")["microphone_names"]):
             yield _heard(f"{SOUND}{name}", "dB(A) re 20 uPa", band, level[k], error[k])
+        if "sound/third_octave/intensity_level_a" in run:
+            probes = run.attributes("sound")["probe_names"]
+            for name, one in zip(probes, run["sound/third_octave/intensity_level_a"], strict=True):
+                unknown = np.full_like(one, np.nan)
+                yield _heard(f"{INTENSITY}{name}", "dB(A) re 1 pW/m2", band, one, unknown)
         power = run["sound/power"]
         yield _heard(POWER, "dB re 1 pW", band, power, np.full_like(power, np.nan))
 

@@ -48,7 +48,7 @@ def bounded(value: float, error: float | None, unit: str) -> str:
 
 def shown_unit(unit: str) -> str:
     """A unit of a file as pages write it."""
-    return SYMBOLS.get(unit, unit).replace("uPa", "µPa")
+    return SYMBOLS.get(unit, unit).replace("uPa", "µPa").replace("/m2", "/m²")
 
 
 def about(error: float) -> str:

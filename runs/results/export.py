@@ -30,7 +30,7 @@ from tireroad.fem.errors import InputError
 from tireroad.runs.files.disk import replacing
 from tireroad.runs.files.folder import left_out
 from tireroad.runs.files.store import opened
-from tireroad.runs.results.wave import wave_file
+from tireroad.runs.results.wave import LISTEN, joined, wave_file
 from tireroad.runs.version import PROGRAM
 
 FRF = 4  # function type: frequency response
@@ -586,7 +586,10 @@ def vibration(file: h5py.File) -> dict[str, Callable[[Path], object]]:
 
 
 def sound(file: h5py.File) -> dict[str, Callable[[Path], object]]:
-    """sound.csv: third octaves at the microphones; a WAV file each, whose name says its full scale."""
+    """sound.csv: third octaves at the microphones; a WAV file each, whose name says its full scale.
+
+    A record shorter than `LISTEN` is joined to itself in overlap.
+    """
     centre, names = file["third_octave/centre"][()], file.attrs["microphone_names"]
     columns = {"band [Hz]": nominal(centre), "exact centre of the band [Hz]": centre}
     for key, unit in (
@@ -605,7 +608,8 @@ def sound(file: h5py.File) -> dict[str, Callable[[Path], object]]:
     files = _table("sound.csv", columns)
     held = file["signal/pressure"]
     for number, (name, signal) in enumerate(zip(names, held[()], strict=True)):
-        data, full = wave_file(signal, float(held.attrs["rate"]))
+        rate = float(held.attrs["rate"])
+        data, full = wave_file(joined(signal, max(round(LISTEN * rate), len(signal))), rate)
         plain = "".join(c if c.isalnum() or c in "-." else "_" for c in str(name))
         files[f"sound_{number}_{plain}_{full:g}_Pa.wav"] = partial(Path.write_bytes, data=data)
     return files

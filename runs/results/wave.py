@@ -8,7 +8,24 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.io import wavfile
 
+FADE = 0.05  # of a record at each end
+LISTEN = 3.0  # s: shorter records are joined to themselves
 _FULL = 32767  # of 16 bits
+
+
+def joined(signal: NDArray, count: int, start: int = 0) -> NDArray:
+    """A signal (..., n) whose ends fade over `FADE` of it, joined to itself in overlap to `count` samples.
+
+    From sample `start` on. The fades of one end and the other add up to 1, so that levels stay: two that
+    have nothing in common lose 0.05 dB.
+    """
+    length = signal.shape[-1]
+    step = max(length - round(FADE * length), 1)
+    whole = np.zeros((*signal.shape[:-1], count))
+    for first in range(-(start % step) - step, count, step):
+        some = slice(max(first, 0), max(min(first + length, count), 0))
+        whole[..., some] += signal[..., some.start - first :][..., : some.stop - some.start]
+    return whole
 
 
 def wave_file(signal: NDArray, rate: float) -> tuple[bytes, float]:

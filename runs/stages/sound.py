@@ -41,6 +41,8 @@ WORST = 1.0  # dB: larger errors of the sources inside are warned of
 
 REGIONS = ("tread ahead", "tread behind", "tread above", "left sidewall", "right sidewall", "wheel")
 SIDE = 0.7  # |n_y| of a sidewall
+SPACING = 0.016  # m: between the microphones of an intensity probe
+INTENSITY = 1e-12  # W/m2: reference of its levels
 PASS_BY = 7.5  # m: distance of the directivity
 KNOWN = 0.9  # least part of a total that lies in bands of known error
 
@@ -49,7 +51,8 @@ def microphones(given: tuple, state: StaticState) -> tuple[list[str], np.ndarray
     """Names and places (k, 3) m of a scene's microphones beside the tire in its static state.
 
     cpx: ISO 11819-2, 0.2 m beside the undeformed sidewall, 0.1 m high, 0.2 m ahead and behind.
-    obsi: AASHTO T 360, pairs 16 mm apart around 0.1 m beside it, 76 mm high, at the contact's ends.
+    obsi: AASHTO T 360, intensity probes of two microphones 16 mm apart, the outer one second, around 0.1 m
+    beside it, 76 mm high, at the contact's ends.
     pass-by: 7.5 m to the left, 1.2 m high.
     """
     side = float(np.abs(state.points[:, 1]).max())
@@ -58,7 +61,7 @@ def microphones(given: tuple, state: StaticState) -> tuple[list[str], np.ndarray
         "cpx": {"cpx front": (0.2, side + 0.2, 0.1), "cpx rear": (-0.2, side + 0.2, 0.1)},
         "pass-by": {"pass-by": (0.0, 7.5, 1.2)},
         "obsi": {
-            f"obsi {end} {place}": (x, side + 0.1 + 0.008 * sign, 0.076)
+            f"obsi {end} {place}": (x, side + 0.1 + SPACING / 2 * sign, 0.076)
             for end, x in (("leading", half), ("trailing", -half))
             for place, sign in (("inner", -1), ("outer", 1))
         },
@@ -69,6 +72,28 @@ def microphones(given: tuple, state: StaticState) -> tuple[list[str], np.ndarray
             known[one] if isinstance(one, str) else {f"{one[0]:g}, {one[1]:g}, {one[2]:g} m": one}
         )
     return list(found), np.array(list(found.values()))
+
+
+def probes(names: list[str]) -> dict[str, tuple[int, int]]:
+    """Intensity probes among microphones of these `names`: the numbers of the inner and the outer one of each."""
+    pairs = [(name.removesuffix(" inner"), name) for name in names if name.endswith(" inner")]
+    return {
+        probe: (names.index(inner), names.index(f"{probe} outer"))
+        for probe, inner in pairs
+        if f"{probe} outer" in names
+    }
+
+
+def intensity(
+    inner: np.ndarray, outer: np.ndarray, frequency: np.ndarray, density: float
+) -> np.ndarray:
+    """Active intensity W/m2 from the inner microphone of a probe to the outer one, of pressures (..., f) Pa.
+
+    I = -Im(p1* p2) / (2 w rho d) of complex amplitudes for e^{+iwt} at f frequencies (Hz), `SPACING` d apart,
+    in air of a `density` in kg/m3; a plane wave is seen by a factor of sin(kd) / kd (Fahy, Sound intensity).
+    """
+    across = (inner.conj() * outer).imag
+    return np.asarray(-across / (4 * np.pi * frequency * density * SPACING))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,14 +143,14 @@ class RadiationStage(Computed[Paths]):
         every = np.vstack([places, FAR * directions()[0]])
         apart = np.linalg.norm(every, axis=1)
         with record.timing("solve"):
-            found = transfer(tire, every, frequency, air, comm)
+            found = transfer(tire, every, frequency, air, comm, table.road)
         with record.timing("larger elements"):
-            coarse = transfer(rough, places, frequency, air, comm)
+            coarse = transfer(rough, places, frequency, air, comm, table.road)
         k = len(places)
         kept: dict[str, Any] = {"frequency": frequency, "air": air}
         near = Transfer(ahead=found[:, :k], distance=apart[:k], **kept)
         with record.timing("sources inside"):
-            error = np.abs(source_errors(tire, near, places)).max(axis=0)
+            error = np.abs(source_errors(tire, near, places, table.road)).max(axis=0)
         record.headline |= {
             "elements": (len(tire.body.area), "-"),
             "frequencies": (len(frequency), "-"),
@@ -199,7 +224,10 @@ class SoundPressure:
     `power` (b,) dB re 1 pW and the `efficiency` (b,) of radiation; `total`, `total_weighted` (k,) and
     `total_power`, its A-weighted value second, (2,): of all lines; `total_error`,
     `total_weighted_error` (k,) dB, NaN where bands of unknown error hold more than a tenth of it;
-    `directivity` (b, elevations, azimuths) dB re 20 uPa at 7.5 m; `signal` (k, n) Pa at `rate` Hz;
+    `probes`: names of the i intensity probes among the microphones; `intensity` (i, f) W/m2 outward, from a Hann
+    window; its A-weighted third octaves `intensity_level` (i, b) dB re 1 pW/m2, NaN of inward ones, and the
+    pressure-intensity index `intensity_index` (i, b) dB, pressure level less that of the intensity's magnitude;
+    `total_intensity` (i,): the A-weighted level of all lines; `directivity` (b, elevations, azimuths) dB re 20 uPa at 7.5 m; `signal` (k, n) Pa at `rate` Hz;
     `solved` (g,) Hz and `weight` (g, k, s) Pa s/m3: pressure per volume velocity at each node of
     the outer face; `share` (k, b, r): of the pressure's square, from each of `REGIONS`; `shares`
     (k, b, e): from each element, with `outline` (e, 4, 2) deg and -: angle around the axle from the
@@ -222,6 +250,11 @@ class SoundPressure:
     total_error: np.ndarray = dataset("dB", "total/level_error")
     total_weighted_error: np.ndarray = dataset("dB", "total/level_a_error")
     total_power: np.ndarray = dataset("dB re 1 pW", "total/power")
+    probes: list[str]
+    intensity: np.ndarray = dataset("W/m2")
+    intensity_level: np.ndarray = dataset("dB(A) re 1 pW/m2", "third_octave/intensity_level_a")
+    intensity_index: np.ndarray = dataset("dB")
+    total_intensity: np.ndarray = dataset("dB(A) re 1 pW/m2", "total/intensity_level_a")
     directivity: np.ndarray = dataset("dB re 20 uPa at 7.5 m", "directivity/level")
     signal: np.ndarray = dataset("Pa", "signal/pressure")
     rate: float
@@ -297,6 +330,7 @@ class SoundStage(WholeTire[SoundPressure]):
         """All fields of the product."""
         write_fields(file, product)
         file["microphones"].attrs["names"] = file.attrs["microphone_names"] = product.names
+        file["intensity"].attrs["names"] = file.attrs["probe_names"] = product.probes
         file["contribution/region"].attrs["names"] = REGIONS
         file["signal/pressure"].attrs["rate"] = product.rate
         elevation, azimuth = angles()
@@ -307,9 +341,8 @@ class SoundStage(WholeTire[SoundPressure]):
         """The same, read back."""
         fields = read_fields(file, SoundPressure)
         names = [str(name) for name in file["microphones"].attrs["names"]]
-        return SoundPressure(
-            names=names, rate=float(file["signal/pressure"].attrs["rate"]), **fields
-        )
+        rate = float(file["signal/pressure"].attrs["rate"])
+        return SoundPressure(names=names, probes=list(probes(names)), rate=rate, **fields)
 
 
 def angles() -> tuple[np.ndarray, np.ndarray]:
@@ -429,6 +462,7 @@ def _sound(
         "total_power": decibels(
             np.array([heard.power.sum(), (heard.power * ears).sum()]) / HANN, POWER
         ),
+        **_intensities(heard, ears),
         "directivity": near.reshape(len(centre), len(elevation), len(azimuth)),
         "signal": _signal(paths, volume, frequency, duration, rate).astype("f4"),
         "rate": rate,
@@ -437,6 +471,35 @@ def _sound(
         "share": share,
         "shares": shares.astype("f4"),
         "outline": heard.tire.outline,
+    }
+
+
+def _intensities(heard: Heard, ears: np.ndarray) -> dict[str, Any]:
+    """The fields of the intensity; `ears` (f,): the A-weighting as a factor of powers."""
+    found = probes(heard.paths.names)
+    if not found:
+        bands = np.zeros((0, len(heard.bands(np.zeros(len(heard.frequency)))[0])))
+        lines = np.zeros((0, len(heard.frequency)))
+        rest = {"intensity_index": bands, "total_intensity": np.zeros(0)}
+        return {"probes": [], "intensity": lines, "intensity_level": bands, **rest}
+    inner, outer = (heard.pressure[[pair[k] for pair in found.values()]] for k in (0, 1))
+    lines = intensity(inner, outer, heard.frequency, heard.paths.near.air.density)
+    middle = np.abs((inner + outer) / 2) ** 2 / 2
+    _, flux = heard.bands(lines.T)
+    _, weighted = heard.bands((lines * ears).T)
+    _, square = heard.bands(middle.T)
+    with np.errstate(divide="ignore"):
+        index = 10 * np.log10(square / PRESSURE**2) - 10 * np.log10(np.abs(flux) / INTENSITY)
+        levels = [
+            10 * np.log10(np.where(part > 0, part, np.nan) / INTENSITY)
+            for part in (weighted, (lines * ears).sum(axis=1) / HANN)
+        ]
+    return {
+        "probes": list(found),
+        "intensity": lines,
+        "intensity_level": levels[0].T,
+        "intensity_index": index.T,
+        "total_intensity": levels[1],
     }
 
 
@@ -536,6 +599,13 @@ def _regions(tire: SoundingTire) -> np.ndarray:
     return found
 
 
+def _told(record: Record, name: str, value: float, error: float, unit: str) -> None:
+    """A level and its error in the headline; what is NaN says "unknown"."""
+    for what, number, of in ((name, value, unit), (f"error of the {name}", error, "dB")):
+        known = np.isfinite(number)
+        record.headline[what] = (float(number), of) if known else ("unknown", "-")
+
+
 def _describe(record: Record, found: SoundPressure) -> None:
     """Levels at the microphones with their errors, the CPX level, and the sound power."""
     for k, name in enumerate(found.names):
@@ -548,21 +618,33 @@ def _describe(record: Record, found: SoundPressure) -> None:
                 "dB(A)",
             ),
         ):
-            record.headline[f"{kind} at {name}"] = (float(total[k]), f"{unit} re 20 uPa")
-            known = np.isfinite(error[k])
-            record.headline[f"error of the {kind} at {name}"] = (
-                (float(error[k]), "dB") if known else ("unknown", "-")
-            )
-    if {"cpx front", "cpx rear"} <= set(found.names):
-        both = [found.names.index(name) for name in ("cpx front", "cpx rear")]
-        mean = 10 * np.log10((10 ** (found.total_weighted[both] / 10)).mean())
-        record.headline["A-weighted CPX level"] = (float(mean), "dB(A) re 20 uPa")
+            _told(record, f"{kind} at {name}", total[k], error[k], f"{unit} re 20 uPa")
+    for name, unit in (("CPX", "dB(A) re 20 uPa"), ("OBSI", "dB(A) re 1 pW/m2")):
+        heard = [k for k, one in enumerate(found.names) if one.startswith(f"{name.lower()} ")]
+        if not heard:
+            continue
+        levels = found.total_weighted[heard] if name == "CPX" else found.total_intensity
+        mean = 10 * np.log10((10 ** (levels / 10)).mean())
+        # That of the vibration is the same at all microphones: it does not average out.
+        error = found.total_weighted_error[heard].mean()
+        _told(record, f"A-weighted {name} level", mean, error, unit)
+    if found.probes:
+        index = found.intensity_index
+        record.indicators["largest pressure-intensity index of a third octave"] = (
+            float(index.max()) if index.size else math.nan,
+            "dB",
+        )
     if found.of_elements.size:
         largest = float(found.of_elements.max())
         record.indicators["largest error of a third octave by the boundary elements"] = (
             largest,
             "dB",
         )
-    record.headline["sound power level"] = (float(found.total_power[0]), "dB re 1 pW")
-    record.headline["A-weighted sound power level"] = (float(found.total_power[1]), "dB(A) re 1 pW")
+    for name, value, unit in zip(
+        ("sound power level", "A-weighted sound power level"),
+        found.total_power,
+        ("dB re 1 pW", "dB(A) re 1 pW"),
+        strict=True,
+    ):
+        _told(record, name, value, math.nan, unit)
     record.headline["band"] = (f"{found.frequency[0]:.3g} to {found.frequency[-1]:.4g} Hz", "-")

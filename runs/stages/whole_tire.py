@@ -21,6 +21,7 @@ from tireroad.greens.responses import Wanted, band
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import opened
 from tireroad.runs.process.mpi import on_root
+from tireroad.runs.results.wave import FADE
 from tireroad.runs.stages.contact_file import ContactHistory
 from tireroad.runs.stages.rolling import histories, of_given_forces, recursive
 from tireroad.runs.stages.setup import components, probes
@@ -29,7 +30,6 @@ from tireroad.runs.stages.stage import Computed, Job, PipelinePart, Result, Shar
 
 _ROWS = 1024  # steps read at a time
 _AT_ONCE = 64  # coordinates transformed at a time, to save memory
-FADE = 0.05  # of a record at each end, where its motion over time fades in and out
 P = TypeVar("P")
 
 

@@ -50,6 +50,7 @@ SHOWN = (
     "static: load",
     "contact: mean load",
     "sound: A-weighted CPX level",
+    "sound: A-weighted OBSI level",
     "sound: A-weighted sound power level",
     "rotating: lowest frequency",
     "modes: lowest mode",

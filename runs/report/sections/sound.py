@@ -22,14 +22,14 @@ from tireroad.runs.report.figures import (
     styled,
     third_octaves,
 )
-from tireroad.runs.report.read import Results, Section, TextTable, about, digits
-from tireroad.runs.results.wave import wave_file
+from tireroad.runs.report.read import Results, Section, TextTable, about, digits, quantity
+from tireroad.runs.results.wave import LISTEN, joined, wave_file
 
 FILE = "sound.h5"
 _CHARTED = 4  # microphones in one chart of bars
 _LIMITS = (
-    "Sound of the tire's vibrations alone: no air pumping, no resonances of grooves, a rigid road, no car; the "
-    "contact's own local flexibility is left out. A rolling tire heard outdoors has those on top, most above 800 Hz."
+    "Sound of the tire's vibrations alone: no air pumping, no resonances of grooves, no car; the contact's own local "
+    "flexibility is left out. A rolling tire heard outdoors has those on top, most above 800 Hz."
 )
 
 
@@ -47,10 +47,15 @@ def sound(results: Results) -> Section:
     head = (f"sound pressure level, {band}", "dB re 20 µPa", "error, dB", "dB(A) re 20 µPa")
     section.table = TextTable((*head, "error, dB"), list(zip(*columns, strict=True)))
     power = results.array(FILE, "total/power")
-    section.facts.append(("sound power", f"{power[0]:.1f} dB, {power[1]:.1f} dB(A) re 1 pW"))
+    section.facts.append(("road, to the sound", _road(results)))
+    section.facts += _probes(results)
+    section.facts.append(
+        ("sound power", f"{power[0]:.1f} dB, {power[1]:.1f} dB(A) re 1 pW, error unknown")
+    )
     centre = results.array(FILE, "third_octave/centre")
     for name, one in zip(names, results.array(FILE, "signal/pressure"), strict=True):
-        data, full = wave_file(one, float(results.dataset(FILE, "signal/pressure").attrs["rate"]))
+        rate = float(results.dataset(FILE, "signal/pressure").attrs["rate"])
+        data, full = wave_file(joined(one, max(round(LISTEN * rate), len(one))), rate)
         uri = f"data:audio/wav;base64,{b64encode(data).decode()}"
         section.sounds.append((f"{name}: full scale is {full:g} Pa", uri))
     if len(centre) < FEWEST_BANDS:
@@ -66,6 +71,34 @@ def sound(results: Results) -> Section:
     )
     _parts(results, section, names, centre, loudest)
     return section
+
+
+def _road(results: Results) -> str:
+    layer = results.scene.get("sound", {}).get("road")
+    if not layer:
+        return "rigid"
+    return (
+        f"porous layer of {quantity(layer['thickness'], 'm')}, {layer['resistivity']:g} N s/m⁴, porosity "
+        f"{layer['porosity']:g}, tortuosity {layer['tortuosity']:g}"
+    )
+
+
+def _probes(results: Results) -> list[tuple[str, str]]:
+    """Levels of the intensity probes, with the largest pressure-intensity index of their bands."""
+    level = results.optional(FILE, "total/intensity_level_a")
+    if level is None or not len(level):
+        return []
+    index = results.array(FILE, "intensity_index")
+    names = results.dataset(FILE, "intensity").attrs["names"]
+    return [
+        (
+            f"A-weighted sound intensity level at {name}",
+            f"{value:.1f} dB(A) re 1 pW/m², pressure-intensity index to {most:.1f} dB"
+            if np.isfinite(value)
+            else "inward",
+        )
+        for name, value, most in zip(names, level, index.max(axis=1, initial=0.0), strict=True)
+    ]
 
 
 def _bands(results: Results, section: Section, names: list[str], centre: NDArray) -> None:

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from tireroad.fem.parameters import Key, Limits, choice, described, finite, number, parameter
+from tireroad.greens.absorbing_road import PorousLayer
+from tireroad.runs.scene.schema import table
 
 MICROPHONES = ("cpx", "obsi", "pass-by")
 HEARD = 1130.0  # Hz: the end of the third octave of 1 kHz
@@ -75,4 +77,7 @@ class SoundTable:
         "height of the contact over the acoustic plane: a gap that texture and grooves leave",
         least=0,
         most=0.02,
+    )
+    road: PorousLayer | None = table(
+        PorousLayer, "a road that absorbs: a porous layer; absent: rigid", optional=True
     )

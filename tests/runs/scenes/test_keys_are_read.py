@@ -195,7 +195,7 @@ def test_every_key_is_read_by_a_run(tmp_path: Path, monkeypatch) -> None:
         )
         _run(tmp_path / "rubbing", RUBBING, *slides)
         _run(tmp_path / "rubbing", RUBBING, *slides, "rotation.speed=20")
-        _run(tmp_path / "rubbing", RUBBING, "sound.up_to=100")
+        _run(tmp_path / "rubbing", RUBBING, "sound.up_to=100", "sound.road.thickness=0.03")
         _run(tmp_path / "full", FULL)
         (tmp_path / "drawing.toml").write_text(DRAWING)
         for section in ('section = "radial"', 'mesh = "drawing.toml"'):
