@@ -256,8 +256,8 @@ class Spectra:
     `left_out` s: the run-in; `limit`: where the model ends; `levels`: third octaves and densities
     by the names of `levels_of`; `too_short`: what the reader is told of a run without
     its low bands, empty if it has them; `level_error` and `contact_level_error` (b, 3) dB:
-    estimated errors of the third octaves of axle and contact force, NaN where unknown, None if not
-    requested; `wheel`: hub moments and motions of a moving wheel, (f, 3) or (f, 1), by the names of
+    estimated numerical errors of the third octaves of axle and contact force, NaN where unknown; `unknown_error`: which of them
+    is, and why, empty if none; `wheel`: hub moments and motions of a moving wheel, (f, 3) or (f, 1), by the names of
     runs.stages.corner.
     """
 
@@ -267,6 +267,7 @@ class Spectra:
     limit: Limit
     levels: dict[str, np.ndarray]
     too_short: str = attribute(default="")
+    unknown_error: str = attribute(default="")
     wheel: dict[str, np.ndarray] = field(default_factory=dict)
     axle_force: np.ndarray | None = dataset("N", default=None)
     level_error: np.ndarray | None = dataset("dB", "third_octave/level_error", default=None)
@@ -317,10 +318,14 @@ class SpectraStage(Computed[Spectra]):
             amplitude = amplitudes(force, step)[1][below]
             axle["axle_force"] = amplitude
             _largest(record, frequency[below], amplitude)
-        if self.accuracy is not None:
-            bars, centre = self.accuracy.product, levels["third_octave/centre"]
-            axle["level_error"] = bars.levels("axle_force", centre)
-            axle["contact_level_error"] = bars.levels("contact_force", centre)
+        unknown = self._unknown_error(levels["third_octave/centre"])
+        if unknown:
+            record.headline["numerical error of the third octaves"] = (unknown, "-")
+        errors = {
+            f"{key}_error": self._errors(force, levels[f"third_octave/{key}"], levels)
+            for key, force in (("level", "axle_force"), ("contact_level", "contact_force"))
+            if f"third_octave/{key}" in levels
+        }
         wheel = {
             name: amplitudes(values[start:].reshape(len(total), -1), step)[1][below]
             for name, values in history.wheel.items()
@@ -333,8 +338,29 @@ class SpectraStage(Computed[Spectra]):
             wheel=wheel,
             levels=levels,
             too_short=short,
+            unknown_error=unknown,
             **axle,
+            **errors,
         )
+
+    def _errors(self, force: str, level: np.ndarray, levels: dict[str, np.ndarray]) -> np.ndarray:
+        """Estimated numerical errors (b, 3) dB of the third octaves of a force, NaN where unknown."""
+        bars = self.accuracy.product if self.accuracy else None
+        found = bars.levels(force, levels["third_octave/centre"]) if bars else None
+        return np.full_like(level, np.nan) if found is None else found
+
+    def _unknown_error(self, centre: np.ndarray) -> str:
+        """Which part of the numerical error of the third octaves is unknown, and why; empty if none is."""
+        if self.accuracy is None:
+            return "unknown: accuracy.estimate is false"
+        bars = self.accuracy.product
+        if not bars.by_cause.get("contact_force"):
+            return f"unknown: {', '.join(dict.fromkeys(bars.absent.values()))}"
+        found = bars.levels("contact_force", centre)
+        if found is None or not np.isfinite(found).any():
+            return f"unknown: its companions end after {bars.window:.3g} s, too short for third octaves"
+        left_out = (f"by the {cause} ({reason})" for cause, reason in bars.absent.items())
+        return ", ".join(("without the part", *left_out)) if bars.absent else ""
 
     def _limit(self, record: Record, step: float) -> Limit:
         """The lowest frequency limit of the model, with its cause."""

@@ -162,6 +162,8 @@ def octaves(results: Results, section: Section, of: str) -> None:
     error = results.optional(_FILE, f"third_octave/{name}_error")
     weighted = results.optional(_FILE, f"third_octave/{name}_a_weighted")
     few = few_lines(results, len(centre))
+    if unknown := results.attribute(_FILE, "unknown_error"):
+        section.facts.append(("numerical error of the third octaves", str(unknown)))
     sure = results.optional(_FILE, "third_octave/confidence")
     held = results.optional(_FILE, "third_octave/windows")
     if held is not None and len(held) > 1:
@@ -250,8 +252,6 @@ def _caption(of: str, error: NDArray | None, few: NDArray, sure: NDArray | None)
         caption += " Boxes: chance of the stretch of road, 95 %, by the number of lines."
     if error is not None and np.isfinite(error).any():
         caption += " Lines on the bars: estimated numerical error, by mesh, modes, step and points."
-    elif error is not None:
-        caption += " The companions of this run were too short to tell the error of a band."
     if few.any():
         caption += f" Pale: fewer than {FEW} lines in the band, so its level may be off by more than 3 dB by chance."
     return caption
