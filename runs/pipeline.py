@@ -45,6 +45,7 @@ from tireroad.runs.stages.spectra import SpectraStage
 from tireroad.runs.stages.stage import Job, PipelinePart, Result, Stage, largest_memory
 from tireroad.runs.stages.static import StaticStage
 from tireroad.runs.stages.stiffness import StiffnessStage
+from tireroad.runs.stages.stretches import StretchesStage
 from tireroad.runs.stages.vibration import MotionStage, VibrationStage
 from tireroad.runs.stages.whole_tire import LinesOfRun
 
@@ -55,6 +56,7 @@ PARTS: tuple[type[PipelinePart], ...] = (
     *STATIC_TO_GREENS,
     ContactStage,
     AccuracyStage,
+    StretchesStage,
     ResponseStage,
     SpectraStage,
     LinesOfRun,

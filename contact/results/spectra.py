@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,6 +79,12 @@ def too_narrow(spacing: float, up_to: float, lowest: float = 20.0) -> np.ndarray
     return centre[(high - low <= FEWEST * spacing) & (centre > 0.95 * lowest)]
 
 
+def wide_enough(spacing: float, up_to: float, lowest: float = 0.0) -> np.ndarray:
+    """Centres, Hz, of the bands in `lowest` to `up_to` Hz with 3 lines (`spacing` Hz) or more, which have a level."""
+    centre, low, high = _bands(up_to, 0.0)
+    return centre[(high - low > FEWEST * spacing) & (centre > 0.95 * lowest)]
+
+
 def lowest_wanted(up_to: float, lowest: float = 63.0) -> float:
     """Exact centre, Hz, of the lowest band that a record should resolve: `lowest`, or the highest one
     below `up_to` Hz where that is lower; 0 if there is none."""
@@ -94,18 +100,6 @@ def least_duration(centre: float) -> float:
 def lines(centre: np.ndarray, spacing: float) -> np.ndarray:
     """Number of lines, `spacing` Hz apart, across each band (b,)."""
     return centre * (10**0.05 - 10**-0.05) / spacing
-
-
-def freedom(count: np.ndarray) -> np.ndarray:
-    """Degrees of freedom of the sum of `count` adjacent lines of noise under a Hann window.
-
-    Adjacent lines are correlated by 2/3 and the next but one by 1/6, so n lines are worth
-    n^2 / (n + 2 (n - 1) 4/9 + 2 (n - 2) 1/36) independent ones (Welch's method on one segment), of
-    two degrees of freedom each.
-    """
-    n = np.maximum(np.asarray(count, float), 1.0)
-    shared = 2 * (n - 1) * 4 / 9 + 2 * np.maximum(n - 2, 0) / 36
-    return 2 * n**2 / (n + shared)
 
 
 def confidence(degrees: np.ndarray, share: float = 0.95) -> np.ndarray:
@@ -249,32 +243,41 @@ class Density:
     confidence: np.ndarray
 
 
-def density(values: np.ndarray, step: float, up_to: float = np.inf, rate: bool = False) -> Density:
-    """Density of values (n, d) in steps of `step` s, or of their `rate`; unit squared per Hz.
+def density(
+    records: Sequence[np.ndarray], step: float, up_to: float = np.inf, rate: bool = False
+) -> Density:
+    """Density of the values (n, d) of independent `records` in steps of `step` s, or of their `rate`; unit squared per Hz.
 
-    Segments of half the record or less: eight averages, or more if segments of 0.5 s allow. Each
-    has its mean removed. The integral is the variance (Parseval). Under a Hann window the powers of
+    Segments of half a record or less: eight averages, or more if segments of 0.5 s allow; of several records as long as the
+    shortest allows. Each has its mean removed. The integral is the variance (Parseval). Under a Hann window the powers of
     segments with half overlap are correlated by 1/36 with the next, so k averages are worth
     k / (1 + (k - 1) / (18 k)).
     """
     from scipy import signal
 
-    count = len(values)
-    width = max(min(2 * int(count / _SEGMENTS / 2), round(_LONGEST / step)), min(count, 8))
+    count = min(len(values) for values in records)
+    parts = _SEGMENTS if len(records) == 1 else 1.0
+    width = max(min(2 * int(count / parts / 2), round(_LONGEST / step)), min(count, 8))
     shift = width - width // 2
-    averages = max(1 + (count - width) // shift, 1)
-    frequency, power = signal.welch(
-        values, 1 / step, "hann", width, width // 2, detrend="constant", axis=0
+    averages = np.array([max(1 + (len(values) - width) // shift, 1) for values in records])
+    every = [
+        signal.welch(values, 1 / step, "hann", width, width // 2, detrend="constant", axis=0)
+        for values in records
+    ]
+    frequency = every[0][0]
+    power = (
+        sum(number * found for number, (_, found) in zip(averages, every, strict=True))
+        / averages.sum()
     )
     if rate:
         power = power * (2 * np.pi * frequency[:, None]) ** 2
-    independent = averages / (1 + (averages - 1) / (18 * averages))
+    independent = averages.sum() ** 2 / (averages + (averages - 1) / 18).sum()
     kept = frequency <= up_to
     return Density(
         frequency[kept],
         power[kept],
         width * step,
-        averages,
+        int(averages.sum()),
         confidence(np.array(2 * independent)),
     )
 

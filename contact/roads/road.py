@@ -5,9 +5,9 @@ The road as the tire meets it: any kind, shifted under the axle, levelled, and w
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,20 @@ class RoadKind(Parameters):
     """
 
     owner = "road"
+    sampled: ClassVar[bool] = True
+    """Whether a run meets a sample of a rough surface, so that its levels are those of the surface by chance; False for a shape."""
+    drawn: ClassVar[bool] = False
+    """Whether the heights are drawn by the key `seed`, each seed another sample of the surface."""
+
+    def another(self, number: int) -> RoadKind | None:
+        """Sample `number` (1, 2, ...) of the same surface beside this one; None where none can be drawn.
+
+        Its seed follows from this one's, but is none that is near it: neighbouring seeds share no samples.
+        """
+        if not self.drawn:
+            return None
+        sequence = np.random.SeedSequence((vars(self)["seed"], number))
+        return replace(self, seed=int(sequence.generate_state(1)[0] >> 1))  # type: ignore[call-arg]
 
     @property
     def reads(self) -> Path | None:

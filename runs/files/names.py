@@ -13,6 +13,7 @@ STAGES = (
     "greens",
     "contact",
     "accuracy",
+    "stretches",
     "response",
     "spectra",
     "vibration",

@@ -45,6 +45,7 @@ _ROUNDING = 1e-9  # relative: a load that is given comes out so near
 MATCHED = 24  # lowest modes of the first run that are matched in the others
 DASHES = ("-", "--")
 MOST = 12
+_BOX = 0.14  # width of a box of chance, of the distance of bands
 
 
 @dataclass(frozen=True)
@@ -172,23 +173,60 @@ def pen(number: int) -> dict[str, str]:
     return {"color": CYCLE[number % len(CYCLE)], "ls": DASHES[number // len(CYCLE) % 2]}
 
 
+@dataclass(frozen=True)
+class BandMarks:
+    """What is drawn of a run's third octaves: `level` (b,), numerical `error` (b,), bounds `chance` (b, 2), dB; NaN where unknown."""
+
+    level: Array
+    error: Array
+    chance: Array
+
+    @staticmethod
+    def at(bands: Sequence[float], one: BandLevels | None) -> BandMarks:
+        """Of one run, at bands (b,) Hz; NaN where it has none of them."""
+        found = BandMarks(*(np.full((len(bands), *more), np.nan) for more in ((), (), (2,))))
+        if one is None:
+            return found
+        for k, band in enumerate(bands):
+            for here in np.flatnonzero(np.isclose(one.band, band)):
+                found.level[k], found.error[k] = one.level[here], one.error[here]
+                found.chance[k] = one.chance[here]
+        return found
+
+
+def marks(axes: Axes, place: Array, one: BandMarks, **drawn: Any) -> None:
+    """Levels joined by a line at places (b,), with a bar for the numerical error and a box for the chance of each."""
+    line = axes.plot(place, one.level, marker="o", ms=3, **drawn)[0]
+    colour = line.get_color()
+    known = np.isfinite(one.level) & np.isfinite(one.error)
+    ends = place[known], one.level[known], one.error[known]
+    axes.errorbar(*ends, fmt="none", ecolor=colour, elinewidth=1.2, capsize=2.5)
+    boxed = np.isfinite(one.level) & np.isfinite(one.chance).all(axis=1)
+    low, high = one.chance[boxed].T
+    bottom = one.level[boxed] + low
+    box = {"color": colour, "alpha": 0.16, "lw": 0}
+    axes.bar(place[boxed], high - low, _BOX, bottom=bottom, **box)
+
+
 @styled
-def levels_figure(rows: Sequence[Row], names: Sequence[str], width: float) -> str:
-    """Third octaves of every run, and below them the difference from the first, dB."""
-    values = np.array([[np.nan if v is None else v for v in row.values] for row in rows])
+def levels_figure(
+    bands: Sequence[float], unit: str, runs: Mapping[str, BandMarks], width: float
+) -> str:
+    """Third octaves of every run with their marks, and below them the difference from the first, dB."""
     figure, axes = canvas(width, 5.0, 2, sharex=True, gridspec_kw={"height_ratios": (2, 1)})
-    place = np.arange(len(rows))
-    for number, name in enumerate(names):
-        axes[0, 0].plot(place, values[:, number], marker="o", ms=3, label=name, **pen(number))
+    names, place = list(runs), np.arange(len(bands), dtype=float)
+    first = runs[names[0]].level
+    for number, (name, one) in enumerate(runs.items()):
+        shift = 0.5 * (number / max(len(names) - 1, 1) - 0.5)  # so that no mark hides another
+        marks(axes[0, 0], place + 0.5 * shift, one, label=name, **pen(number))
         if number:
-            change = values[:, number] - values[:, 0]
+            change = one.level - first
             axes[1, 0].plot(place, change, marker="o", ms=3, **pen(number))
-    axes[0, 0].set_ylabel(shown_unit(rows[0].unit))
+    axes[0, 0].set_ylabel(shown_unit(unit))
     legend_above(axes[0, 0], names, width)
     axes[1, 0].axhline(0.0, color="#7b8794", lw=0.8)
     axes[1, 0].set(ylabel=f"less {names[0]}, dB", xlabel="third-octave band in Hz")
-    bands = [row.name.removesuffix(" Hz") for row in rows]
-    axes[1, 0].set_xticks(place, bands, rotation=45)
+    axes[1, 0].set_xticks(place, [f"{band:g}" for band in bands], rotation=45)
     return encode(figure)
 
 
@@ -345,13 +383,19 @@ def _figures(
     runs: Sequence[RunResults], names: Sequence[str], levels: Sequence[Row]
 ) -> list[Drawing]:
     """Charts of the third octaves that several runs have, of histories and of footprints."""
-    figures = []
+    figures, every = [], [{one.name: one for one in band_levels(run)} for run in runs]
     for group in dict.fromkeys(row.group for row in levels if is_drawn(row.group)):
         rows = [row for row in levels if row.group == group]
         several = sum(any(row.values[k] is not None for row in rows) for k in range(len(runs))) > 1
         if len(rows) >= FEWEST_BANDS and several:  # fewer are in the table
-            text = f"Third octaves: {group}."
-            figures.append(drawing(partial(levels_figure, rows, names), text))
+            bands = [float(row.name.removesuffix(" Hz")) for row in rows]
+            drawn = {
+                name: BandMarks.at(bands, found.get(group))
+                for name, found in zip(names, every, strict=True)
+            }
+            text = f"Third octaves: {group}.{marks_told(list(drawn.values()))}"
+            chart = partial(levels_figure, bands, rows[0].unit, drawn)
+            figures.append(drawing(chart, text))
     histories = {
         name: _valid(run)
         for name, run in zip(names, runs, strict=True)
@@ -369,6 +413,16 @@ def _figures(
         text = "Contact pressure at rest, one scale for all."
         figures.append(drawing(partial(footprints, prints), text))
     return figures
+
+
+def marks_told(drawn: Sequence[BandMarks]) -> str:
+    """What the marks of a chart are, of those that it has."""
+    told = ""
+    if any(np.isfinite(one.error).any() for one in drawn):
+        told += " Bars: estimated numerical error."
+    if any(np.isfinite(one.chance).any() for one in drawn):
+        told += " Boxes: chance of the stretch of road, 95 %, by the number of lines."
+    return told
 
 
 def _valid(run: RunResults) -> tuple[Array, Array]:

@@ -187,10 +187,11 @@ def third_octaves(
     label: str,
     few: NDArray,
     names: Sequence[str] = COMPONENTS,
+    chance: NDArray | None = None,
 ) -> str:
-    """Third-octave levels (nb, n) dB as bars over band centres (nb) Hz, with errors (nb, n) dB.
+    """Third-octave levels (nb, n) dB as bars over band centres (nb) Hz, with errors (nb, n) dB as lines.
 
-    Pale where a band has `few` (nb) lines.
+    Pale where a band has `few` (nb) lines. Boxes: bounds (nb, 2) dB of the levels by `chance`.
     """
     figure, axes = line_canvas(WIDE, 3.2, below=0.62)
     here, place = axes[0, 0], np.arange(len(centre))
@@ -203,6 +204,12 @@ def third_octaves(
         bars = here.bar(where, height, 0.93 * pitch, bottom=floor, color=CYCLE[column], label=name)
         for bar in np.array(bars.patches)[few]:
             bar.set_alpha(0.45)
+        if chance is not None:
+            boxed = (height > 0) & np.isfinite(chance).all(axis=1)
+            low, high = chance[boxed].T
+            bottom = (floor + height)[boxed] + low
+            box = {"color": "none", "edgecolor": "#52606d", "lw": 0.7}
+            here.bar(where[boxed], high - low, 0.55 * pitch, bottom=bottom, **box)
         if error is not None:
             known = np.isfinite(error[:, column]) & (height > 0)
             ends = where[known], (floor + height)[known], error[known, column]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.contact.results.spectra import SILENT, nominal
+from tireroad.contact.results.spectra import SILENT, confidence, nominal
 from tireroad.runs.results.reader import RunResults
 
 Array = NDArray[np.float64]
@@ -26,8 +26,9 @@ _FORCES = (
 
 @dataclass(frozen=True)
 class BandLevels:
-    """Levels of one quantity: `name` and `unit`; `band` (b,) Hz, nominal; `level` (b,) dB and its
-    estimated `error` (b,) dB, NaN where there is none or it is unknown.
+    """Levels of one quantity: `name` and `unit`; `band` (b,) Hz, nominal; `level` (b,) dB, its estimated numerical
+    `error` (b,) dB, and the `freedom` (b,), degrees of freedom of its lines, by which it is off by chance; NaN where there is
+    none or it is unknown.
     """
 
     name: str
@@ -35,6 +36,12 @@ class BandLevels:
     band: Array
     level: Array
     error: Array
+    freedom: Array
+
+    @property
+    def chance(self) -> Array:
+        """Bounds (b, 2) dB of the level of the road's process, 95 %, to be added to `level`."""
+        return confidence(self.freedom)
 
 
 def is_drawn(name: str) -> bool:
@@ -56,16 +63,18 @@ def band_levels(run: RunResults) -> Iterator[BandLevels]:
     """All third octaves of a run: forces and moments by component, sound at each microphone, its power."""
     if "spectra/third_octave/centre" in run:
         band = nominal(run["spectra/third_octave/centre"])
+        freedom = _known(run, "spectra/third_octave/freedom", band)
         for quantity, key, unit in _FORCES:
             path = f"spectra/third_octave/{key}"
             if path in run:
-                level, error = run[path], _error(run, f"{path}_error", run[path])
+                level, error = run[path], _known(run, f"{path}_error", run[path])
                 for axis, name in enumerate(AXES):
-                    yield _heard(f"{quantity} {name}", unit, band, level[:, axis], error[:, axis])
+                    both = level[:, axis], error[:, axis]
+                    yield _heard(f"{quantity} {name}", unit, band, *both, freedom)
     if "sound/third_octave/level_a" in run:
         band = nominal(run["sound/third_octave/centre"])
         level = run["sound/third_octave/level_a"]
-        error = _error(run, "sound/third_octave/level_error", level)
+        error = _known(run, "sound/third_octave/level_error", level)
         for k, name in enumerate(run.attributes("sound")["microphone_names"]):
             yield _heard(f"{SOUND}{name}", "dB(A) re 20 uPa", band, level[k], error[k])
         if "sound/third_octave/intensity_level_a" in run:
@@ -77,10 +86,14 @@ def band_levels(run: RunResults) -> Iterator[BandLevels]:
         yield _heard(POWER, "dB re 1 pW", band, power, np.full_like(power, np.nan))
 
 
-def _error(run: RunResults, path: str, level: Array) -> Array:
+def _known(run: RunResults, path: str, level: Array) -> Array:
     return run[path] if path in run else np.full_like(level, np.nan)
 
 
-def _heard(name: str, unit: str, band: Array, level: Array, error: Array) -> BandLevels:
+def _heard(
+    name: str, unit: str, band: Array, level: Array, error: Array, freedom: Array | None = None
+) -> BandLevels:
     level = np.where(level > SILENT, level, np.nan)
-    return BandLevels(name, unit, band, level, np.where(np.isfinite(level), error, np.nan))
+    known = np.full_like(level, np.nan) if freedom is None else freedom
+    error, known = (np.where(np.isfinite(level), one, np.nan) for one in (error, known))
+    return BandLevels(name, unit, band, level, error, known)

@@ -121,9 +121,9 @@ def _rolling(results: Results, given: Given) -> list[Fact]:
     return [
         (
             f"vertical contact force, rolling (mean{after})",
-            bounded(float(force.mean()), error, "N"),
+            bounded(float(force.mean()), error, "N") + ("" if error else ", error unknown"),
         ),
-        (what, bounded(varies, off, "N")),
+        (what, bounded(varies, off, "N") + ("" if off else ", error unknown")),
     ]
 
 

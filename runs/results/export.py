@@ -529,6 +529,14 @@ def bands(group: h5py.Group) -> Columns:
         low, high = group["confidence"][()].T
         columns["lines in the band [-]"] = group["lines"][()]
         columns |= {"95 % of the process from [dB]": low, "95 % of the process to [dB]": high}
+    for name in (name for name in group if name.endswith("_spread")):
+        what = name.removesuffix("_spread")
+        label, bounds = NAMES.get(what, what.replace("_", " ")), group[name][()]
+        bounds = bounds.reshape(len(centre), -1, 3, 2)
+        for point, end in np.ndindex(bounds.shape[1], 2):
+            place = f" {point + 1}" if bounds.shape[1] > 1 else ""
+            title = f"95 % of the {label}{place} by its spread, {('from', 'to')[end]}"
+            columns |= _components(title, bounds[:, point, :, end], "dB")
     return columns | _spread(group, group["centre"])
 
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 from tireroad.contact.choices import DENSE_POINTS, MOST_TOUCHING, USABLE
+from tireroad.contact.results.chance import asked, planned
 from tireroad.greens.residuals import residual_of
 from tireroad.runs.scene.plan import meets_road, skipped
 from tireroad.runs.scene.sizes import (
@@ -115,6 +116,7 @@ KEYS = {
     "radiation": "sound.up_to",
     "air around": "sound.up_to",
     "error bars": "accuracy.estimate",
+    "stretches": "accuracy.chance_db, time.duration",
 }
 
 # Parts that the processes of a run share by rows; of everything else each process has its own.
@@ -213,6 +215,7 @@ def seconds(
     column: int,
     bars: bool = False,
     load_error: bool = False,
+    stretches: float = 0.0,
 ) -> dict[str, float]:
     """CPU time (s) of `operations` by stage; `column`: unknowns in a column through the wall.
 
@@ -220,7 +223,8 @@ def seconds(
     unknowns (static state: 224,100) within a factor of 1.6
     (tests/runs/scenes/test_estimated_time.py). Operations through the wall are done in blocks,
     which are faster the thicker the wall; those on modes too, in larger blocks on larger meshes.
-    `bars`: with error bars, by companion runs; `load_error`: with static.error_estimate.
+    `bars`: with error bars, by companion runs; `load_error`: with static.error_estimate; `stretches`:
+    steps on further stretches of road, over those of the run.
     """
     thicker, larger = column / 9, size.free / 27_900
     share = {
@@ -232,7 +236,21 @@ def seconds(
     beside = {"error bars": _BARS * sum(found.values())} if bars else {}
     if load_error:
         beside[LOAD_ERROR] = _LOAD_ERROR * found["static"]
+    if stretches:
+        beside["stretches"] = stretches * found["contact loop"]
     return found | beside
+
+
+def _stretches(scene: Scene, size: Sizes) -> float:
+    """Steps on further stretches of road (runs.stages.stretches), over those of the run."""
+    rotation, duration = scene.rotation, scene.time.duration
+    radius = scene.tire.proportions().outer_radius
+    speed = rotation.speed * radius if rotation else 0.0
+    grown = (scene.road.run_in + 0.5 * radius) / speed if speed else 0.0
+    window = duration - grown if grown < duration / 2 else duration
+    limit = USABLE * highest_frequency(scene, size.modes)
+    plan = planned(asked(1 / window, limit), 1 / window, scene.accuracy.chance_db)
+    return plan.stretches * (grown + (plan.windows + 1) / 2 * window) / duration
 
 
 def operations(
@@ -374,6 +392,7 @@ def estimate(scene: Scene, until: str | None = None) -> Estimate:
             column,
             bars="accuracy" not in left_out,
             load_error=scene.static.on_road and scene.static.error_estimate,
+            stretches=0.0 if "stretches" in left_out else _stretches(scene, size),
         ),
     )
 

@@ -5,6 +5,8 @@ from dataclasses import fields
 from tireroad.runs.files.names import STAGES
 from tireroad.runs.scene.tables.scene import Scene
 
+_OF_CONTACT = "accuracy", "stretches", "spectra"
+
 
 def skipped(scene: Scene, until: str | None = None) -> dict[str, str]:
     """The stages that will not run, each with its reason."""
@@ -21,11 +23,13 @@ def skipped(scene: Scene, until: str | None = None) -> dict[str, str]:
         reasons["response"] = idle
     if not scene.in_contact:
         reasons["contact"] = why = _no_contact(scene)
-        reasons["accuracy"] = reasons["spectra"] = f"{why}, hence no contact forces"
+        reasons |= dict.fromkeys(_OF_CONTACT, f"{why}, hence no contact forces")
         if not scene.force:
             reasons["greens"] = f"no [[force]], and {why}"
     elif not scene.output.spectra:
         reasons["spectra"] = "output.spectra is false"
+    if "stretches" not in reasons and (idle := _no_chance(scene)):
+        reasons["stretches"] = idle
     if "accuracy" not in reasons and not scene.accuracy.estimate:
         reasons["accuracy"] = "accuracy.estimate is false"
     if not scene.output.vibration:
@@ -48,6 +52,17 @@ def meets_road(until: str | None) -> bool:
     The contact points, which are chosen with the Green's functions, reach as high as the road.
     """
     return until is None or STAGES.index(until) >= STAGES.index("greens")
+
+
+def _no_chance(scene: Scene) -> str | None:
+    """Why no further stretches of road are rolled over; None if there are."""
+    if scene.accuracy.chance_db is None:
+        return "no accuracy.chance_db"
+    if not scene.output.spectra:
+        return "output.spectra is false"
+    if not scene.road.surface.sampled:
+        return f'road.kind = "{scene.road.kind}" is a shape, whose levels are not by chance'
+    return None
 
 
 def _no_contact(scene: Scene) -> str:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
 from tireroad.contact.choices import LEAST_STEPS, TURN
-from tireroad.contact.loop import DrivenTire, LinearTire, equal_steps, steps_of
+from tireroad.contact.loop import Block, DrivenTire, LinearTire, equal_steps, steps_of
 from tireroad.contact.patch import Patch
 from tireroad.contact.results.chatter import Chosen, choose, oscillation
 from tireroad.contact.rolling import bristles, make_loop, rolling_steadily
@@ -190,21 +191,35 @@ def forces(
     `scheme`: see greens.recursion; `contact` replaces the scene's table. Raises ConvergenceError
     if the road touches outside the patch. Collective.
     """
-    kept = response.resolved(step)
-    comm = sharers(kept, job.comm)
+    setup = rolling_steadily(contact or job.scene.contact, setup, response, step)
+    comm = sharers(response.resolved(step), job.comm)
+    rolled = blocks(job, setup, response, step, steps, scheme, comm, contact)
+    both = [(block.total_force, block.axle_force) for block in rolled]
+    total, axle = map(np.concatenate, zip(*both, strict=True))
+    return ContactForces(total, axle, step)
+
+
+def blocks(
+    job: Job,
+    setup: ContactSetup,
+    response: Response,
+    step: float,
+    steps: int,
+    scheme: str,
+    comm: MPI.Comm,
+    contact=None,
+) -> Iterator[Block]:
+    """The blocks of a loop as in `forces`, of a setup that rolls steadily, on the processes `comm` that share it. Collective
+    on these."""
+    kept, spec = response.resolved(step), contact or job.scene.contact
     tire = Recursion(response=kept, step=step, scheme=scheme, comm=comm, look_ahead=True)
-    spec = contact or job.scene.contact
-    setup = rolling_steadily(spec, setup, response, step)
     driven = driven_tire(job, Integration(tire, step, steps, scheme), setup.patch)
     chosen: LinearTire = driven or tire
     loop = make_loop(spec, setup, chosen, step)
     with threadpool_limits(1, "blas"):
-        total, axle = [], []
         for block in loop.roll(setup.drive, step, steps):
             setup.patch.check_edge(block.force, block.time, setup.reach)
-            total.append(block.total_force)
-            axle.append(block.axle_force)
-    return ContactForces(np.concatenate(total), np.concatenate(axle), step)
+            yield block
 
 
 def chosen_scheme(

@@ -9,7 +9,7 @@ from typing import ClassVar
 import h5py
 import numpy as np
 
-from tireroad.contact.results import spectra
+from tireroad.contact.results import chance, spectra
 from tireroad.contact.results.spectra import (
     FORCE,
     MOMENT,
@@ -36,6 +36,7 @@ from tireroad.runs.stages.accuracy import Accuracy, all_limits
 from tireroad.runs.stages.contact_file import ContactHistory
 from tireroad.runs.stages.rolling import first_step, run_in
 from tireroad.runs.stages.stage import Computed, Record, Result
+from tireroad.runs.stages.stretches import Stretches
 
 # name in `third_octave/`: name in `density/`, reference of the level, its unit, unit of the
 # density, whether the rate is taken
@@ -45,7 +46,13 @@ _KINDS = {
     "hub_moment_level": ("hub_moment", MOMENT, "1 N m", "N2 m2/Hz", False),
     "point_velocity_level": ("point_velocity", VELOCITY, "1 nm/s", "m2/s2/Hz", True),
 }
-WEIGHTED = "_a_weighted"
+WEIGHTED, SPREAD = "_a_weighted", "_spread"
+_STRETCHED = {  # the same of further stretches, by their field in runs.stages.stretches.Stretches
+    "level": "axle_force",
+    "contact_level": "contact_force",
+    "hub_moment_level": "hub_moment",
+    "point_velocity_level": "driven",
+}
 # dB by which the window may change the mean square of a force without a warning: an impact in the
 # middle adds 4.26, a short rough record loses up to 5. A force that varies by less than this share
 # needs none.
@@ -55,7 +62,9 @@ _ONE = {  # common to all
     "third_octave/centre": "Hz",
     "third_octave/nominal": "Hz",
     "third_octave/lines": "-",
+    "third_octave/freedom": "-",
     "third_octave/confidence": "dB",
+    "third_octave/windows": "-",
     "third_octave/too_narrow": "Hz",
     "density/frequency": "Hz",
     "density/confidence": "dB",
@@ -68,6 +77,7 @@ UNITS = _ONE | {
     for key, unit in (
         (f"third_octave/{name}", f"dB re {reference}"),
         (f"third_octave/{name}{WEIGHTED}", f"dB(A) re {reference}"),
+        (f"third_octave/{name}{SPREAD}", "dB"),
         (f"density/{what}", per_hertz),
     )
 }
@@ -83,30 +93,51 @@ def series(history: ContactHistory, start: int) -> dict[str, np.ndarray]:
     return {name: values[start:] for name, values in found.items() if values is not None}
 
 
-def levels_of(history: ContactHistory, start: int, up_to: float) -> dict[str, np.ndarray]:
+def records_of(name: str, values: np.ndarray, further: Stretches | None) -> list[np.ndarray]:
+    """The records (n, d) of a level: the run's own `values`, and those of further stretches."""
+    more = [] if further is None else getattr(further, _STRETCHED[name])
+    return [record.reshape(len(record), -1) for record in (values, *more)]
+
+
+def levels_of(
+    history: ContactHistory, start: int, up_to: float, further: Stretches | None = None
+) -> dict[str, np.ndarray]:
     """All entries of `UNITS` that the history provides, after the run-in and below `up_to` Hz.
 
     By their names in spectra.h5: levels (b, 3), for points (b, k, 3), dB of the rms; `…_a_weighted`
-    with each line weighted; densities (f, 3) or (f, k, 3).
+    with each line weighted; `…_spread` (b, 3, 2); densities (f, 3) or (f, k, 3). Of the mean power of the run's own record and
+    of the windows of `further` stretches.
     """
     found: dict[str, np.ndarray] = {}
+    held = further.held if further else (1,)
     for name, values in series(history, start).items():
         what, reference, _, _, rate = _KINDS[name]
-        flat, shape = values.reshape(len(values), -1), values.shape[1:]
+        records, shape = records_of(name, values, further), values.shape[1:]
         for weighted, suffix in ((False, ""), (True, WEIGHTED)):
-            centre, level = third_octaves(
-                flat, history.step, up_to, reference=reference, rate=rate, weighted=weighted
-            )
-            found[f"third_octave/{name}{suffix}"] = level.reshape(-1, *shape)
-        welch = density(flat, history.step, up_to, rate)
+            every = [
+                third_octaves(
+                    window, history.step, up_to, reference=reference, rate=rate, weighted=weighted
+                )
+                for record in records
+                for window in chance.windows(record, len(values))
+            ]
+            centre, level = every[0][0], np.array([one for _, one in every])
+            found[f"third_octave/{name}{suffix}"] = chance.pooled(level).reshape(-1, *shape)
+            spacing = 1 / (len(values) * history.step)
+            if not weighted:
+                each, degrees = (chance.freedom(centre, spacing, h) for h in ((1,), held))
+                if len(every) >= chance.LEAST_WINDOWS:
+                    wide = chance.spread(level, each, degrees)
+                    found[f"third_octave/{name}{SPREAD}"] = wide.reshape(-1, *shape, 2)
+        welch = density(records, history.step, up_to, rate)
         found[f"density/{what}"] = welch.density.reshape(-1, *shape)
-    spacing = 1 / (len(flat) * history.step)
-    count = spectra.lines(centre, spacing)
     return found | {
         "third_octave/centre": centre,
         "third_octave/nominal": spectra.nominal(centre),
-        "third_octave/lines": count,
-        "third_octave/confidence": spectra.confidence(spectra.freedom(count)),
+        "third_octave/lines": spectra.lines(centre, spacing),
+        "third_octave/freedom": degrees,
+        "third_octave/confidence": spectra.confidence(degrees),
+        "third_octave/windows": np.array(held),
         "third_octave/too_narrow": spectra.too_narrow(spacing, up_to),
         "density/frequency": welch.frequency,
         "density/confidence": welch.confidence,
@@ -121,6 +152,7 @@ def describe(
     history: ContactHistory,
     start: int,
     up_to: float,
+    further: Stretches | None = None,
 ) -> None:
     """Record the bands of `levels_of`, the vertical totals, and what the window hides.
 
@@ -134,15 +166,44 @@ def describe(
         if name not in forces or len(forces[name]) < 2:
             continue
         vertical = forces[name][:, 2:]
+        windows = [
+            window[:, 2:]
+            for record in records_of(name, forces[name], further)
+            for window in chance.windows(record, len(vertical))
+        ]
         for kind, letter in (("level", ""), ("A-weighted level", "(A)")):
-            total = float(total_level(vertical, history.step, up_to, weighted=bool(letter))[0])
+            every = [
+                total_level(window, history.step, up_to, weighted=bool(letter))
+                for window in windows
+            ]
+            total = float(chance.pooled(np.array(every))[0])
             record.headline[f"{kind} of the vertical {what}"] = (
                 (total, f"dB{letter} re 1 N") if total > SILENT else _CONSTANT
             )
         _warn_of_window(record, vertical, what)
+    _describe_chance(record, found)
     narrow = spectra.nominal(found["third_octave/too_narrow"])
     if len(narrow):
         record.headline["bands left out, narrower than three lines"] = (_named(narrow), "-")
+
+
+def _describe_chance(record: Record, found: dict[str, np.ndarray]) -> None:
+    """Record how far the lowest band of pooled stretches may be off by chance, by its lines and by the spread of the windows."""
+    wide = found.get(
+        f"third_octave/level{SPREAD}", found.get(f"third_octave/contact_level{SPREAD}")
+    )
+    names = found["third_octave/nominal"]
+    if wide is None or not len(names):
+        return
+    worst = int(np.abs(found["third_octave/confidence"]).max(axis=1).argmax())
+    name = f"third octave {names[worst]:g} Hz by chance, 95 %"
+    by_lines, by_spread = found["third_octave/confidence"][worst], wide[worst, 2]
+    record.headline[f"{name}, at most"] = (float(np.abs(by_lines).max()), "dB")
+    if np.isfinite(by_spread).all():
+        record.headline[f"{name}, by the spread of {int(found['third_octave/windows'].sum())} windows"] = (
+            float(np.abs(by_spread).max()),
+            "dB",
+        )  # fmt: skip
 
 
 def extremes(record: Record, history: ContactHistory, start: int, up_to: float) -> None:
@@ -195,8 +256,8 @@ class Spectra:
     `left_out` s: the run-in; `limit`: where the model ends; `levels`: third octaves and densities
     by the names of `levels_of`; `too_short`: what the reader is told of a run without
     its low bands, empty if it has them; `level_error` and `contact_level_error` (b, 3) dB:
-    estimated errors of the third octaves of axle and contact force, NaN where unknown, None if not
-    requested; `wheel`: hub moments and motions of a moving wheel, (f, 3) or (f, 1), by the names of
+    estimated numerical errors of the third octaves of axle and contact force, NaN where unknown; `unknown_error`: which of them
+    is, and why, empty if none; `wheel`: hub moments and motions of a moving wheel, (f, 3) or (f, 1), by the names of
     runs.stages.corner.
     """
 
@@ -206,6 +267,7 @@ class Spectra:
     limit: Limit
     levels: dict[str, np.ndarray]
     too_short: str = attribute(default="")
+    unknown_error: str = attribute(default="")
     wheel: dict[str, np.ndarray] = field(default_factory=dict)
     axle_force: np.ndarray | None = dataset("N", default=None)
     level_error: np.ndarray | None = dataset("dB", "third_octave/level_error", default=None)
@@ -223,6 +285,7 @@ class SpectraStage(Computed[Spectra]):
     setup: Result[ContactSetup]
     rotating: Result[RollingModes]
     accuracy: Result[Accuracy] | None = None
+    stretches: Result[Stretches] | None = None
 
     def compute(self, record: Record) -> Spectra:
         """The spectra. Not collective."""
@@ -239,8 +302,12 @@ class SpectraStage(Computed[Spectra]):
         limit = self._limit(record, step)
         frequency, contact = amplitudes(total, step)
         below = frequency <= limit.frequency
-        levels = levels_of(history, start, limit.frequency)
-        describe(record, levels, history, start, limit.frequency)
+        further = self.stretches.product if self.stretches else None
+        levels = levels_of(history, start, limit.frequency, further)
+        describe(record, levels, history, start, limit.frequency, further)
+        if not self.job.scene.road.surface.sampled:  # the levels of a shape are not by chance
+            for name in ("freedom", "confidence"):
+                del levels[f"third_octave/{name}"]
         extremes(record, history, start, limit.frequency)
         grows = run_in(self.setup.product, self.job.scene.road)
         short = too_short(levels["third_octave/centre"], limit.frequency, grows)
@@ -251,10 +318,14 @@ class SpectraStage(Computed[Spectra]):
             amplitude = amplitudes(force, step)[1][below]
             axle["axle_force"] = amplitude
             _largest(record, frequency[below], amplitude)
-        if self.accuracy is not None:
-            bars, centre = self.accuracy.product, levels["third_octave/centre"]
-            axle["level_error"] = bars.levels("axle_force", centre)
-            axle["contact_level_error"] = bars.levels("contact_force", centre)
+        unknown = self._unknown_error(levels["third_octave/centre"])
+        if unknown:
+            record.headline["numerical error of the third octaves"] = (unknown, "-")
+        errors = {
+            f"{key}_error": self._errors(force, levels[f"third_octave/{key}"], levels)
+            for key, force in (("level", "axle_force"), ("contact_level", "contact_force"))
+            if f"third_octave/{key}" in levels
+        }
         wheel = {
             name: amplitudes(values[start:].reshape(len(total), -1), step)[1][below]
             for name, values in history.wheel.items()
@@ -267,8 +338,29 @@ class SpectraStage(Computed[Spectra]):
             wheel=wheel,
             levels=levels,
             too_short=short,
+            unknown_error=unknown,
             **axle,
+            **errors,
         )
+
+    def _errors(self, force: str, level: np.ndarray, levels: dict[str, np.ndarray]) -> np.ndarray:
+        """Estimated numerical errors (b, 3) dB of the third octaves of a force, NaN where unknown."""
+        bars = self.accuracy.product if self.accuracy else None
+        found = bars.levels(force, levels["third_octave/centre"]) if bars else None
+        return np.full_like(level, np.nan) if found is None else found
+
+    def _unknown_error(self, centre: np.ndarray) -> str:
+        """Which part of the numerical error of the third octaves is unknown, and why; empty if none is."""
+        if self.accuracy is None:
+            return "unknown: accuracy.estimate is false"
+        bars = self.accuracy.product
+        if not bars.by_cause.get("contact_force"):
+            return f"unknown: {', '.join(dict.fromkeys(bars.absent.values()))}"
+        found = bars.levels("contact_force", centre)
+        if found is None or not np.isfinite(found).any():
+            return f"unknown: its companions end after {bars.window:.3g} s, too short for third octaves"
+        left_out = (f"by the {cause} ({reason})" for cause, reason in bars.absent.items())
+        return ", ".join(("without the part", *left_out)) if bars.absent else ""
 
     def _limit(self, record: Record, step: float) -> Limit:
         """The lowest frequency limit of the model, with its cause."""

@@ -1,10 +1,9 @@
 """sweep.html: the members of a sweep side by side, with their third octaves and the errors of these.
 
-Levels are also given in dB relative to the first member that has any. Members that differ only in a seed are samples of one road: their powers are averaged, and the mean
-power lies within t s / sqrt(n) of that of all roads in 95 of 100 cases (Student's t with n - 1
-degrees of freedom, s the standard deviation over the n seeds). The error bars of the runs
-(contact.results.error_bars) are added as squares; both are independent of each other and of those
-of other members.
+Levels are also given in dB relative to the first member that has any. Members that differ only in a seed are samples of one
+road: their powers are averaged as those of the stretches of one run are (contact.results.chance), with bounds by the number of
+their lines and by the spread of the members. The numerical errors of the runs (contact.results.error_bars) are added as
+squares; they are independent of the chance, and of those of other members.
 """
 
 from __future__ import annotations
@@ -22,13 +21,14 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
-from scipy import stats
 
+from tireroad.contact.results import chance
+from tireroad.contact.results.spectra import confidence
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.disk import replacing, write_text
 from tireroad.runs.files.store import sealed
 from tireroad.runs.files.trials import NAME, read_trials
-from tireroad.runs.report.compare import legend_above, pen
+from tireroad.runs.report.compare import BandMarks, legend_above, marks, marks_told, pen
 from tireroad.runs.report.figures import Drawing, canvas, drawing, encode, styled
 from tireroad.runs.report.kit import page_of
 from tireroad.runs.report.levels import band_levels, is_drawn, rank
@@ -41,8 +41,7 @@ from tireroad.runs.search.settings import applied
 from tireroad.runs.sweep.definition import Member, Sweep
 
 Array = NDArray[np.float64]
-ERROR = "error of the "
-_SURE = 0.95
+ERROR, FREEDOM = "error of the ", "degrees of freedom of the "
 TOTAL = "spectra: level of the vertical force on the axle"  # over all lines, whatever the bands
 SHOWN = (
     TOTAL,
@@ -57,6 +56,7 @@ SHOWN = (
 )
 _VARIES = 1e-6  # relative
 WIDE = 9.5  # inches
+_OF_GROUP: dict[str, tuple[int, ...]] = {"level": (), "error": (), "chance": (2,), "spread": (2,)}
 CURVES = 12  # third-octave spectra that can be distinguished in one figure
 
 
@@ -119,7 +119,8 @@ def _place(key: tuple[str, str]) -> tuple[int, tuple[int, str], float]:
     what, band = _banded(key[0])
     if band is None:
         return 0, (0, ""), 0.0
-    return 1 + what.startswith(ERROR), rank(what.removeprefix(ERROR)), band
+    kind = next((k for k, mark in enumerate((ERROR, FREEDOM), 1) if what.startswith(mark)), 0)
+    return 1 + kind, rank(what.removeprefix(ERROR).removeprefix(FREEDOM)), band
 
 
 def _banded(name: str) -> tuple[str, float | None]:
@@ -167,11 +168,14 @@ def _figures(run: RunResults) -> dict[tuple[str, str], float]:
             if isinstance(value, int | float) and not isinstance(value, bool):
                 figures[f"{stage}: {name}", entry.get("unit", "-")] = float(value)
     for one in band_levels(run):
-        for band, value, error in zip(one.band, one.level, one.error, strict=True):
+        every = one.band, one.level, one.error, one.freedom
+        for band, value, error, freedom in zip(*every, strict=True):
             if np.isfinite(value):
                 figures[f"{one.name}, {band:g} Hz", one.unit] = float(value)
             if np.isfinite(error):
                 figures[f"{ERROR}{one.name}, {band:g} Hz", "dB"] = float(error)
+            if np.isfinite(freedom):
+                figures[f"{FREEDOM}{one.name}, {band:g} Hz", "-"] = float(freedom)
     return figures
 
 
@@ -217,8 +221,9 @@ def _numbers(values: Sequence[Any]) -> bool:
 class Levels:
     """Levels of a `quantity` of groups of members that differ in seeds only.
 
-    `names`; number of `seeds` that have a level in any band; `level` (g, b) dB in the `unit` and its `error`
-    (g, b) dB at the `bands`, NaN where nothing is known.
+    `names`; number of `seeds` that have a level in any band; `level` (g, b) dB in the `unit`, its numerical `error` (g, b) dB,
+    and its bounds by chance (g, b, 2) dB, by the number of lines (`chance`) and by the spread of the seeds (`spread`), at the
+    `bands`; NaN where nothing is known.
     """
 
     quantity: str
@@ -228,17 +233,21 @@ class Levels:
     bands: tuple[str, ...]
     level: Array
     error: Array
+    chance: Array
+    spread: Array
 
     @property
     def with_bands(self) -> tuple[int, ...]:
         """The groups that have a level in any band."""
         return tuple(np.flatnonzero(np.isfinite(self.level).any(axis=1)).tolist())
 
-    def differences(self) -> tuple[Array, Array]:
-        """Differences (g, b) dB from the first group that has bands, and their errors."""
+    def differences(self) -> tuple[Array, Array, Array]:
+        """Differences (g, b) dB from the first group that has bands, their numerical errors (g, b), and their bounds
+        (g, b, 2) by the spread of the seeds."""
         first = self.with_bands[0]
         both = np.sqrt(self.error**2 + self.error[first] ** 2)
-        return self.level - self.level[first], both
+        across = np.hypot(self.spread, self.spread[first, :, ::-1]) * [-1.0, 1.0]
+        return self.level - self.level[first], both, across
 
 
 def levels(table: Gathered, quantity: str) -> Levels | None:
@@ -249,9 +258,12 @@ def levels(table: Gathered, quantity: str) -> Levels | None:
     if not np.isfinite(level).any():
         return None
     nothing = SweepColumn("", "", np.full(len(level), np.nan))
-    error = np.stack([columns.get(ERROR + c.name, nothing).values for c in own], axis=1)
+    error, freedom = (
+        np.stack([columns.get(mark + c.name, nothing).values for c in own], axis=1)
+        for mark in (ERROR, FREEDOM)
+    )
     groups = _alike(table)
-    found = [_mean(level[members], error[members]) for members in groups.values()]
+    found = [_pooled(level[each], error[each], freedom[each]) for each in groups.values()]
     return Levels(
         quantity=quantity,
         unit=own[0].unit,
@@ -260,8 +272,7 @@ def levels(table: Gathered, quantity: str) -> Levels | None:
             int(np.isfinite(level[members]).any(axis=1).sum()) for members in groups.values()
         ),
         bands=tuple(f"{_banded(column.name)[1]:g} Hz" for column in own),
-        level=np.array([one for one, _ in found]),
-        error=np.array([off for _, off in found]),
+        **{name: np.array([one[name] for one in found]) for name in found[0]},
     )
 
 
@@ -279,20 +290,26 @@ def _alike(table: Gathered) -> dict[str, list[int]]:
     return groups
 
 
-def _mean(level: Array, error: Array) -> tuple[Array, Array]:
-    """Level of the mean power (b,) of n members (n, b), and its error, dB."""
-    power = 10 ** (level / 10)
-    count = np.isfinite(power).sum(axis=0)
-    known = np.where(count > 0, count, 1)
-    mean = np.where(count > 0, np.nansum(power, axis=0) / known, np.nan)
-    squares = np.nansum((power - mean) ** 2, axis=0)
-    more = np.maximum(count - 1, 1)
-    width = stats.t.ppf((1 + _SURE) / 2, more) * np.sqrt(squares / more / known)
-    spread = np.where(count > 1, 10 * np.log10(1 + width / mean), 0.0)
-    own = np.sqrt(np.nansum(np.where(np.isfinite(error), error, 0.0) ** 2, axis=0) / known)
-    unknown = ~np.isfinite(error).any(axis=0)
-    total = np.sqrt(spread**2 + own**2)
-    return 10 * np.log10(mean), np.where(unknown & (count < 2), np.nan, total)
+def _pooled(level: Array, error: Array, freedom: Array) -> dict[str, Array]:
+    """Of n members (n, b) that are samples of one road: the fields of `Levels` of their group.
+
+    A numerical error is that of the mean of independent ones.
+    """
+    bands = level.shape[1]
+    found = {name: np.full((bands, *more), np.nan) for name, more in _OF_GROUP.items()}
+    for band in range(bands):
+        there = np.isfinite(level[:, band])
+        if not there.any():
+            continue
+        kept, own, degrees = level[there, band], error[there, band], freedom[there, band]
+        found["level"][band] = chance.pooled(kept[:, None])[0]
+        known = own[np.isfinite(own)]
+        if len(known):
+            found["error"][band] = np.sqrt((known**2).sum()) / len(kept)
+        found["chance"][band] = confidence(degrees.sum())
+        one = np.ones(1)
+        found["spread"][band] = chance.spread(kept[:, None], one, len(kept) * one)[0]
+    return found
 
 
 def write_page(table: Gathered, folder: Path, title: str, failed: Sequence[str]) -> Path:
@@ -344,6 +361,12 @@ def _of_bands(table: Gathered, what: str) -> list[Drawing]:
         text += f" The first {CURVES} of {len(table.names)} members."
     found = [drawing(partial(_spectra, bands, table.names), text, WIDE)]
     compared = levels(table, what)
+    if compared is not None and max(compared.seeds) > 1:
+        text = (
+            f"Third octaves: {what}, mean power over all seeds. Thin lines: its chance, 95 %, by the spread of the "
+            f"seeds.{marks_told([BandMarks(compared.level, compared.error, compared.chance)])}"
+        )
+        found.append(drawing(partial(_of_seeds, compared), text, WIDE))
     if compared is not None and len(compared.with_bands) > 1:
         found.append(drawing(partial(_differences, compared), _about(compared), WIDE))
     return found
@@ -395,16 +418,42 @@ def _ticks(axes: Axes, bands: Sequence[float | None]) -> None:
 
 
 @styled
+def _of_seeds(pooled: Levels, width: float) -> str:
+    """Levels over all seeds, with bars for numerical errors, boxes for the chance by lines and thin lines for that by the spread."""
+    figure, axes = canvas(width, 3.6)
+    place, shown = np.arange(len(pooled.bands), dtype=float), pooled.with_bands[:CURVES]
+    for order, group in enumerate(shown):
+        level, error, sure = (part[group] for part in (pooled.level, pooled.error, pooled.chance))
+        here = place + 0.6 * ((order + 0.5) / len(shown) - 0.5)
+        drawn = {"label": pooled.names[group], **pen(group)}
+        marks(axes[0, 0], here, BandMarks(level, error, sure), **drawn)
+        _spans(axes[0, 0], here, level[:, None] + pooled.spread[group], pen(group)["color"])
+    axes[0, 0].set(ylabel=f"{shown_unit(pooled.unit)}, rms", xlabel="third-octave band in Hz")
+    _ticks(axes[0, 0], [float(band.removesuffix(" Hz")) for band in pooled.bands])
+    legend_above(axes[0, 0], [pooled.names[group] for group in shown], width)
+    return encode(figure)
+
+
+def _spans(axes: Axes, place: Array, ends: Array, colour: str) -> None:
+    """Thin lines at places (b,) between ends (b, 2), where these are known."""
+    known = np.isfinite(ends).all(axis=1)
+    axes.vlines(place[known], *ends[known].T, color=colour, lw=0.6)
+
+
+@styled
 def _differences(compared: Levels, width: float) -> str:
-    """Differences in dB from the first that has bands, with error bars."""
+    """Differences in dB from the first that has bands, with bars for numerical errors and thin lines for the chance."""
     figure, axes = canvas(width, 3.2)
-    level, error = compared.differences()
+    level, error, across = compared.differences()
     place = np.arange(len(compared.bands))
     _, *others = compared.with_bands[:CURVES]
     for order, number in enumerate(others, start=1):
         there = np.isfinite(level[number])
+        here = (place + 0.3 * (order / (len(others) + 1) - 0.5))[there]
+        ends = (level[number, :, None] + across[number])[there]
+        _spans(axes[0, 0], here, ends, pen(number)["color"])
         axes[0, 0].errorbar(
-            (place + 0.3 * (order / (len(others) + 1) - 0.5))[there],
+            here,
             level[number, there],
             np.nan_to_num(error[number, there]),
             marker="o",
@@ -424,16 +473,13 @@ def _about(compared: Levels) -> str:
     """Caption of the figure of differences."""
     text = (
         f"Third octaves: {compared.quantity}, difference from the first that has bands, "
-        f"{compared.names[compared.with_bands[0]]}, in dB, with what the runs' error bars tell of it; "
+        f"{compared.names[compared.with_bands[0]]}, in dB, with bars for the runs' numerical errors; "
         "where there is no bar nothing is known."
     )
     least, most = (f([compared.seeds[k] for k in compared.with_bands]) for f in (min, max))
     if most > 1:
         number = f"{most}" if least == most else f"{least} to {most}"
-        text += (
-            f" Mean power over {number} seeds; the bars hold the true mean of all seeds in 95 of "
-            "100 cases."
-        )
+        text += f" Mean power over {number} seeds; thin lines: chance of the seeds, 95 %, as if the two had different ones."
     return text
 
 

@@ -22,6 +22,8 @@ TABLE_LIMIT = 2_000_000
 class Cobblestones(Levelled):
     """Sizes of the pavement, which repeats with the pitch of block plus joint."""
 
+    drawn = True
+
     block_length: float = number(
         0.14, "m", "length of a block along x; the pitch is joint_width more", least=1e-3, most=10
     )

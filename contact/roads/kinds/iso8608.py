@@ -23,6 +23,8 @@ KEPT = 8  # chunks
 class Iso8608(Levelled):
     """Class, shortest wave and seed of a profile."""
 
+    drawn = True
+
     road_class: str = choice("C", tuple(CLASSES), "road class of ISO 8608, A smooth to H rough")
     shortest_wave: float = number(
         0.1, "m", "shortest wavelength of the profile", least=1e-3, most=50

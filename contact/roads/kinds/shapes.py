@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 class Flat(EndlessRoad):
     """Heights 0 m, endless."""
 
+    sampled = False
+
     def height(self, x: Array, y: Array) -> Array:
         """Zeros in the shape of x, m."""
         return np.zeros(np.shape(x))
@@ -32,6 +34,8 @@ class Flat(EndlessRoad):
 @road_kind("sine", "sine waves, their crests across the rolling direction")
 class Sine(EndlessRoad):
     """z = a sin(2 pi x/L + phase): amplitude a and wavelength L in m, phase in degrees; endless."""
+
+    sampled = False
 
     amplitude: float = number(1.0e-3, "m", "amplitude of the waves", least=0, most=1)
     wavelength: float = number(0.1, "m", "wavelength", least=1e-3, most=1e4)
@@ -62,6 +66,8 @@ SHARP = 1e-3  # m: assumed length of an edge without a ramp
 @dataclass(frozen=True, kw_only=True)
 class Edges(RoadKind):
     """Common parameters of steps and cleats."""
+
+    sampled = False
 
     position: float = number(
         0.3, "m", "x of the foot of the first edge on the road's middle line", least=-1e6, most=1e6

@@ -9,6 +9,8 @@ from tireroad.fem.parameters import ParameterError, integer, number
 class TextureRoad(RoadKind):
     """Spectrum and seed of a texture."""
 
+    drawn = True
+
     rms: float = number(2e-4, "m", "root mean square of the heights", least=0, most=1)
     hurst: float = number(
         0.8, "-", "Hurst exponent H: the spectrum falls as wave number^(-2-2H)", least=0, most=1

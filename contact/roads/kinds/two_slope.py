@@ -28,6 +28,8 @@ LEVELS = (42.0, 42.0, 43.0, 44.0, 45.5, 45.0, 42.0, 36.0)
 class TwoSlope(Levelled):
     """Class of the long waves, levels of the texture, and the wavelength that separates them."""
 
+    drawn = True
+
     road_class: str = choice("A", tuple(CLASSES), "road class of ISO 8608 of the long waves")
     crossover: float = number(
         0.5, "m", "wavelength where the texture begins: longer waves are of the class, the same over "

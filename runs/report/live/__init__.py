@@ -99,11 +99,12 @@ def bars(
     *,
     ends: tuple[float, float],
     few: NDArray,
+    chance: NDArray | None = None,
     height: int = 300,
 ) -> dict[str, Any]:
     """Bars by name, each (values (n,), errors (n,) or None), side by side over named places (n,).
 
-    From ends[0] to at least ends[1]; pale where `few` (n,).
+    From ends[0] to at least ends[1]; pale where `few` (n,); boxes for bounds (n, 2) of all by `chance`.
     Non-finite values have no bar.
     """
     drawn = [
@@ -123,6 +124,7 @@ def bars(
         "floor": float(ends[0]),
         "top": float(ends[1]),
         "few": [bool(one) for one in few],
+        "chance": None if chance is None else [packed(bound, "f4") for bound in chance.T],
         "height": height,
     }
 

@@ -86,6 +86,7 @@ function drawBars(given, box, key) {
   box = make("div", box);
   const wide = 0.84 / given.series.length, count = given.names.length;
   const errors = given.series.map(s => (s.error ? values(s.error) : []));
+  const [lows, highs] = given.chance ? given.chance.map(values) : [[], []];
   const at = (u, v, scale) => u.valToPos(v, scale, true);
   const paint = u => {
     const ink = u.ctx, { left, top, width, height } = u.bbox;
@@ -100,6 +101,11 @@ function drawBars(given, box, key) {
       ink.fillRect(from, y, to - from, top + height - y);
       ink.globalAlpha = 1;
       const error = errors[k][n], middle = (from + to) / 2;
+      if (lows[n] != null && highs[n] != null) { // a box: what the road's chance leaves open
+        const upper = at(u, v + highs[n], "y"), half = 0.3 * (to - from);
+        ink.strokeStyle = "#52606d"; ink.lineWidth = 0.8 * devicePixelRatio;
+        ink.strokeRect(middle - half, upper, 2 * half, at(u, v + lows[n], "y") - upper);
+      }
       if (error == null) return;
       ink.strokeStyle = "#1f2933"; ink.lineWidth = devicePixelRatio;
       ink.beginPath(); ink.moveTo(middle, at(u, v - error, "y")); ink.lineTo(middle, at(u, v + error, "y")); ink.stroke();
@@ -115,7 +121,9 @@ function drawBars(given, box, key) {
     const first = Math.max(Math.round(low), 0), last = Math.min(Math.round(high), count - 1);
     return [first - 0.6, last + 0.6];
   };
-  const told = (k, v, n) => (v == null ? "–" : digits(v) + (errors[k][n] == null ? "" : " ± " + digits(errors[k][n])));
+  const tenths = v => (v < 0 ? "−" : "+") + Math.abs(v).toFixed(1);
+  const byChance = n => (lows[n] == null || highs[n] == null ? "" : `, by chance ${tenths(lows[n])} to ${tenths(highs[n])}`);
+  const told = (k, v, n) => (v == null ? "–" : digits(v) + (errors[k][n] == null ? "" : " ± " + digits(errors[k][n])) + byChance(n));
   const plot = new uPlot({
     width: box.clientWidth, height: given.height,
     scales: { x: { time: false, range: shown }, y: { range: (_, low, high) => [given.floor, Math.max(high, given.top)] } },

@@ -162,14 +162,28 @@ def octaves(results: Results, section: Section, of: str) -> None:
     error = results.optional(_FILE, f"third_octave/{name}_error")
     weighted = results.optional(_FILE, f"third_octave/{name}_a_weighted")
     few = few_lines(results, len(centre))
-    _show_bands(section, centre, level, error, of, "dB re 1 N", few)
-    section.table = _table(results, centre, level, weighted, error)
+    if unknown := results.attribute(_FILE, "unknown_error"):
+        section.facts.append(("numerical error of the third octaves", str(unknown)))
+    sure = results.optional(_FILE, "third_octave/confidence")
+    held = results.optional(_FILE, "third_octave/windows")
+    if held is not None and len(held) > 1:
+        section.facts.append(("levels are of", _windows(held)))
+    _show_bands(section, centre, level, error, of, "dB re 1 N", few, sure)
+    section.table = _table(results, name, weighted, error, sure)
     for key, what, reference in _MORE:
         more = results.optional(_FILE, f"third_octave/{key}")
         if more is None or key == name:
             continue
         error = results.optional(_FILE, f"third_octave/{key}_error")
-        _show_bands(section, centre, more, error, what, reference, few)
+        _show_bands(section, centre, more, error, what, reference, few, sure)
+
+
+def _windows(held: NDArray) -> str:
+    """In words: the windows of the run's own record and of each further stretch, whose powers are averaged."""
+    return (
+        f"{held.sum():g} half-overlapping windows of road: the run's own, and {held[1]:g} on each of {len(held) - 1} further "
+        "stretches"
+    )
 
 
 def _show_bands(
@@ -180,8 +194,9 @@ def _show_bands(
     of: str,
     reference: str,
     few: NDArray,
+    sure: NDArray | None,
 ) -> None:
-    """Add levels (b, 3) dB over band centres (b,) Hz, with their errors (b, 3) dB."""
+    """Add levels (b, 3) dB over band centres (b,) Hz, with their errors (b, 3) dB and bounds (b, 2) dB by chance."""
     if len(centre) < figures.FEWEST_BANDS:
         section.facts += _in_numbers(centre, level, error, of, reference)
         return
@@ -198,9 +213,10 @@ def _show_bands(
         figures.COLOURS,
         ends=figures.level_range(level),
         few=few,
+        chance=sure,
     )
-    picture = figures.third_octaves(centre, level, error, label, few)
-    section.show(picture, _caption(of, error, few), drawn)
+    picture = figures.third_octaves(centre, level, error, label, few, chance=sure)
+    section.show(picture, _caption(of, error, few, sure), drawn)
 
 
 def _in_numbers(
@@ -223,17 +239,19 @@ def _bounded(level: float, error: float) -> str:
 
 
 def few_lines(results: Results, count: int) -> NDArray:
-    """Mask (b,) of bands with too few lines for a reliable level."""
+    """Mask (b,) of bands with too few lines, in all windows together, for a reliable level."""
     held = results.optional(_FILE, "third_octave/lines")
-    return np.zeros(count, bool) if held is None else held < FEW
+    windows = results.optional(_FILE, "third_octave/windows")
+    times = 1 if windows is None else windows.sum()
+    return np.zeros(count, bool) if held is None else times * held < FEW
 
 
-def _caption(of: str, error: NDArray | None, few: NDArray) -> str:
+def _caption(of: str, error: NDArray | None, few: NDArray, sure: NDArray | None) -> str:
     caption = f"Third-octave bands of the {of}, rms."
+    if sure is not None:
+        caption += " Boxes: chance of the stretch of road, 95 %, by the number of lines."
     if error is not None and np.isfinite(error).any():
-        caption += " Lines on the bars: estimated error by mesh, modes, step and points."
-    elif error is not None:
-        caption += " The companions of this run were too short to tell the error of a band."
+        caption += " Lines on the bars: estimated numerical error, by mesh, modes, step and points."
     if few.any():
         caption += f" Pale: fewer than {FEW} lines in the band, so its level may be off by more than 3 dB by chance."
     return caption
@@ -241,25 +259,33 @@ def _caption(of: str, error: NDArray | None, few: NDArray) -> str:
 
 def _table(
     results: Results,
-    centre: NDArray,
-    level: NDArray,
+    name: str,
     weighted: NDArray | None,
     error: NDArray | None,
+    sure: NDArray | None,
 ) -> TextTable:
-    """The vertical levels, their errors and confidence intervals."""
-    sure = results.optional(_FILE, "third_octave/confidence")
+    """The vertical levels of the dataset `name`, their numerical errors, and their bounds by chance."""
+    centre, level, spread = (
+        results.optional(_FILE, f"third_octave/{key}") for key in ("centre", name, f"{name}_spread")
+    )
+    assert centre is not None and level is not None
     head = ["band, Hz", "z, dB re 1 N"]
     columns = [[f"{c:g}" for c in nominal(centre)], _texts(level[:, 2])]
     if error is not None:
-        head.append("error, dB")
+        head.append("numerical error, dB")
         columns.append([about(e) for e in error[:, 2]])
     if weighted is not None:
         head.append("z, dB(A)")
         columns.append(_texts(weighted[:, 2]))
-    if sure is not None:
-        head.append("95 %, by length, dB")
-        columns.append([f"{low:+.1f} to {high:+.1f}".replace("-", "−") for low, high in sure])
+    for what, bounds in (("lines", sure), ("spread", None if spread is None else spread[:, 2])):
+        if bounds is not None:
+            head.append(f"chance, 95 %, by {what}, dB")
+            columns.append([_between(*ends) for ends in bounds])
     return TextTable(tuple(head), list(zip(*columns, strict=True)))
+
+
+def _between(low: float, high: float) -> str:
+    return f"{low:+.1f} to {high:+.1f}".replace("-", "−") if np.isfinite(high) else "unknown"
 
 
 def _texts(level: NDArray) -> list[str]:

@@ -335,6 +335,14 @@ class AccuracyTable:
     of: str = choice(
         "axle_force", ("axle_force", "contact_force"), "force to which the target applies"
     )
+    chance_db: float | None = number(
+        None,
+        "dB",
+        "by how much third octaves from 63 Hz on may differ from those of an endless rough road by chance, in 95 % of cases: "
+        "chooses how many stretches of it are rolled over and pooled; absent: one",
+        least=0.1,
+        most=20,
+    )
     up_to: float = number(
         400.0,
         "Hz",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
-from tireroad.contact.results import spectra
+from tireroad.contact.results import chance, spectra
 from tireroad.contact.results.spectra import VELOCITY, density, third_octaves
 
 STEP = 1e-4
@@ -50,7 +50,7 @@ def test_the_density_holds_the_variance(rate) -> None:
     """Parseval: the integral over frequency is the variance, of a velocity too."""
     rng = np.random.default_rng(2)
     smooth = np.convolve(rng.standard_normal(60_000), np.hanning(61), mode="valid")[:, None]
-    found = density(smooth, STEP, rate=rate)
+    found = density([smooth], STEP, rate=rate)
     exact = np.gradient(smooth[:, 0], STEP).var() if rate else smooth.var()
     assert trapezoid(found.density[:, 0], found.frequency) == pytest.approx(exact, rel=0.03)
 
@@ -61,32 +61,31 @@ def test_bands_and_density_of_white_noise_agree() -> None:
     centre, level = third_octaves(noise, STEP, 2000.0)
     band = np.argmin(np.abs(centre - 1000))
     width = centre[band] * (10**0.05 - 10**-0.05)
-    found = density(noise, STEP)
+    found = density([noise], STEP)
     inside = np.abs(np.log10(found.frequency[1:] / centre[band])) < 0.05
     held = found.density[1:, 0][inside].mean() * width
     assert level[band, 0] == pytest.approx(10 * np.log10(held), abs=0.3)
 
 
 def test_nothing_is_beyond_the_band_and_the_settings_are_told() -> None:
-    found = density(np.random.default_rng(4).standard_normal((4500, 3)), STEP, 300.0)
+    found = density([np.random.default_rng(4).standard_normal((4500, 3))], STEP, 300.0)
     assert found.frequency[-1] <= 300.0
     assert (found.segment, found.averages) == (pytest.approx(0.1), 8)
     assert found.density.shape == (len(found.frequency), 3)
-    longer = density(np.zeros((60_000, 1)), STEP)
+    longer = density([np.zeros((60_000, 1))], STEP)
     assert longer.segment == pytest.approx(0.5)
     assert longer.averages == 23
 
 
 def test_a_record_of_one_value_has_a_density_of_one_line() -> None:
-    assert density(np.ones((1, 3)), STEP).density.shape == (1, 3)
+    assert density([np.ones((1, 3))], STEP).density.shape == (1, 3)
 
 
 def test_confidence_covers_the_level_of_the_process() -> None:
     """Of 400 records of white noise, 95 % have the true level within the interval; of few lines and of many."""
     rng = np.random.default_rng(5)
     for band, spacing in ((100.0, 5.0), (500.0, 5.0)):
-        count = spectra.lines(np.array([band]), spacing)
-        low, high = spectra.confidence(spectra.freedom(count))[0]
+        low, high = spectra.confidence(chance.freedom(np.array([band]), spacing))[0]
         width = band * (10**0.05 - 10**-0.05)
         exact = 10 * np.log10(width / 2500.0)
         inside = 0

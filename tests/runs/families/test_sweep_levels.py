@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from tireroad.contact.results import chance
+from tireroad.contact.results.spectra import confidence
 from tireroad.runs.report.levels import POWER, SOUND
 from tireroad.runs.sweep.page import (
     TOTAL,
@@ -49,17 +51,36 @@ def test_seeds_are_samples_of_one_road() -> None:
     assert found.seeds == (4, 4)
     power = 10 ** (LOUD / 10)
     np.testing.assert_allclose(found.level[0], 10 * np.log10(power.mean(axis=0)))
-    top = stats.t.interval(0.95, 3, power.mean(axis=0), stats.sem(power, axis=0))[1]
-    np.testing.assert_allclose(found.level[0] + found.error[0], 10 * np.log10(top))
-    apart, sure = found.differences()
+    # As of Gaussian noise whose power varies so, and by Student's t for four members.
+    degrees = 2 * 4 * (power.mean(axis=0) / power.std(axis=0, ddof=1)) ** 2
+    degrees *= (stats.norm.ppf(0.975) / stats.t.ppf(0.975, 3)) ** 2
+    ends = [10 * np.log10(degrees / stats.chi2.ppf(q, degrees)) for q in (0.975, 0.025)]
+    np.testing.assert_allclose(found.spread[0].T, ends)
+    apart, sure, across = found.differences()
     np.testing.assert_allclose(apart[1], 3.0)
-    np.testing.assert_allclose(sure[1], np.sqrt(2) * found.error[0])
+    assert np.isnan(sure).all() and np.isnan(found.chance).all()
+    np.testing.assert_allclose(across[1, :, 1], np.hypot(*ends))
+
+
+def test_bands_of_seeds_are_pooled_as_stretches_of_one_run_are() -> None:
+    """Four members of 8 degrees of freedom each have 32, in level and bounds."""
+    given = table({"road.seed": (1, 2, 3, 4)}, LOUD, None)
+    degrees = [
+        SweepColumn(f"degrees of freedom of the {column.name}", "-", np.full(4, 8.0))
+        for column in given.columns
+    ]
+    full = Gathered(given.names, given.settings, (*given.columns, *degrees), ())
+    found = levels(full, FORCE)
+    np.testing.assert_allclose(found.chance[0], [confidence(np.array(32.0))] * 2)
+    np.testing.assert_allclose(found.level[0], chance.pooled(LOUD))
+    np.testing.assert_allclose(found.spread[0], chance.spread(LOUD, np.ones(2), 4 * np.ones(2)))
+    assert any("mean power over all seeds" in text for text in captions(full))
 
 
 def test_what_runs_tell_of_their_errors_adds_up() -> None:
     error = np.array([[0.3, np.nan], [0.4, np.nan]])
     found = levels(table({"static.load": (1.0, 2.0)}, LOUD[:2], error), FORCE)
-    apart, sure = found.differences()
+    apart, sure, _ = found.differences()
     np.testing.assert_allclose(apart[1], LOUD[1] - LOUD[0])
     assert sure[1, 0] == pytest.approx(0.5) and np.isnan(sure[1, 1])
 
@@ -134,7 +155,7 @@ def test_members_without_bands_are_drawn_as_far_as_they_go(recwarn) -> None:
     bands = table(given, level, None)
     total = SweepColumn(TOTAL, "dB re 1 N", np.array([35.3, 35.2, 35.4, np.nan]))
     full = Gathered(bands.names, given, (total, *bands.columns), ())
-    apart, _ = levels(full, FORCE).differences()
+    apart, *_ = levels(full, FORCE).differences()
     np.testing.assert_allclose(apart[:, 0], [np.nan, 0.0, -2.0, -0.5])
     assert _chosen(full) == [total]
     shown = captions(full)

@@ -10,10 +10,22 @@ import h5py
 import numpy as np
 import pytest
 
+from tireroad.contact.results.spectra import confidence
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.disk import signed
-from tireroad.runs.report.compare import Row, _change, assurance, compare, level_rows, scene_rows
-from tireroad.runs.report.levels import SOUND
+from tireroad.runs.report.compare import (
+    BandMarks,
+    Row,
+    _change,
+    assurance,
+    compare,
+    level_rows,
+    marks,
+    marks_told,
+    scene_rows,
+)
+from tireroad.runs.report.figures import canvas
+from tireroad.runs.report.levels import SOUND, BandLevels
 from tireroad.runs.results.reader import RunResults
 
 
@@ -150,3 +162,23 @@ def test_what_differs_in_the_scenes_has_its_unit() -> None:
     cords = [{"tire": {"cords": [{"name": "belt", "spacing": s}]}} for s in (1e-3, 2e-3)]
     (row,) = scene_rows(cords)
     assert (row.name, row.unit) == ("tire.cords.0.spacing", "m")
+
+
+def test_a_chart_of_bands_has_a_mark_for_the_numerical_error_and_one_for_the_chance():
+    """Of what is known: a run without error bars has none, one over a shape no boxes; bands by their frequency."""
+    nan = np.nan
+    one = BandLevels(
+        "axle force z", "dB re 1 N", np.array([100.0, 125.0]), np.array([10.0, 12.0]),
+        np.array([0.5, nan]), np.array([16.0, 20.0]),
+    )  # fmt: skip
+    found = BandMarks.at([80.0, 100.0, 125.0], one)
+    np.testing.assert_allclose(found.level, [nan, 10.0, 12.0])
+    np.testing.assert_allclose(found.error, [nan, 0.5, nan])
+    np.testing.assert_allclose(found.chance[1:], confidence(np.array([16.0, 20.0])))
+    figure, axes = canvas(6.0, 3.0)
+    marks(axes[0, 0], np.arange(3.0), found)
+    assert len(axes[0, 0].patches) == 2  # boxes
+    assert len(axes[0, 0].collections[0].get_segments()) == 1  # bars
+    assert [word in marks_told([found]) for word in ("numerical", "chance")] == [True, True]
+    nothing = BandMarks.at([100.0], None)
+    assert not marks_told([nothing]) and np.isnan(nothing.level).all()

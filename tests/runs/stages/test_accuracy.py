@@ -232,7 +232,11 @@ def test_it_can_be_left_out(run):
     stages = json.loads((folder / "summary.json").read_text())["stages"]
     assert stages["accuracy"]["status"] == "skipped"
     with h5py.File(folder / "spectra.h5") as file:
-        assert "third_octave/level_error" not in file
+        for name in ("level_error", "contact_level_error"):
+            assert np.isnan(file[f"third_octave/{name}"][:]).all()
+        assert file.attrs["unknown_error"] == "unknown: accuracy.estimate is false"
+    told = stages["spectra"]["headline"]["numerical error of the third octaves"]["value"]
+    assert told == "unknown: accuracy.estimate is false"
 
 
 def test_the_coarser_tire_turns_as_fast(tmp_path) -> None:
