@@ -29,6 +29,7 @@ _ROUNDING = 1e-9  # of the number of steps: a duration that is a multiple of the
 # The road is met at places that change no gap by more than this share of the largest deflection of a point under its own force.
 MEETING = 1e-2
 MEETINGS = 20  # solutions of a step, at most
+GENTLE, STEEP = 0.5, 1.0  # slopes up to which points are followed wholly, and from which on they are not
 MIXED = 5  # of them whose places are combined
 
 
@@ -359,6 +360,16 @@ class RoadMet:
         """Whether the road has a slope, and is met where the points have moved to."""
         return self.driven is not None
 
+    def follows(self, apart: Array) -> Array:
+        """Share (c,) of their motion with which points are followed: 1 where no flank `apart` (c,) m or nearer, before or
+        behind, is steeper than GENTLE, 0 from STEEP on."""
+        assert self.driven is not None and self.driven.slope is not None, "a road that leans"
+        x = self.along + np.outer((-1.0, -0.5, 0.0, 0.5, 1.0), apart)
+        y = np.broadcast_to(self.across, x.shape)
+        steepest = np.sqrt((self.driven.slope(x, y) ** 2).sum(axis=2).max(axis=0))
+        way: Array = np.clip((STEEP - steepest) / (STEEP - GENTLE), 0.0, 1.0)
+        return way * way * (3.0 - 2.0 * way)
+
     def at(self, place: Array) -> tuple[Array, Array]:
         """Height (c,) m and slope (c, 2) of a road that leans, for points at a `place` (2, c) m beside their own."""
         assert self.driven is not None and self.driven.slope is not None, "a road that leans"
@@ -373,7 +384,8 @@ class ContactProblem:
     `same_step` (k, k) m/N: displacements at the end of a step of the nodes under forces on them, in z, or in z, then x,
     then y. `solver` is made for the normal compliance A + C~.
 
-    A point meets the road where it lies, at its place x + u, y + v of the same instant, and on a slope r = (r_x, r_y)
+    A point meets the road where it lies, at its place x + u, y + v of the same instant (near flanks steeper than `GENTLE` only in
+    part, near those of `STEEP` at its place at rest: on them a point has several places to rest at), and on a slope r = (r_x, r_y)
     there a point with the vertical force f and the bristle's force t bears
 
         (t - f r,  f + t . r),
@@ -455,7 +467,9 @@ class ContactProblem:
         last = self._solution.copy()
         self._solution += last - self._before
         self._before = last
+        follows = road.follows(2.0 * self.patch.half_sizes[:, 0])
         COMPILED.lib.meeting_place(self._compiled, nodes, COMPILED.doubles(place))
+        place *= follows
         for turn in range(MEETINGS):
             height, slope = road.at(place)
             force, pulled = self._force.copy(), self._tangential.copy()
@@ -463,7 +477,7 @@ class ContactProblem:
             self.commit(solved)
             COMPILED.lib.meeting_shift(self._compiled, nodes, tips)
             COMPILED.lib.meeting_place(self._compiled, nodes, COMPILED.doubles(found))
-            rest = found - place
+            rest = follows * found - place
             settled = self._settled(solved, rest, self._force - force, self._tangential - pulled)
             if settled and (turn or not self.has_friction):
                 return solved
