@@ -36,7 +36,7 @@ def over(
     return time, vertical, np.concatenate([b.horizontal for b in blocks]), problem
 
 
-@pytest.mark.parametrize("slope", [0.1, -0.5, 2.0])
+@pytest.mark.parametrize("slope", [0.1, -0.3, 0.5])
 def test_a_point_on_springs_presses_a_plane_normal_to_it(slope: float) -> None:
     """f (A_zz + r^2 A_xx) = h, the height that the plane would have under the point at rest; at r = 2 a place read from the
     last forces would swing with twelve times the amplitude of the one before."""
