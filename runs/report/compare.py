@@ -175,7 +175,7 @@ def pen(number: int) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class BandMarks:
-    """What is drawn of a run's third octaves: `level` (b,), numerical `error` (b,), bounds `chance` (b, 2), dB; NaN where unknown."""
+    """Marks of a run's third octaves: `level` (b,), numerical `error` (b,), bounds `chance` (b, 2), dB; NaN where unknown."""
 
     level: Array
     error: Array
@@ -183,7 +183,7 @@ class BandMarks:
 
     @staticmethod
     def at(bands: Sequence[float], one: BandLevels | None) -> BandMarks:
-        """Of one run, at bands (b,) Hz; NaN where it has none of them."""
+        """Marks of one run at bands (b,) Hz; NaN where it has none of them."""
         found = BandMarks(*(np.full((len(bands), *more), np.nan) for more in ((), (), (2,))))
         if one is None:
             return found
@@ -416,7 +416,7 @@ def _figures(
 
 
 def marks_told(drawn: Sequence[BandMarks]) -> str:
-    """What the marks of a chart are, of those that it has."""
+    """Explanation of the marks that a chart has."""
     told = ""
     if any(np.isfinite(one.error).any() for one in drawn):
         told += " Bars: estimated numerical error."

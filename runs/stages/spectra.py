@@ -350,7 +350,7 @@ class SpectraStage(Computed[Spectra]):
         return np.full_like(level, np.nan) if found is None else found
 
     def _unknown_error(self, centre: np.ndarray) -> str:
-        """Which part of the numerical error of the third octaves is unknown, and why; empty if none is."""
+        """Part of the numerical error of the third octaves that is unknown, and why; empty if none is."""
         if self.accuracy is None:
             return "unknown: accuracy.estimate is false"
         bars = self.accuracy.product

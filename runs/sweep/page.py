@@ -291,7 +291,7 @@ def _alike(table: Gathered) -> dict[str, list[int]]:
 
 
 def _pooled(level: Array, error: Array, freedom: Array) -> dict[str, Array]:
-    """Of n members (n, b) that are samples of one road: the fields of `Levels` of their group.
+    """Fields for n members (n, b) that are samples of one road: those of `Levels` of their group.
 
     A numerical error is that of the mean of independent ones.
     """
