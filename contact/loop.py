@@ -29,7 +29,10 @@ _ROUNDING = 1e-9  # of the number of steps: a duration that is a multiple of the
 # The road is met at places that change no gap by more than this share of the largest deflection of a point under its own force.
 MEETING = 1e-2
 MEETINGS = 20  # solutions of a step, at most
-GENTLE, STEEP = 0.5, 1.0  # slopes up to which points are followed wholly, and from which on they are not
+GENTLE, STEEP = (
+    0.5,
+    1.0,
+)  # slopes up to which points are followed wholly, and from which on they are not
 MIXED = 5  # of them whose places are combined
 
 
@@ -332,43 +335,46 @@ class Drive:
             leans = moving and self.slope is not None
             if not leans:
                 known = known + self.height(along, across)
-            met = [
-                RoadMet(self if leans else None, along[k], y, known[k]) for k in range(len(times))
-            ]
+            follows = self._follows(along, across, patch) if leans else np.ones(along.shape)
+            road = self if leans else None
+            met = [RoadMet(road, along[k], y, known[k], follows[k]) for k in range(len(times))]
             skipped = max(done - first, 0)
             yield times[skipped:], met[skipped:]
+
+    def _follows(self, along: Array, across: Array, patch: Patch) -> Array:
+        """Shares (n, c) of their motion with which points are followed: 1 where no flank one point before or behind or nearer
+        is steeper than GENTLE, 0 from STEEP on."""
+        assert self.slope is not None, "a road that leans"
+        apart = np.multiply.outer((-1.0, -0.5, 0.0, 0.5, 1.0), 2.0 * patch.half_sizes[:, 0])
+        x = (along + apart[:, None]).reshape(-1, along.shape[1])
+        slope = self.slope(x, np.tile(across, (len(apart), 1)))
+        steepest = np.sqrt((slope**2).sum(axis=-1)).reshape(len(apart), *along.shape).max(axis=0)
+        way: Array = np.clip((STEEP - steepest) / (STEEP - GENTLE), 0.0, 1.0)
+        return way * way * (3.0 - 2.0 * way)
 
 
 @dataclass(frozen=True)
 class RoadMet:
     """The road under the points at the end of a step: `known` (c,) m on a level road, and on one that is `driven` over to be
-    added to its height at the places of the points, `along` and `across` (c,) m of their own."""
+    added to its height at the places of the points, `along` and `across` (c,) m of their own. `follows` (c,): share of
+    their motion with which the points are followed."""
 
     driven: Drive | None
     along: Array
     across: Array
     known: Array
+    follows: Array
 
     @staticmethod
     def level(patch: Patch) -> RoadMet:
         """A level road at rest."""
         x, y, _ = patch.points.T
-        return RoadMet(None, x, y, np.zeros(len(x)))
+        return RoadMet(None, x, y, np.zeros(len(x)), np.ones(len(x)))
 
     @property
     def leans(self) -> bool:
         """Whether the road has a slope, and is met where the points have moved to."""
         return self.driven is not None
-
-    def follows(self, apart: Array) -> Array:
-        """Share (c,) of their motion with which points are followed: 1 where no flank `apart` (c,) m or nearer, before or
-        behind, is steeper than GENTLE, 0 from STEEP on."""
-        assert self.driven is not None and self.driven.slope is not None, "a road that leans"
-        x = self.along + np.outer((-1.0, -0.5, 0.0, 0.5, 1.0), apart)
-        y = np.broadcast_to(self.across, x.shape)
-        steepest = np.sqrt((self.driven.slope(x, y) ** 2).sum(axis=2).max(axis=0))
-        way: Array = np.clip((STEEP - steepest) / (STEEP - GENTLE), 0.0, 1.0)
-        return way * way * (3.0 - 2.0 * way)
 
     def at(self, place: Array) -> tuple[Array, Array]:
         """Height (c,) m and slope (c, 2) of a road that leans, for points at a `place` (2, c) m beside their own."""
@@ -384,16 +390,16 @@ class ContactProblem:
     `same_step` (k, k) m/N: displacements at the end of a step of the nodes under forces on them, in z, or in z, then x,
     then y. `solver` is made for the normal compliance A + C~.
 
-    A point meets the road where it lies, at its place x + u, y + v of the same instant (near flanks steeper than `GENTLE` only in
-    part, near those of `STEEP` at its place at rest: on them a point has several places to rest at), and on a slope r = (r_x, r_y)
+    A point meets the road where it lies, at its place x + u, y + v of the same instant (near flanks steeper than GENTLE only in
+    part, near those of STEEP at its place at rest: on them a point has several places to rest at), and on a slope r = (r_x, r_y)
     there a point with the vertical force f and the bristle's force t bears
 
         (t - f r,  f + t . r),
 
     so that the work of the force is that of the gap's change, -r . (u, v). Both are found by solving the contact again with
     the road met at the places found and with what the slope added there, until neither changes a gap by more than
-    `tolerance` of the largest deflection of a point under its own force: most steps are solved once, from the
-    displacements (u, v) that the last forces would cause at the new instant. A place is approached by 1 / (1 + r . r B/A)
+    `tolerance` of the largest deflection of a point under its own force. The first solution is at the places and forces
+    extrapolated from the last two steps; with friction it is rough (one turn), so that each step has a second. A place is approached by 1 / (1 + r . r B/A)
     of the way, A and B the compliances of the point normal to the road and in its plane, and by Anderson's acceleration (J. ACM 12
     (1965) 547). Where the motion in the plane is not followed (one component) the points stay, on a level road.
 
@@ -425,8 +431,9 @@ class ContactProblem:
         # Normal forces, bristles' forces and shifts in the plane of the last solution, and as they were a step before.
         self._solution = np.zeros((5, c))
         self._before = np.zeros((5, c))
-        self._force, self._tangential, self._shift = np.split(self._solution, [1, 3])
-        self._force = self._force[0]
+        self._force, self._tangential, self._shift = (
+            self._solution[part] for part in (0, slice(1, 3), slice(3, 5))
+        )
         self.repeated = self.unsettled = 0
         if self.components == 3:
             self._in_plane = _in_plane(same_step, weights, p)
@@ -467,9 +474,8 @@ class ContactProblem:
         last = self._solution.copy()
         self._solution += last - self._before
         self._before = last
-        follows = road.follows(2.0 * self.patch.half_sizes[:, 0])
         COMPILED.lib.meeting_place(self._compiled, nodes, COMPILED.doubles(place))
-        place *= follows
+        place *= road.follows
         for turn in range(MEETINGS):
             height, slope = road.at(place)
             force, pulled = self._force.copy(), self._tangential.copy()
@@ -477,7 +483,7 @@ class ContactProblem:
             self.commit(solved)
             COMPILED.lib.meeting_shift(self._compiled, nodes, tips)
             COMPILED.lib.meeting_place(self._compiled, nodes, COMPILED.doubles(found))
-            rest = follows * found - place
+            rest = road.follows * found - place
             settled = self._settled(solved, rest, self._force - force, self._tangential - pulled)
             if settled and (turn or not self.has_friction):
                 return solved

@@ -98,16 +98,16 @@ class CellMean:
         """Know the means at the positions from one before `first` * step to two behind `last` * step.
 
         Those under the footprint are kept as it rolls on: nine of ten positions were evaluated
-        before.
+        before; and those of a rectangle's two lengths behind it, to which points move back within a step.
         """
         begin, end = first - 1, last + 3
-        passed, known = begin - self._begin, len(self._means)
-        if 0 <= passed <= known:
-            self._sums, self._means = self._sums[passed:], self._means[passed:]
-        else:
+        if not 0 <= begin - self._begin <= len(self._means):
             self._sums, self._means = _nothing(self._means.shape[2])
-        self._begin = begin
-        if len(self._means) < end - begin:
+            self._begin = begin
+        passed = max(begin - self._begin - 2 * self._reach, 0)
+        self._sums, self._means = self._sums[passed:], self._means[passed:]
+        self._begin += passed
+        if self._begin + len(self._means) < end:
             self._add(end)
 
     def _add(self, end: int) -> None:

@@ -1244,11 +1244,8 @@ static void drag(brush *s, const double *force, const double *free, double *move
     struct brush_work *w = s->work;
     const int c = compliance->points;
     w->touches = w->reaches = 0;
-    memset(w->set, 0, c);
     for (int i = 0; i < c; i++)
-        if (force[i] > 0.0) w->touch[w->touches++] = i, w->set[i] = w->set[s->ahead[i]] = 1;
-    for (int i = 0; i < c; i++)
-        if (w->set[i]) w->reach[w->reaches++] = i;
+        if (force[i] > 0.0) w->touch[w->touches++] = i;
     if (compliance->lift) { /* between the points that touch: the others are read once, in `finish` */
         hold(compliance, w->touches, w->touch);
         memset(p->z, 0, p->slots * sizeof(double));
@@ -1261,6 +1258,10 @@ static void drag(brush *s, const double *force, const double *free, double *move
         }
         return;
     }
+    memset(w->set, 0, c);
+    for (int a = 0; a < w->touches; a++) w->set[w->touch[a]] = w->set[s->ahead[w->touch[a]]] = 1;
+    for (int i = 0; i < c; i++)
+        if (w->set[i]) w->reach[w->reaches++] = i;
     carry(compliance, w->touches, w->touch);
     plane_drag(compliance, force, force, w->reaches, w->reach, w->some);
     for (int d = 0; d < 2; d++)

@@ -38,8 +38,7 @@ def over(
 
 @pytest.mark.parametrize("slope", [0.1, -0.3, 0.5])
 def test_a_point_on_springs_presses_a_plane_normal_to_it(slope: float) -> None:
-    """f (A_zz + r^2 A_xx) = h, the height that the plane would have under the point at rest; at r = 2 a place read from the
-    last forces would swing with twelve times the amplitude of the one before."""
+    """f (A_zz + r^2 A_xx) = h, the height that the plane would have under the point at rest."""
     compliance = np.diag([ALONG_Z, IN_PLANE, IN_PLANE])
     begun = 2e-3 if slope < 0 else 0.0
     drive = Drive(
