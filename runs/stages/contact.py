@@ -100,9 +100,12 @@ def describe(
 
 
 def meeting(record: Record, contact: ContactProblem, steps: int) -> None:
-    """Record how often a step was solved again for where its points lie, and warn where they were not found."""
+    """Record how often a step was solved for where its points lie, and warn where they were not found."""
     record.indicators |= {
-        "steps solved again where the points have moved to": (contact.repeated, "-"),
+        "solutions of a step, for where its points lie, in the mean": (
+            contact.solutions / steps,
+            "-",
+        ),
         "steps that do not meet the road where the points lie": (contact.unsettled, "-"),
     }
     if contact.unsettled > _ASTRAY * steps:
