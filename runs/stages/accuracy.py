@@ -6,10 +6,11 @@ import shutil
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
+from mpi4py import MPI
 
 from tireroad.contact.grid_patch import MOST, finer_touching, halved, ratio, thinned
 from tireroad.contact.model import TreadContact
@@ -40,6 +41,7 @@ from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.sections.mesh2d import Ring
 from tireroad.fem.static.load_error import carried_over
 from tireroad.fem.static.state import StaticState
+from tireroad.greens.recursion import sharers
 from tireroad.greens.response import Response
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.disk import Refused
@@ -123,7 +125,7 @@ class Given:
 
     Its `job`, static state, patch and road (`setup`, not settled), response and rolling modes; the
     first `steps` of `step` s of its loop, integrated by `scheme`. `most`: touching points that a companion may
-    have (contact.grid_patch.ratio).
+    have (contact.grid_patch.ratio). `comm`: the processes that repeat a loop together, by default those of the job.
     """
 
     job: Job
@@ -135,6 +137,7 @@ class Given:
     steps: int
     scheme: str = "linear"
     most: float = MOST
+    comm: MPI.Comm | None = None
 
     @property
     def points_ratio(self) -> float:
@@ -147,8 +150,16 @@ class Given:
         return equilibrated(self.job, self.setup, self.response, self.static.product.normal_force)
 
     @cached_property
+    def coarser(self) -> tuple[ContactSetup, Response]:
+        """Setup and response of the tire with elements of twice the size. Collective on the job's processes."""
+        with console.quiet():
+            job, done = coarser(self.job, self.static)
+        response, state = done["greens"].product.contact, done["static"].product
+        return equilibrated(job, done["setup"].product, response, state.normal_force), response
+
+    @cached_property
     def longer(self) -> ContactForces:
-        """The run repeated with twice its time step. Collective."""
+        """The run repeated with twice its time step. Collective on `comm`."""
         return self.repeated(self.equilibrated, self.response, coarser=2)
 
     @cached_property
@@ -157,7 +168,7 @@ class Given:
 
         It halves their cost. None if the longer step drops a state or does not resolve the
         contact's oscillation although the run's own step does; the run itself is then the
-        reference. Collective.
+        reference. Collective on `comm`.
         """
         step, spec = 2 * self.step, self.job.scene.contact
         kept = self.response.resolved(step)
@@ -180,10 +191,16 @@ class Given:
         """The same with another job; `base` stays that of the run."""
         return self._keeping("base", job=job)
 
-    def _keeping(self, name: str, **changes: Any) -> Given:
-        """The same with `changes`, and the cached property `name` as here."""
+    def alone(self) -> Given:
+        """The same for this process by itself."""
+        return self._keeping("equilibrated", "coarser", comm=MPI.COMM_SELF)
+
+    def _keeping(self, *names: str, **changes: Any) -> Given:
+        """The same with `changes`, and the cached properties `names` as here; one that cannot be had is left out."""
         other = replace(self, **changes)
-        other.__dict__[name] = getattr(self, name)
+        for name in names:
+            with suppress(ConvergenceError, InputError):
+                other.__dict__[name] = getattr(self, name)
         return other
 
     def repeated(
@@ -195,11 +212,12 @@ class Given:
     ) -> ContactForces:
         """Repeat the loop with another setup (settled), response or `contact`.
 
-        `coarser`: factor on the time step, by default that of `base`. Collective.
+        `coarser`: factor on the time step, by default that of `base`. Collective on `comm`.
         """
         times = coarser or (1 if self.base is None else 2)
         step, steps = times * self.step, self.steps // times
-        return forces(self.job, setup, response, step, steps, self.scheme, contact)
+        comm = self.comm or self.job.comm
+        return forces(self.job, setup, response, step, steps, self.scheme, comm, contact)
 
 
 def equilibrated(
@@ -305,7 +323,7 @@ def _made(
     return part.result() if part else None
 
 
-SHARE = 0.33  # of the run's own cost: budget of all companion runs together
+SHARE = 0.5  # of the run's own cost: budget of all companion runs together
 _FEWEST, _PERIODS = 64, 2  # least steps after the run-in, and periods of `up_to`, to repeat
 # Cost of five companion runs in time loops per repeated step, by the spacing of that of the points.
 _LOOPS = {2.0: 3.5, 0.5: 6.0}
@@ -412,11 +430,7 @@ def fewer_modes(given: Given) -> ContactForces:
 
 def coarser_mesh(given: Given) -> ContactForces:
     """Elements of twice the size, from the static state on. Collective."""
-    job, done = coarser(given.job, given.static)
-    response, state = done["greens"].product.contact, done["static"].product
-    setup = done["setup"].product
-    setup = equilibrated(job, setup, response, state.normal_force)
-    return given.of(job).repeated(setup, response)
+    return given.repeated(*given.coarser)
 
 
 def finer_wall(given: Given) -> tuple[ContactForces, ContactForces | None]:
@@ -444,6 +458,10 @@ COMPANIONS: dict[str, Callable[[Given], ContactForces]] = {
     "mesh": coarser_mesh,
 }
 """By the cause of the error that each estimates (contact.results.error_bars.CAUSES)."""
+
+
+# Which of several processes repeats the loops of a cause: twice as many points take longer than all others.
+_TURN = {"points": 0, "step": 1, "modes": 1, "mesh": 2}
 
 
 class Companion(NamedTuple):
@@ -478,7 +496,8 @@ def _figures(
 def companions(cause: str, given: Given) -> list[Companion]:
     """Companion runs for one cause, without terminal output; their errors add as squares.
 
-    Raises InputError or ConvergenceError if the cause has none. Collective.
+    Raises InputError or ConvergenceError if the cause has none. Collective on the processes of `given`; where these are
+    not those of its job, its coarser mesh is known before.
     """
     with console.quiet():
         beside = None if cause == "step" else given.base
@@ -564,7 +583,8 @@ class AccuracyStage(Computed[Accuracy]):
         return {"contact": self.contact.key, "up_to": self.job.scene.accuracy.up_to}
 
     def compute(self, record: Record) -> Accuracy:
-        """Run the companions one by one; a failed one is reported, its cause absent. Collective."""
+        """Run the companions, beside each other where a process holds a loop by itself; a failed one is reported, its cause
+        absent. Collective."""
         history, setup = self.contact.product, self.setup.product
         if self._at_rest:
             return self._none("nothing excites the tire: its forces vary by rounding only")
@@ -586,14 +606,9 @@ class AccuracyStage(Computed[Accuracy]):
         }
         found: dict[str, dict[str, Bars]] = {name: {} for name in exact}
         absent: dict[str, str] = {}
-        for cause in CAUSES:
-            try:
-                with record.timing(cause):
-                    told = companions(cause, given)
-            except Refused:
-                raise  # a full disk is no property of the run: it must not be kept as one
-            except (ConvergenceError, InputError) as error:
-                absent[cause] = str(error)
+        for cause, told in self._companions(given, record).items():
+            if isinstance(told, Exception):
+                absent[cause] = str(told)
                 continue
             parts = [one.bars(exact, start * history.step, limit, up_to) for one in told]
             for name in exact:
@@ -610,6 +625,36 @@ class AccuracyStage(Computed[Accuracy]):
         record.indicators["errors are estimated up to"] = (product.window, "s")
         _describe(record, product, exact, limit)
         return product
+
+    def _companions(
+        self, given: Given, record: Record
+    ) -> dict[str, list[Companion] | ConvergenceError | InputError]:
+        """The companions of each cause, or why it has none. Collective."""
+        comm = self.job.comm
+
+        def attempted(part: str, run: Callable[[], Any]) -> Any:
+            try:
+                with record.timing(part):
+                    return run()
+            except Refused:
+                raise  # a full disk is no property of the run: it must not be kept as one
+            except (ConvergenceError, InputError) as error:
+                return error
+
+        coarse = attempted("coarser mesh", lambda: given.coarser)
+        lacking = isinstance(coarse, ConvergenceError | InputError)
+        found: dict[str, Any] = {"mesh": coarse} if lacking else {}
+        alone = sharers(given.response.resolved(given.step), comm).size < comm.size
+        one = given.alone() if alone else given
+        for cause in CAUSES:
+            mine = not alone or min(_TURN[cause], comm.size - 1) == comm.rank
+            if mine and cause not in found:
+                found[cause] = attempted(cause, partial(companions, cause, one))
+        if alone:
+            for part, seconds in comm.allgather((found, dict(record.cost))):
+                found |= part
+                record.cost |= seconds
+        return {cause: found[cause] for cause in CAUSES}
 
     def end(self, key: str, product: Accuracy) -> None:
         """Remove the coarser companion's folder, kept to resume. Collective."""

@@ -184,15 +184,16 @@ def forces(
     step: float,
     steps: int,
     scheme: str,
+    comm: MPI.Comm,
     contact=None,
 ) -> ContactForces:
     """Run the loop of the job's scene with another response, step or setup (settled), in memory.
 
     `scheme`: see greens.recursion; `contact` replaces the scene's table. Raises ConvergenceError
-    if the road touches outside the patch. Collective.
+    if the road touches outside the patch. Collective on `comm`.
     """
     setup = rolling_steadily(contact or job.scene.contact, setup, response, step)
-    comm = sharers(response.resolved(step), job.comm)
+    comm = sharers(response.resolved(step), comm)
     rolled = blocks(job, setup, response, step, steps, scheme, comm, contact)
     both = [(block.total_force, block.axle_force) for block in rolled]
     total, axle = map(np.concatenate, zip(*both, strict=True))

@@ -69,6 +69,7 @@ def values(folder, file, name):
         ("contact.h5", "displacement", 1e-6),
         ("contact.h5", "axle_force", 1e-6),
         ("spectra.h5", "axle_force", 1e-6),
+        ("accuracy.h5", "axle_force/points/deviation", 1e-4),  # a difference of two runs
     ],
 )
 def test_results_do_not_depend_on_the_number_of_processes(
@@ -85,8 +86,8 @@ def test_results_do_not_depend_on_the_number_of_processes(
 @pytest.mark.parametrize("processes", [2, 3])
 @pytest.mark.parametrize("name", ["normal_force", "horizontal_force", "axle_force"])
 def test_friction_differs_between_processes_by_less_than_it_is_solved_to(folders, processes, name):
-    """Turns end at a residual of 1e-3 of the largest bound, and the road is met to 1e-2 of the largest deflection of a point under
-    its own force: rounding may end either one time earlier or later. Found: 1.1e-3, 5.3e-3, 3.5e-4."""
+    """Turns end at a residual of 1e-3 of the largest bound, and the road is met to 3 % of the deflections of points under
+    their own forces: rounding may end either one time earlier or later. Found: 1.1e-3, 5.3e-3, 3.5e-4."""
     one, many = (values(folders[n][0], "contact.h5", name) for n in (1, processes))
     assert np.abs(one).max() > 0.0
     assert (

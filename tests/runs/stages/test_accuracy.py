@@ -183,7 +183,7 @@ def test_bars_are_in_the_summary_and_beside_the_bands(whole):
     folder, _ = whole
     stages = json.loads((folder / "summary.json").read_text())["stages"]
     told = stages["accuracy"]
-    assert set(told["cost"]) == set(CAUSES)
+    assert set(told["cost"]) == {*CAUSES, "coarser mesh"}
     assert told["headline"]["error of the mean contact force"]["value"] > 0
     with h5py.File(folder / "accuracy.h5") as file:
         assert set(file["contact_force"]) == set(CAUSES)
