@@ -28,14 +28,15 @@ SCALED = {
 
 @dataclass(frozen=True)
 class Parameter:
-    """A free factor of the built-in tire: name, `spread` (the factor at one standard deviation), range, and
-    what it multiplies."""
+    """A free factor of the built-in tire: name, `spread` (the factor at one standard deviation), range, what it
+    multiplies, and whether the tire on the road, standing, depends on it (`on_road`)."""
 
     name: str
     spread: float
     least: float
     most: float
     doc: str
+    on_road: bool = True
 
     @property
     def deviation(self) -> float:
@@ -45,13 +46,15 @@ class Parameter:
 
 # Spreads from the ranges of docs/radial-tire.md.
 PARAMETERS = (
-    Parameter("density", 1.15, 0.6, 1.6, "densities of all compounds"),
+    Parameter("density", 1.15, 0.6, 1.6, "densities of all compounds", on_road=False),
     Parameter("tread", 1.25, 0.4, 3.0, "modulus of the tread"),
     Parameter("skim", 1.25, 0.4, 3.0, "modulus of the belt skim"),
     Parameter("sidewall", 1.5, 0.2, 4.0, "moduli of sidewall and ply rubber"),
     Parameter("apex", 1.3, 0.1, 4.0, "modulus of the apex"),
     Parameter("carcass", 1.5, 0.2, 5.0, "modulus of the carcass cords"),
-    Parameter("dynamic", 1.25, 0.87, 1.7, "dynamic over static modulus of all compounds"),
+    Parameter(
+        "dynamic", 1.25, 0.87, 1.7, "dynamic over static modulus of all compounds", on_road=False
+    ),
 )
 
 

@@ -13,7 +13,7 @@ deflection (m) and load (N).
 
 Mass, modes and damping come from Fourier series around the inflated section (fem.sections.inflated,
 a second each); load, stiffness and footprint from the stages static and stiffness on a coarse mesh,
-whose ratio to the default mesh is taken from a last run there.
+by the ratio of the default mesh to it, of the tire as built and then of the fitted one.
 
 The factors f_k are those of the most likely tire: they minimise
 
@@ -31,7 +31,7 @@ import re
 import tempfile
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -53,6 +53,7 @@ from tireroad.runs.scene import files
 LOADS, PRINTS = 0.03, 0.05  # relative tolerance of the load at a deflection, of a footprint's sizes
 ALIKE = 4  # points of a curve from which on their errors are one another's
 MODES = "lateral", "yaw", "windup", "vertical"
+_FREE = {"mass", *(f"{mode}_{what}" for mode in MODES for what in ("frequency", "damping"))}
 _LOAD_RANGES = ((0.0, 0.5), (0.0, 1e6))
 _PRINT_RANGES = ((10.0, 1e6), (0.01, 1.0), (0.01, 1.0))
 _EXAMPLE = {"size": '"205/55 R16"', "inflation": "2.4e5   # Pa"}
@@ -68,14 +69,18 @@ _UNITS: Mapping[str, tuple[str, tuple[str, ...]]] = {
 """What a .tir file calls the SI units."""
 _CURVE = "DEFLECTION_LOAD_CURVE"
 _MOST_LOADS = 3  # points of a curve that are fitted
-_STEP = 0.1  # of the finite differences, and the largest of an iteration is _TRUST
-_TRUST = 0.5
-_ITERATIONS = 8
+_TRUST, _LEAST = 0.5, 0.03  # largest change of a logarithm in an iteration; one at which they end
+# Steps of finite differences, and those of figures on the road, where nodes come into contact one by one.
+_STEP, _ROAD_STEP = 0.02, 0.2
+_ITERATIONS = 40
+# Times that the weights of an iteration are taken at most, and the change of a logarithm at which they stay.
+_REWEIGHTED, _SETTLED = 60, 1e-4
 _COMPUTED = 6  # deflections of a run on the road
 _SAME = 5e-7  # a factor that is 1
-_ENOUGH = 0.02  # of a residual: change of the sum's root at which iterations end
+# Decrease of the misfit, and share of it, that is none: a tenth of a standard deviation of one factor.
+_ENOUGH, _SHARE = 0.01, 0.01
 ELEMENTS, ORDER = 26, 2
-COARSE = 20, 20  # elements around, and from bead to bead, of the runs on the road
+COARSE = 14, 14  # elements around, and from bead to bead, of the runs on the road
 _LOSSES = ("tread", "other")  # factors of the loss factors, fitted to the damping ratios afterwards
 _LOSS, _LOSS_SPREAD = (0.1, 3.0), 1.0  # range, and standard deviation of a factor
 _SHARP, _KNEE = 4.0, 0.125  # of rho: weight of a residual, and where it turns linear, in tolerances
@@ -143,8 +148,7 @@ class FitFigures:
     @property
     def pressed(self) -> bool:
         """Whether there are figures of the tire on the road."""
-        modal = {"mass", *(f"{mode}_{what}" for mode in MODES for what in ("frequency", "damping"))}
-        return bool(self.loads or self.footprints or set(self.values) - modal)
+        return bool(self.loads or self.footprints or set(self.values) - _FREE)
 
     @property
     def targets(self) -> dict[str, float]:
@@ -518,6 +522,7 @@ class Model:
         self.figures, self.ratios = figures, dict[str, float]()
         self._known: dict[str, dict[str, float]] = {}  # figures on the road by scene
         self.names = [name for name in figures.targets if not name.endswith("damping")]
+        self.on_road = np.array([name not in _FREE for name in self.names], dtype=bool)
 
     def free(self, factors: Mapping[str, float]) -> dict[str, float]:
         """Mass, frequencies and damping ratios of the inflated tire on its rim."""
@@ -542,7 +547,10 @@ class Model:
         return self._known[scene]
 
     def _scene(self, factors: Mapping[str, float], mesh: tuple[int, int] | None) -> str:
-        text = tire_table(self.figures, factors)
+        of_static_state = {
+            one.name: factors.get(one.name, 1.0) for one in PARAMETERS if one.on_road
+        }
+        text = tire_table(self.figures, of_static_state)
         if mesh:
             text = text.replace(
                 "[tire]\n", f"[tire]\nsegments = {mesh[0]}\nelements_arc = {mesh[1]}\n", 1
@@ -595,6 +603,11 @@ class Model:
                 found[name] = value * self.ratios.get(name, 1.0)
         return found
 
+    def correct(self, factors: Mapping[str, float]) -> None:
+        """Take the ratios of the default to the coarse mesh from the tire with these factors."""
+        coarse, fine = (self.pressed(factors, mesh) for mesh in (COARSE, None))
+        self.ratios = {name: value / coarse[name] for name, value in fine.items()}
+
     def residuals(self, found: Mapping[str, float]) -> np.ndarray:
         """Logarithms of ratios to the targets over the tolerances."""
         targets = self.figures.targets
@@ -631,47 +644,147 @@ def _run(folder: Path) -> Path:
 
 
 def fit(figures: FitFigures) -> Fitted:
-    """The most likely factors. Not collective; minutes with figures on the road, else seconds."""
+    """The most likely factors. Not collective; half an hour with figures on the road, else seconds."""
     model = Model(figures)
-    low, high = (np.log([getattr(one, end) for one in PARAMETERS]) for end in ("least", "most"))
-    drawn = np.diag([1 / one.deviation for one in PARAMETERS])
-    place = np.zeros(len(PARAMETERS))
-    start = found = model.all({})
-    console.say(f"  {figures.size} as built: {_worst(model, found)}")
-    jacobian = _jacobian(model, place, found) if model.names else np.zeros((0, len(place)))
-    for iteration in range(_ITERATIONS if model.names else 0):
-        rest = model.residuals(found)
-        weight = _weights(rest)
-        wanted = np.concatenate([-weight * rest, -drawn @ place])
-        bounds = np.maximum(low - place, -_TRUST), np.minimum(high - place, _TRUST)
-        matrix = np.vstack([weight[:, None] * jacobian, drawn])
-        step = lsq_linear(matrix, wanted, bounds=bounds).x
-        if np.abs(step).max() < 1e-3:
-            break
-        new = model.all(_factors(place + step))
-        change = model.residuals(new) - rest
-        # Broyden: the Jacobian that explains what was seen.
-        jacobian += np.outer(change - jacobian @ step, step) / (step @ step)
-        before, after = (
-            _misfit(model.residuals(one), drawn @ at)
-            for one, at in ((found, place), (new, place + step))
-        )
-        console.say(f"  iteration {iteration + 1}: {_worst(model, new)}")
-        if after < before:
-            place, found = place + step, new
-        if before - after < _ENOUGH * max(before, 1.0):
-            if figures.pressed and not model.ratios:
-                found = _corrected(model, place, found)
-                continue
-            break
-    factors = _factors(place)
     if figures.pressed:
-        found = model.free(factors) | model.pressed(factors, None)
-        console.say(f"  on the default mesh: {_worst(model, found)}")
-        start = dict(start) | model.pressed({}, None)
+        model.correct({})
+    start = model.all({})
+    console.say(f"  {figures.size} as built: {_worst(model, start)}")
+    best = _least(model, np.zeros(len(PARAMETERS)))
+    if figures.pressed:
+        model.correct(_factors(best.place))  # the coarse mesh errs as for this tire from here on
+        ends = [best, _least(model, best.place)]
+        best = min((end.on_default_mesh(model) for end in ends), key=lambda end: end.misfit)
+        console.say(f"  on the default mesh: {_worst(model, best.found)}")
+    factors = _factors(best.place)
     factors |= _losses(figures, factors)
-    weighted = _weights(model.residuals(found))[:, None] * jacobian if model.names else jacobian
-    return Fitted(figures, factors, start, found | model.free(factors), _left(weighted, drawn))
+    left = _left(_weights(best.rest)[:, None] * best.jacobian)
+    return Fitted(figures, factors, start, dict(best.found) | model.free(factors), left)
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Logarithms of the factors, the figures `found` there, their residuals `rest` (n,) and the `jacobian`
+    (n, factors) of these."""
+
+    place: np.ndarray
+    found: Mapping[str, float]
+    rest: np.ndarray
+    jacobian: np.ndarray
+
+    @property
+    def misfit(self) -> float:
+        """Misfit of the figures and factors, which is minimised."""
+        return _misfit(self.rest, self.place)
+
+    def expected(self, step: np.ndarray) -> float:
+        """Decrease of the misfit by a step if residuals were linear."""
+        return self.misfit - _misfit(self.rest + self.jacobian @ step, self.place + step)
+
+    def on_default_mesh(self, model: Model) -> _Place:
+        """The same factors with the figures of the default mesh."""
+        factors = _factors(self.place)
+        found = model.free(factors) | model.pressed(factors, None)
+        return replace(self, found=found, rest=model.residuals(found))
+
+
+def _least(model: Model, start: np.ndarray) -> _Place:
+    """The place of least misfit, from `start` on by the least misfit of linearised residuals within a radius.
+
+    It ends where a Jacobian that was taken at that very place, and what was seen since, expect no decrease,
+    and none of the neighbouring sets of factors by which it was taken has a smaller misfit.
+    """
+    if not model.names:
+        return _Place(start, model.all(_factors(start)), np.zeros(0), np.zeros((0, len(start))))
+    here, radius = _differentiated(model, start), _TRUST
+    tested = start
+    for iteration in range(_ITERATIONS):
+        step = _step(here, radius)
+        expected = here.expected(step)
+        if expected < _ENOUGH + _SHARE * here.misfit or radius < _LEAST:
+            if np.array_equal(tested, here.place):
+                break
+            tested = here.place
+            here, radius = _differentiated(model, here.place), _ROAD_STEP
+            continue
+        there = _moved(model, here, step)
+        gained = here.misfit - there.misfit
+        if gained < 0.25 * expected:
+            radius = 0.5 * float(np.abs(step).max())
+        elif gained > 0.75 * expected:
+            radius = min(2 * radius, _TRUST)
+        told = "" if gained > 0 else ", not taken"
+        console.say(f"  iteration {iteration + 1}: misfit {there.misfit:.4g}{told}")
+        here = there if gained > 0 else replace(here, jacobian=there.jacobian)
+    console.say(f"  misfit {here.misfit:.4g}: {_worst(model, here.found)}")
+    return here
+
+
+def _step(here: _Place, radius: float) -> np.ndarray:
+    """The step (factors,) to the least misfit of linearised residuals, no logarithm by more than the radius.
+
+    Squares with weights that have the slope of rho, taken anew until they stay.
+    """
+    low, high = _ranges()
+    bounds = np.maximum(low - here.place, -radius), np.minimum(high - here.place, radius)
+    drawn = np.diag(1 / _deviations())
+    step = np.zeros(len(here.place))
+    for _ in range(_REWEIGHTED):
+        weight = _weights(here.rest + here.jacobian @ step)
+        matrix = np.vstack([weight[:, None] * here.jacobian, drawn])
+        wanted = np.concatenate([-weight * here.rest, -drawn @ here.place])
+        last, step = step, lsq_linear(matrix, wanted, bounds=bounds).x
+        if np.abs(step - last).max() < _SETTLED:
+            break
+    return step
+
+
+def _moved(model: Model, here: _Place, step: np.ndarray) -> _Place:
+    """The place a step further; of figures on the road with the Jacobian that explains what was seen (Broyden)."""
+    place = np.clip(here.place + step, *_ranges())
+    found = model.all(_factors(place))
+    rest = model.residuals(found)
+    jacobian = here.jacobian + np.outer(rest - here.rest - here.jacobian @ step, step) / (
+        step @ step
+    )
+    jacobian[~model.on_road] = _free_rows(model, place, found, rest)
+    return _Place(place, found, rest, jacobian)
+
+
+def _differentiated(model: Model, place: np.ndarray) -> _Place:
+    """The place with a new Jacobian; in its stead the best of the places by which it is taken if that is better.
+
+    These are nearer to the tire as built in one factor each.
+    """
+    found = model.all(_factors(place))
+    rest = model.residuals(found)
+    jacobian = np.zeros((len(rest), len(place)))
+    beside = []
+    for k, one in enumerate(PARAMETERS):
+        by = -_ROAD_STEP if place[k] > 0 else _ROAD_STEP
+        moved = place + by * (np.arange(len(place)) == k)
+        there = model.all(_factors(moved))
+        jacobian[:, k] = (model.residuals(there) - rest) / by
+        beside.append(_Place(moved, there, model.residuals(there), jacobian))
+        console.say(f"  sensitivity to {one.name}: {one.doc}")
+    least = _ENOUGH + _SHARE * _misfit(rest, place)
+    best = min(beside, key=lambda one: one.misfit)
+    if best.misfit > _misfit(rest, place) - least:
+        best = _Place(place, found, rest, jacobian)
+    jacobian[~model.on_road] = _free_rows(model, best.place, best.found, best.rest)
+    return best
+
+
+def _free_rows(
+    model: Model, place: np.ndarray, found: Mapping[str, float], rest: np.ndarray
+) -> np.ndarray:
+    """Rows of the Jacobian that are those of the free tire; a second each."""
+    columns = []
+    for k in range(len(place)):
+        factors = _factors(place + _STEP * (np.arange(len(place)) == k))
+        there = model.residuals(dict(found) | model.free(factors))
+        columns.append((there - rest)[~model.on_road] / _STEP)
+    return np.array(columns).T
 
 
 def _weights(rest: np.ndarray) -> np.ndarray:
@@ -679,42 +792,32 @@ def _weights(rest: np.ndarray) -> np.ndarray:
     return _SHARP * np.sqrt(np.minimum(1.0, _KNEE / np.maximum(np.abs(rest), 1e-12)))
 
 
-def _misfit(rest: np.ndarray, drawn: np.ndarray) -> float:
-    """Root of what is minimised."""
+def _misfit(rest: np.ndarray, place: np.ndarray) -> float:
+    """Misfit at residuals and logarithms of factors: the sum that is minimised."""
     size = np.abs(rest)
     rho = _SHARP**2 * np.where(size < _KNEE, size**2, _KNEE * (2 * size - _KNEE))
-    return math.sqrt(float(rho.sum() + drawn @ drawn))
+    return float(rho.sum() + np.sum((place / _deviations()) ** 2))
 
 
-def _left(jacobian: np.ndarray, drawn: np.ndarray) -> dict[str, float]:
+def _left(jacobian: np.ndarray) -> dict[str, float]:
     """Standard deviation of each parameter's logarithm with the figures, over that without them."""
-    spread = np.linalg.inv(jacobian.T @ jacobian + drawn @ drawn)
-    shares = np.sqrt(np.diag(spread)) * np.diag(drawn)
+    spread = np.linalg.inv(jacobian.T @ jacobian + np.diag(_deviations() ** -2.0))
+    shares = np.sqrt(np.diag(spread)) / _deviations()
     return {one.name: float(share) for one, share in zip(PARAMETERS, shares, strict=True)}
 
 
-def _corrected(model: Model, place: np.ndarray, found: Mapping[str, float]) -> dict[str, float]:
-    """Take the ratio of the default to the coarse mesh from here on; the figures by it."""
-    fine = model.pressed(_factors(place), None)
-    model.ratios = {name: value / found[name] for name, value in fine.items()}
-    console.say("  ratios of the default mesh to the coarse one are known from here on")
-    return dict(found) | fine
+def _deviations() -> np.ndarray:
+    return np.array([one.deviation for one in PARAMETERS])
+
+
+def _ranges() -> tuple[np.ndarray, np.ndarray]:
+    """Least and largest logarithm of each factor."""
+    low, high = (np.log([getattr(one, end) for one in PARAMETERS]) for end in ("least", "most"))
+    return low, high
 
 
 def _factors(place: np.ndarray) -> dict[str, float]:
     return {one.name: float(np.exp(p)) for one, p in zip(PARAMETERS, place, strict=True)}
-
-
-def _jacobian(model: Model, place: np.ndarray, found: Mapping[str, float]) -> np.ndarray:
-    columns = []
-    for k, one in enumerate(PARAMETERS):
-        moved = place.copy()
-        moved[k] += _STEP
-        columns.append(
-            (model.residuals(model.all(_factors(moved))) - model.residuals(found)) / _STEP
-        )
-        console.say(f"  sensitivity to {one.name}: {one.doc}")
-    return np.array(columns).T
 
 
 def _worst(model: Model, found: Mapping[str, float]) -> str:

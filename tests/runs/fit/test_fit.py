@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.sections.inflated import InflatedRing
 from tireroad.runs import fit as fitting
 from tireroad.runs.cli import main
-from tireroad.runs.factors import PLAUSIBLE
+from tireroad.runs.factors import PARAMETERS, PLAUSIBLE
 from tireroad.runs.fit import (
     KINDS,
     FitFigures,
@@ -152,6 +153,85 @@ def test_figures_of_no_one_tire_are_named(coarse: None) -> None:
     for name in strange:
         assert f"{name} x {found.factors[name]:.2f}" in told
     assert "vertical_frequency (-" in told.split("not reached within twice the tolerance: ")[1]
+
+
+def misfit_of(model: Model, factors: dict[str, float]) -> float:
+    """What a fit minimises, at these factors."""
+    place = np.log([factors[one.name] for one in PARAMETERS])
+    return fitting._misfit(model.residuals(model.all(factors)), place)
+
+
+def neighbours(factors: dict[str, float]) -> Iterator[dict[str, float]]:
+    """Sets of factors with one of them 5 or 20 % off, within its range."""
+    for one in PARAMETERS:
+        for by in (0.8, 0.95, 1.05, 1.2):
+            if one.least < factors[one.name] * by < one.most:
+                yield factors | {one.name: factors[one.name] * by}
+
+
+def free_by_formula(model: Model, factors: Mapping[str, float]) -> dict[str, float]:
+    """Mass and frequencies in closed form, about as those of 205/55 R16."""
+    density, sidewall, apex, carcass, dynamic = (
+        np.log(factors.get(name, 1.0))
+        for name in ("density", "sidewall", "apex", "carcass", "dynamic")
+    )
+    logarithms = {
+        "mass": 2.243 + 0.85 * density,
+        "lateral_frequency": 3.841 + 0.15 * (sidewall + dynamic) + 0.06 * apex - 0.42 * density,
+        "yaw_frequency": 4.064 + 0.11 * (sidewall + dynamic) + 0.05 * apex - 0.42 * density,
+        "windup_frequency": 4.2 + 0.3 * (sidewall + dynamic) + 0.05 * apex - 0.45 * density,
+        "vertical_frequency": 4.339 + 0.12 * (sidewall + dynamic) + 0.1 * carcass - 0.43 * density,
+    }
+    return {name: float(np.exp(value)) for name, value in logarithms.items()}
+
+
+def pressed_by_formula(
+    model: Model, factors: Mapping[str, float], mesh: tuple[int, int] | None
+) -> dict[str, float]:
+    """Figures on the road in closed form, curved as those of a tire are, and on the coarse mesh 1 % rough."""
+    tread, skim, sidewall, apex, carcass = (
+        np.log(factors.get(name, 1.0)) for name in ("tread", "skim", "sidewall", "apex", "carcass")
+    )
+    rough = 0.01 * np.sin(40 * (tread + 2 * sidewall + skim)) if mesh else 0.0
+    logarithms = {
+        "longitudinal_stiffness": 12.83 + 0.3 * tread + 0.35 * sidewall + 0.15 * apex,
+        "lateral_stiffness": 12.04 + 0.2 * tread + 0.3 * sidewall - 0.25 * sidewall**2 + 0.1 * apex,
+        "torsional_stiffness": 8.62 + 0.45 * tread + 0.4 * tread**2 + 0.15 * skim,
+        "load at 18.2 mm": 8.25 + 0.15 * sidewall + 0.08 * carcass**3 + 0.03 * skim,
+        "load at 32.4 mm": 8.93 + 0.17 * sidewall + 0.1 * carcass - 0.02 * tread,
+    }
+    return {name: float(np.exp(value + rough)) for name, value in logarithms.items()}
+
+
+def test_no_neighbouring_tire_is_better(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures that no one tire has (205/55 R16): a step that fails must not end the fit, nor roughness of 1 %."""
+    monkeypatch.setattr(Model, "free", free_by_formula)
+    monkeypatch.setattr(Model, "pressed", pressed_by_formula)
+    figures = FitFigures(
+        size="205/55 R16",
+        inflation=2.4e5,
+        load=5026.7,
+        rim_width=0.1651,
+        values={
+            "mass": 8.1,
+            "lateral_frequency": 42.4,
+            "yaw_frequency": 50.3,
+            "windup_frequency": 54.1,
+            "vertical_frequency": 69.7,
+            "longitudinal_stiffness": 229e3,
+            "lateral_stiffness": 111e3,
+            "torsional_stiffness": 2368.0,
+        },
+        loads=((0.0182, 3015.5), (0.0324, 6031.0)),
+    )
+    found = fit(figures)
+    model = Model(figures)
+    monkeypatch.setattr(Model, "pressed", lambda by, f, mesh: pressed_by_formula(by, f, None))
+    reached = misfit_of(model, dict(found.factors))
+    built = misfit_of(model, {one.name: 1.0 for one in PARAMETERS})
+    assert reached < 0.5 * built
+    for factors in neighbours(dict(found.factors)):
+        assert misfit_of(model, factors) > reached - 0.02 * reached
 
 
 def test_the_scene_has_the_fitted_tire(tmp_path: Path) -> None:
