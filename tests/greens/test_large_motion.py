@@ -9,6 +9,8 @@ import tireroad as tr
 from tireroad.contact.loop import ContactProblem, Drive, Loop
 from tireroad.contact.setup import nodes_within
 from tireroad.contact.solver.active_set import ActiveSet
+from tireroad.contact.solver.stick_slip import BrushFriction
+from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import winkler_compliance
 from tireroad.fem.matrices.compliance import multiply, on_own_rows, solve_all
 from tireroad.fem.matrices.probe import nodes
@@ -68,11 +70,15 @@ class Case:
     def large(self, ahead=False):
         return LargeTire(self.linear(ahead=ahead), self.trained.force, self.points.shape[0])
 
-    def loop(self, tire):
-        count = len(self.patch.points)
-        tread = winkler_compliance(self.patch.area, BED)
-        solver = ActiveSet(tire.same_step[:count, :count] + tread)
-        return Loop(tire, ContactProblem(self.patch, tire.same_step, solver))
+    def loop(self, tire, coefficient=0.0):
+        patch, count = self.patch, len(self.patch.points)
+        tread = winkler_compliance(patch.area, BED)
+        solver, friction = ActiveSet(tire.same_step[:count, :count] + tread), None
+        if coefficient:
+            law = BrushLaw(1e5, coefficient, kind="spring")
+            brush = Brush(law, patch.points[:, 0], patch.line, 0.0, STEP)
+            friction = BrushFriction(brush, tire.same_step, None)
+        return Loop(tire, ContactProblem(patch, tire.same_step, solver, friction))
 
 
 def rising(time):
@@ -144,13 +150,14 @@ def test_vectors_loads_at_rest_and_rolling_and_with_moduli_over_frequency(expone
     assert np.allclose(whole, wanted, rtol=0, atol=1e-7 * abs(wanted).max())
 
 
-def test_a_rise_in_time_is_that_of_nonlinear_elements(case):
+@pytest.mark.parametrize("friction", [0.0, 0.5])
+def test_a_rise_in_time_is_that_of_nonlinear_elements(case, friction):
     given = {"operators": case.operators, "damping": DAMPING, "step": STEP}
     given |= {"outputs": case.points, "loads": case.points}
-    exact = forces(case.loop(NonlinearTire(inflation=INFLATION, **given)))
-    straight = forces(case.loop(FullTire(rotation=None, speed=0.0, **given)))
+    exact = forces(case.loop(NonlinearTire(inflation=INFLATION, **given), friction))
+    straight = forces(case.loop(FullTire(rotation=None, speed=0.0, **given), friction))
     large = case.large()
-    found = forces(case.loop(large))
+    found = forces(case.loop(large, friction))
     size = np.sqrt(np.mean((exact - case.state.load) ** 2))
     off, far = (np.sqrt(np.mean((one - exact) ** 2)) / size for one in (found, straight))
     assert off < 0.04
