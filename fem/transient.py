@@ -20,7 +20,7 @@ from scipy import sparse
 
 from tireroad.fem.cavity import Column
 from tireroad.fem.collective import summed
-from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.fem.errors import ConvergenceError, InputError, NearlySingular
 from tireroad.fem.matrices.compliance import (
     factorise,
     multiply,
@@ -28,6 +28,7 @@ from tireroad.fem.matrices.compliance import (
     rotating_damping,
     rotating_stiffness,
     solve_columns,
+    symmetric,
 )
 from tireroad.fem.matrices.operators import Operators, RimMotion, Rotation, carried_pencil
 from tireroad.fem.nonlinear.force import RestoringForce
@@ -319,13 +320,9 @@ class FullTire:
         diagonal.array[:] += (1 - self._a) / (self._beta * step**2) * self._mass
         system.setDiagonal(diagonal)
         system.setOption(PETSc.Mat.Option.SYMMETRIC, speed == 0)
-        self._solver = factorise(system)
         self._columns = on_own_rows(operators, loads).toarray()
-        self._modal, self._system = modal, system
-        self._with_modes = modal.solver_with(self._by_factors, share) if modal else None
-        # Full motion per unit force at the end of a step: the response of a step is then one
-        # product.
-        self._answer = self._solved_columns(self._columns)
+        self._modal, self._share = modal, share
+        self._take(system)
         self._tire = len(self._mass)
         self.wheel, self._air = wheel, None
         if air or wheel:
@@ -334,6 +331,16 @@ class FullTire:
         n = len(self._mass)
         self.displacement, self.velocity, self.acceleration, self.balanced = np.zeros((4, n))
         self._vectors = system.createVecs()
+
+    def _take(self, system: PETSc.Mat) -> None:
+        """Factorise the matrix of a step, and take what follows from it. Collective."""
+        self._system, self._solver = system, factorise(system)
+        self._with_modes = None
+        if self._modal:
+            self._with_modes = self._modal.solver_with(self._by_factors, self._share)
+        # Full motion per unit force at the end of a step: the response of a step is then one
+        # product.
+        self._answer = self._solved_columns(self._columns)
 
     def _with(self, air: Column | None, wheel: MovingWheel | None) -> AirStep | WheelStep:
         """Include air or wheel: append its unknowns to all arrays with one row each. Collective."""
@@ -465,6 +472,11 @@ class FullTire:
 TOLERANCE = 1e-9  # of the largest displacement
 _FLOOR = 1e-11  # of the wall's thickness: rounding of F
 MOST_TURNS = 60
+_MOST_MET = 500  # solutions of the contact in one of them
+# An iteration that leaves more than this of what the last one left is followed by a new factor: one
+# takes as long as some ten iterations between few points, and as a hundred between many.
+SLOW = 0.3
+_PART = 0.1  # of what is out of balance: changes of the contact's forces that are not felt
 
 
 class NonlinearTire(FullTire):
@@ -473,16 +485,24 @@ class NonlinearTire(FullTire):
     FullTire's interface plus `settle`: after each contact solve it tells whether the motion is in
     equilibrium, or for which free displacement to solve the contact again. `operators` are those of
     the static state at `inflation` (Pa); `turning`: rotation matrices and rolling of that state,
-    None: standing. `turns`: iterations so far. All methods are collective.
+    None: standing. `turns`: iterations so far, `factors`: matrices factorised. All methods are collective.
 
         M u'' + (D + 2 Omega G) u' + F(u) = W^T f + f_static,   D = gamma1 M + gamma2 K,
 
     F being the internal forces of the hyperelastic wall and its cords, the follower pressure and, for a
     rotating wheel, the steady-rolling forces (fem.static.virtual_work) at the total displacement, K
     their tangent at the static state. The integration method is that of `fem.transient` (Wood,
-    Bossak and Zienkiewicz); the two differ in F only. Each step is solved by iterations with the
-    factorisation of the linear step, to which inertia keeps the true tangent close; contact is solved
-    in each iteration.
+    Bossak and Zienkiewicz); the two differ in F only.
+
+    Each step is solved by Newton's method with the factor of the matrix of a step
+
+        A = (1 - a) M / (beta h^2) + (gamma / (beta h)) (D + 2 Omega G) + K_Omega + dF/du (u_k) - K,
+
+    that of the linear step first, and taken anew at the present motion where an iteration leaves more
+    than `SLOW` of what was out of balance. The contact is solved in each iteration. Its own matrix stays
+    that of the linear step, S_0 = W A_0^-1 W^T: for forces f' near f it is given the displacement
+    w(f) - S_0 f + (S - S_0) (f' - f), with f' of its last solution, and solved again until f' stays. That
+    needs steps in which inertia counts: contact and tire are to respond less than twice as much as in S_0.
     """
 
     def __init__(
@@ -513,13 +533,23 @@ class NonlinearTire(FullTire):
         )
         self._small = _FLOOR * operators.body.ring.thickness
         self._elastic = np.zeros(len(self._mass))
-        self.turns = 0
+        self._beyond = np.zeros_like(self.same_step)  # S - S_0
+        self._met = np.zeros(self.same_step.shape[1])
+        self._linear: PETSc.Mat | None = None
+        self._factored: np.ndarray | None = None  # the motion at which the matrix was taken
+        self.turns, self.factors = 0, 1
 
     def predict(self) -> np.ndarray:
         """First estimate of the displacement (r,) m at the end of the step without new force."""
-        self._tried = 0
+        self._tried, self._meetings, self._off = 0, 0, np.inf
+        self._again = False
+        self._free = self._predicted()
+        return self._seen()
+
+    def _predicted(self) -> np.ndarray:
+        """Displacement (own rows) at the end of the step without force, if the present factor were exact."""
         here = self.displacement
-        return self._freed(here - self._solved(self._dynamic(here) + self._elastic))
+        return here - self._solved(self._dynamic(here) + self._elastic)
 
     def settle(self, force: np.ndarray) -> np.ndarray | None:
         """None if the motion under a force (k,) N is in equilibrium; then call `advance`.
@@ -527,28 +557,73 @@ class NonlinearTire(FullTire):
         Otherwise a better displacement (r,) m without new force, for which to solve the contact
         again. Raises ConvergenceError after MOST_TURNS iterations.
         """
+        felt = float(abs(self._beyond @ (force - self._met)).max(initial=0.0))
+        self._met = force.copy()
         new = self._free + self._answer @ force
+        size = self._largest(new)
+        enough = TOLERANCE * size + self._small
+        if felt > max(_PART * min(self._off, size), enough) and self._meetings < _MOST_MET:
+            self._meetings += 1
+            return self._seen()
+        self._tried, self._meetings = self._tried + 1, 0
         elastic = self._force.change(new)
         defect = self._dynamic(new) + elastic - self._columns @ force
         change = self._solved(defect)
-        largest = (float(abs(v).max(initial=0.0)) for v in (change, new))
-        off, size = (self.comm.allreduce(v, op=MPI.MAX) for v in largest)
+        off = self._largest(change)
         self.turns += 1
-        if off <= TOLERANCE * size + self._small:
+        if max(off, felt) <= enough:
             self._elastic = elastic
             return None
-        self._tried += 1
         if self._tried > MOST_TURNS or not np.isfinite(off):
-            raise ConvergenceError(
-                f"full finite elements: a step of {self._step:g} s leaves {off:.1e} m of "
-                f"{size:.1e} m out of balance after {self._tried} iterations; the motion is too large for "
-                "the step or the tire buckles: take a smaller step or a smaller motion."
-            )
-        return self._freed(new - change - self._answer @ force)
+            raise self._stuck(off, size)
+        if off > self._off and not self._again:
+            # Too far from the motion of the step before to be led back.
+            self._again, self._off = True, np.inf
+            self._factor_at(self.displacement)
+            self._free = self._predicted()
+            return self._seen()
+        if off > SLOW * self._off:
+            try:
+                self._factor_at(new)
+            except NearlySingular:
+                raise self._stuck(off, size) from None
+            change = self._solved(defect)
+        self._off = off
+        self._free = new - change - self._answer @ force
+        return self._seen()
 
-    def _freed(self, free: np.ndarray) -> np.ndarray:
-        self._free = free
-        return summed(self.comm, self._outputs @ free)
+    def _largest(self, values: np.ndarray) -> float:
+        """Largest magnitude among the rows of all processes."""
+        return self.comm.allreduce(float(abs(values).max(initial=0.0)), op=MPI.MAX)
+
+    def _stuck(self, off: float, size: float) -> ConvergenceError:
+        return ConvergenceError(
+            f"full finite elements: a step of {self._step:g} s leaves {off:.1e} m of "
+            f"{size:.1e} m out of balance after {self._tried} iterations; the motion is too large for "
+            "the step or the tire buckles: take a smaller step or a smaller motion."
+        )
+
+    def _factor_at(self, motion: np.ndarray) -> None:
+        """Factorise the matrix of a step at a motion (own rows)."""
+        tangent, different = self._force.tangent, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN
+        if self._linear is None:
+            rest = np.zeros_like(motion)
+            at_rest, self._linear = tangent(rest, rest), self._system.copy()
+            self._linear.axpy(-1.0, at_rest, different)
+            at_rest.destroy()
+        now, known = tangent(motion, motion), symmetric(self._system)
+        now.axpy(1.0, self._linear, different)
+        now.setOption(PETSc.Mat.Option.SYMMETRIC, known)
+        self._solver.destroy()
+        self._system.destroy()
+        self._take(now)
+        self._beyond = summed(self.comm, self._outputs @ self._answer) - self.same_step
+        self._factored = motion.copy()
+        self.factors += 1
+
+    def _seen(self) -> np.ndarray:
+        """Displacement (r,) m without new force for which the contact is solved with S_0."""
+        return summed(self.comm, self._outputs @ self._free) + self._beyond @ self._met
 
     def _dynamic(self, new: np.ndarray) -> np.ndarray:
         """Inertia and damping forces, N, if the step ends at displacement `new` (own rows)."""
@@ -559,10 +634,21 @@ class NonlinearTire(FullTire):
         balanced = (1 - a) * acceleration + a * self.acceleration
         return self._mass * balanced + self._product(rate)
 
+    def snapshot(self) -> dict[str, np.ndarray]:
+        """FullTire.snapshot, with the motion of the factor if it was taken anew, and the last forces."""
+        kept = super().snapshot() | {"met": self._met}
+        if self._factored is not None:
+            spread, everywhere = self._operators.spread, self._operators.body.everywhere
+            kept["factored"] = everywhere(spread(self._factored))
+        return kept
+
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """Continue from a snapshot, before `predict`; written by any number of processes."""
         super().restore(state)
+        self._met = state["met"]
         self._elastic = self._force.change(self.displacement)
+        if "factored" in state:
+            self._factor_at(self._operators.restrict(state["factored"][self._operators.body.ids]))
 
     def energy(self) -> float:
         """Kinetic energy and energy stored since the static state, J; standing wheel only."""

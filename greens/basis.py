@@ -163,18 +163,21 @@ def regained(
     uniform: np.ndarray,
     outputs: sparse.csr_matrix,
     loads: sparse.csr_matrix,
+    full: Basis | None = None,
 ) -> Statics:
     """Static answers of the modes under true damping less those under the full matrices' damping.
 
     Added to the answers of the full matrices, they yield those of matrices that damp the modes
-    truly and all other motions uniformly. `true`, `uniform`: K~ of both.
+    truly and all other motions uniformly. `true`, `uniform`: K~ of both; `full`: the basis with what the
+    probes are in the full matrices, if they are others there.
     """
     own = basis.projection.squares > 0
     flexible = np.pad(own, (0, len(true) - len(own)), constant_values=True)  # the air's are
-    seen = basis.seen(outputs)[:, flexible], basis.seen(loads)[:, flexible]
-    carried = basis.beside(basis.of_hub(outputs))[:, flexible]
-    both = (
-        modal_statics(stiffness[np.ix_(flexible, flexible)], *seen, carried)
-        for stiffness in (true, uniform)
-    )
-    return Statics(*(a - b for a, b in zip(*both, strict=True)))
+
+    def statics(basis: Basis, stiffness: np.ndarray) -> Statics:
+        seen = basis.seen(outputs)[:, flexible], basis.seen(loads)[:, flexible]
+        carried = basis.beside(basis.of_hub(outputs))[:, flexible]
+        return modal_statics(stiffness[np.ix_(flexible, flexible)], *seen, carried)
+
+    both = zip(statics(basis, true), statics(full or basis, uniform), strict=True)
+    return Statics(*(a - b for a, b in both))

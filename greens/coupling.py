@@ -274,6 +274,36 @@ class Wheel:
             flexibility, beside = flexibility + lacking.compliance, beside + lacking.momentum
         return self._completed(basis, outputs, loads, flexibility, beside)
 
+    def respond_inside(
+        self,
+        basis: Basis,
+        full: Basis,
+        outputs: Probes,
+        loads: Probes,
+        read: sparse.csr_matrix,
+        driven: sparse.csr_matrix,
+    ) -> Response:
+        """Response of probes of which some lie inside the tire, with the exact static flexibility of what the states lack.
+
+        The shapes of `basis` have further rows for these, and those of `full` for what they are in the full matrices;
+        `read` (r, n) and `driven` (n, k) are the same `outputs` and `loads` there, on own unknowns. InputError for a wheel that
+        moves. Collective.
+        """
+        if basis.projection.moves:
+            raise InputError(
+                'large motions: a wheel that moves on an axle is not available; take axle.kind = "fixed"'
+            )
+        rows = sparse.csr_matrix(self._beside(basis.of_hub(outputs)))
+        shapes = LoadedShapes(self.operators, self.rotating_stiffness, self.air)
+        answers = shapes.readings(sparse.vstack([read, rows], format="csr"), driven)
+        shapes.destroy()
+        flexibility, beside = np.split(answers, [outputs.shape[0]])
+        if self._apart:
+            stiffnesses = self._stiffnesses(basis.projection)
+            lacking = regained(basis.held, *stiffnesses, outputs, loads, full.held)
+            flexibility, beside = flexibility + lacking.compliance, beside + lacking.momentum
+        return self._completed(basis, outputs, loads, flexibility, beside)
+
     def _completed(
         self, basis: Basis, outputs: Probes, loads: Probes, flexibility: Array, beside: Array
     ) -> Response:

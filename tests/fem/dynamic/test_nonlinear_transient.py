@@ -7,6 +7,7 @@ from scipy import sparse
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.matrices import probe
+from tireroad.fem.matrices.compliance import on_own_rows, solve_all
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.load_steps import LoadStepper
@@ -65,6 +66,55 @@ def linear(tire, step):
     )
 
 
+class Manufactured(NonlinearTire):
+    """A tire whose solution is g(t) `shape`, g = sin^2(w t): the forces on all unknowns that it needs are applied."""
+
+    def prepare(self, shape, frequency):
+        self.shape, self.rate, self.count = shape, 2 * np.pi * frequency, 0
+        self.acceleration = self.balanced = self.amplitude(0.0)[2] * shape
+
+    def amplitude(self, time):
+        turn = self.rate * time
+        rates = np.sin(2 * turn), 2 * np.cos(2 * turn)
+        return np.sin(turn) ** 2, self.rate * rates[0], self.rate**2 * rates[1]
+
+    def predict(self):
+        self.count += 1
+        g, first, second = (part * self.shape for part in self.amplitude(self.count * self._step))
+        self.applied = self._mass * second + self._product(first) + self._force.change(g)
+        return super().predict()
+
+    def _dynamic(self, new):
+        return super()._dynamic(new) - self.applied
+
+
+def manufactured(tire, step, radius, last=8e-3):
+    """Relative error over time of a known motion of 30 mm, and the tire."""
+    operators, load = tire
+    shape = solve_all(operators.stiffness, on_own_rows(operators, load))[:, 0]
+    shape *= 0.03 / abs(shape).max()
+    full = Manufactured(
+        operators=operators,
+        inflation=INFLATION,
+        damping=DAMPING,
+        step=step,
+        outputs=load,
+        loads=load,
+        spectral_radius=radius,
+    )
+    full.prepare(shape, 62.5)
+    off = size = 0.0
+    for k in range(1, round(last / step) + 1):
+        full.predict()
+        while full.settle(np.zeros(1)) is not None:
+            pass
+        full.advance(np.zeros(1))
+        exact = full.amplitude(k * step)[0] * shape
+        off += float(((full.displacement - exact) ** 2).sum())
+        size += float((exact**2).sum())
+    return np.sqrt(off / size), full
+
+
 def pulse(time):
     """A smooth push of 10 ms."""
     return np.where(time < 0.01, np.sin(np.pi * time / 0.01) ** 4, 0.0)
@@ -80,6 +130,19 @@ def march(full, step, size=PUSH, last=0.02, first=0.0):
         full.advance(force)
         out.append((free + full.same_step @ force)[0])
     return np.array(out)
+
+
+@pytest.mark.parametrize("radius", [0.0, 1.0])
+def test_a_manufactured_motion_of_centimetres_is_found_to_second_order(tire, radius):
+    """Three times the wall's thickness, for which factors are taken anew."""
+    errors = []
+    for step in (5e-4, 2.5e-4, 1.25e-4):
+        error, full = manufactured(tire, step, radius)
+        errors.append(error)
+        assert full.factors > 1
+        assert full.turns <= 8 * full.count
+    assert np.log2(np.divide(errors[:-1], errors[1:])) == pytest.approx(2.0, abs=0.25)
+    assert errors[-1] < 0.01
 
 
 @pytest.mark.long
