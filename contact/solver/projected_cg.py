@@ -134,7 +134,7 @@ class ProjectedCG:
     zero and their points leave, points with a negative gap join, and either restarts the
     directions. Symmetry of A is assumed only in the length of steps: a slight skew part slows
     convergence, but the gap is always that of A itself. Warm start by linear extrapolation of the
-    last forces. Sources: Polonsky and Keer, Wear 231 (1999) 206; Vollebregt, J. Comput. Phys. 257
+    last forces; a step that is solved again, for which the points that touch are given, begins with its last ones. Sources: Polonsky and Keer, Wear 231 (1999) 206; Vollebregt, J. Comput. Phys. 257
     (2014) 333.
 
     On a grid only the points of a box around those that touch take part. The gaps of all others are
@@ -152,6 +152,7 @@ class ProjectedCG:
         self._base, self.force = np.zeros(n), np.zeros(n)  # of this step
         self._last: Array | None = None
         self._before: Array | None = None
+        self._again = False  # the last step is solved once more
         self.active: Mask = np.zeros(n, dtype=bool)
         self.gap: Array = np.zeros(n)
         self.penetration = 0.0
@@ -276,9 +277,10 @@ class ProjectedCG:
         return self._compliance.block(index, index)
 
     def _begin(self, base: Array, guess_active: Mask | None) -> Array:
-        if self._last is None or guess_active is not None:
+        self._again = self._last is not None and guess_active is not None
+        if self._last is None:
             return base.copy()
-        if self._before is None:
+        if self._before is None or self._again:
             return self._last.copy()
         ahead: Array = np.maximum(2.0 * self._last - self._before, 0.0)
         return np.where(self._last > 0.0, ahead, 0.0)
@@ -294,6 +296,8 @@ class ProjectedCG:
     def _finish(self, force: Array, gap: Array) -> None:
         check_residual("projected-cg", self.residual)
         self.active = force > 0.0
-        self._before, self._last = self._last, force
+        if not self._again:
+            self._before = self._last
+        self._last = force
         self.penetration = penetration(gap)
         self.gap = np.where(self.active, 0.0, gap)
