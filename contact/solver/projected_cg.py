@@ -134,8 +134,8 @@ class ProjectedCG:
     zero and their points leave, points with a negative gap join, and either restarts the
     directions. Symmetry of A is assumed only in the length of steps: a slight skew part slows
     convergence, but the gap is always that of A itself. Warm start by linear extrapolation of the
-    last forces; a step that is solved again, for which the points that touch are given, begins with its last ones. Sources: Polonsky and Keer, Wear 231 (1999) 206; Vollebregt, J. Comput. Phys. 257
-    (2014) 333.
+    last forces; a step that is solved again, for which the points that touch are given, begins with
+    its own. Sources: Polonsky and Keer, Wear 231 (1999) 206; Vollebregt, J. Comput. Phys. 257 (2014) 333.
 
     On a grid only the points of a box around those that touch take part. The gaps of all others are
     found afterwards; where one is negative the box grows and the step is solved again.

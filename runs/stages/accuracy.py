@@ -150,7 +150,7 @@ class Given:
         return equilibrated(self.job, self.setup, self.response, self.static.product.normal_force)
 
     @cached_property
-    def coarser(self) -> tuple[ContactSetup, Response]:
+    def on_coarser_mesh(self) -> tuple[ContactSetup, Response]:
         """Setup and response of the tire with elements of twice the size. Collective on the job's processes."""
         with console.quiet():
             job, done = coarser(self.job, self.static)
@@ -192,15 +192,14 @@ class Given:
         return self._keeping("base", job=job)
 
     def alone(self) -> Given:
-        """The same for this process by itself."""
-        return self._keeping("equilibrated", "coarser", comm=MPI.COMM_SELF)
+        """The same for this process by itself, with what all processes have found."""
+        known = (name for name in ("equilibrated", "on_coarser_mesh") if name in self.__dict__)
+        return self._keeping(*known, comm=MPI.COMM_SELF)
 
     def _keeping(self, *names: str, **changes: Any) -> Given:
-        """The same with `changes`, and the cached properties `names` as here; one that cannot be had is left out."""
+        """The same with `changes`, and the cached properties `names` as here."""
         other = replace(self, **changes)
-        for name in names:
-            with suppress(ConvergenceError, InputError):
-                other.__dict__[name] = getattr(self, name)
+        other.__dict__.update({name: getattr(self, name) for name in names})
         return other
 
     def repeated(
@@ -430,7 +429,7 @@ def fewer_modes(given: Given) -> ContactForces:
 
 def coarser_mesh(given: Given) -> ContactForces:
     """Elements of twice the size, from the static state on. Collective."""
-    return given.repeated(*given.coarser)
+    return given.repeated(*given.on_coarser_mesh)
 
 
 def finer_wall(given: Given) -> tuple[ContactForces, ContactForces | None]:
@@ -641,7 +640,7 @@ class AccuracyStage(Computed[Accuracy]):
             except (ConvergenceError, InputError) as error:
                 return error
 
-        coarse = attempted("coarser mesh", lambda: given.coarser)
+        coarse = attempted("coarser mesh", lambda: given.on_coarser_mesh)
         lacking = isinstance(coarse, ConvergenceError | InputError)
         found: dict[str, Any] = {"mesh": coarse} if lacking else {}
         alone = sharers(given.response.resolved(given.step), comm).size < comm.size

@@ -87,7 +87,7 @@ def test_results_do_not_depend_on_the_number_of_processes(
 @pytest.mark.parametrize("name", ["normal_force", "horizontal_force", "axle_force"])
 def test_friction_differs_between_processes_by_less_than_it_is_solved_to(folders, processes, name):
     """Turns end at a residual of 1e-3 of the largest bound, and the road is met to 3 % of the deflections of points under
-    their own forces: rounding may end either one time earlier or later. Found: 1.1e-3, 5.3e-3, 3.5e-4."""
+    their own forces: rounding may end either one time earlier or later. Found at 1 % of the largest one: 1.1e-3, 5.3e-3, 3.5e-4."""
     one, many = (values(folders[n][0], "contact.h5", name) for n in (1, processes))
     assert np.abs(one).max() > 0.0
     assert (
