@@ -19,7 +19,9 @@ from scipy import sparse
 from tireroad.contact.patch import Patch
 from tireroad.contact.solver.active_set import COMPILED
 from tireroad.contact.solver.conditions import Array, ContactSolver, Mask
-from tireroad.contact.solver.stick_slip import BrushFriction, CompressedRows
+from tireroad.contact.solver.grid_newton import GridNewton
+from tireroad.contact.solver.projected_cg import ProjectedCG
+from tireroad.contact.solver.stick_slip import BrushFriction, CompressedRows, in_plane
 from tireroad.contact.tread.memory import TreadMemory
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.greens.recursion import LoadedColumns, ahead_of_mean
@@ -434,8 +436,14 @@ class ContactProblem:
             self._solution[part] for part in (0, slice(1, 3), slice(3, 5))
         )
         self.solutions = self.unsettled = 0
+        self._at_once: GridNewton | None = None
+        if friction is not None and isinstance(solver, ProjectedCG) and solver.tread is not None:
+            self._at_once, self._at_zero = (
+                GridNewton(solver, friction, same_step, patch),
+                np.zeros(c),
+            )
         if self.components == 3:
-            self._in_plane = _in_plane(same_step, weights, p)
+            self._in_plane = in_plane(same_step, weights, p)
         doubles = {
             "gap0": np.ascontiguousarray(patch.gap), "at_rest": np.ascontiguousarray(patch.force), "q": self._q,
             "free": self._free, "vertical": self.vertical, "horizontal": self.horizontal, "change": self.at_points,
@@ -466,6 +474,8 @@ class ContactProblem:
 
         `tread` (1 or 3, c) m: displacements of a tread that creeps due to its past.
         """
+        if self._at_once:
+            return self._solve_at_once(self._at_once, road, tread, free)
         if not road.leans:
             return self._solve_at(road.known, None, tread, free)
         nodes, tips = COMPILED.doubles(free), self._friction.compiled if self._friction else _NULL
@@ -494,6 +504,25 @@ class ContactProblem:
             place = mixed.next(place, way * rest, np.where(self._force > 0.0, slope.T, 0.0))
         self.unsettled += 1
         return solved
+
+    def _solve_at_once(
+        self, solver: GridNewton, road: RoadMet, tread: Array | None, free: Array
+    ) -> Solved:
+        """As `solve`, the road read in each Newton step."""
+        given = COMPILED.doubles(free), COMPILED.doubles(self._at_zero), _NULL, _pointer(tread)
+        COMPILED.lib.meeting_prepare(self._compiled, *given)
+
+        def read(place: Array) -> tuple[Array, Array]:
+            return road.at(road.follows * place)
+
+        found = solver.solve(
+            self._q, self._free, read if road.leans else None, road.known, self._tolerance
+        )
+        self.solutions += found.turns
+        slope = found.slope if road.leans else None
+        return Solved(
+            found.force[0], found.gap, found.force[1:], found.residual, found.penetration, slope
+        )
 
     def _settled(self, solved: Solved, rest: Array, force: Array, pulled: Array) -> bool:
         """Whether places that are off by `rest` (2, c) m and a slope's forces of a solution that has changed by `force` (c,)
@@ -563,7 +592,9 @@ class ContactProblem:
 
     def state(self) -> dict[str, Array]:
         """The state that a checkpoint keeps."""
-        kept = self._solver.state() | (self._friction.state() if self._friction else {})
+        kept = (self._at_once or self._solver).state() | (
+            self._friction.state() if self._friction else {}
+        )
         if self.components == 3:
             kept |= {
                 "met": np.stack([self._solution, self._before]),
@@ -574,19 +605,12 @@ class ContactProblem:
     def set_state(self, state: dict[str, Array]) -> None:
         """Restore the state; what follows is bitwise that of an uninterrupted run."""
         self._touching = None
-        self._solver.set_state(state)
+        (self._at_once or self._solver).set_state(state)
         if self._friction:
             self._friction.set_state(state)
         if self.components == 3:
             self._solution[:], self._before[:] = state["met"]
             self.solutions, self.unsettled = (int(count) for count in state["meetings"])
-
-
-def _in_plane(same_step: Array, weights: sparse.csr_matrix, p: int) -> Array:
-    """Compliance (c,) m/N in the plane of each point of the tire under its own force, the mean of both directions."""
-    blocks = (same_step[d * p : (d + 1) * p, d * p : (d + 1) * p] for d in (1, 2))
-    x, y = (np.asarray(weights.multiply(weights @ block).sum(axis=1)).ravel() for block in blocks)
-    return 0.5 * (x + y)
 
 
 class Mixed:

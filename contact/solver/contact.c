@@ -42,8 +42,8 @@ typedef struct {
 
 int pivot_solve(pivot *s, const double *q, const uint8_t *guess, double *force);
 
-/* Normal forces for the turns of a brush: `all` points at once, the `usual` ones, or `another` solver, which may take
-   `some` of them. After these the `others` are looked at, where not all take part. */
+/* Normal forces for the turns of a brush: `all` points at once, the `usual` ones, after which the `others` are looked at, or
+   `another` solver. */
 typedef int (*normal_solver)(const double *q, const uint8_t *guess, double *force);
 typedef int (*look)(const double *q, double *force);  /* SOLVED, the forces exact, or AGAIN with more points */
 typedef struct {
@@ -51,8 +51,6 @@ typedef struct {
     pivot *usual;
     look others;
     normal_solver another;
-    int count;
-    const int *some;
 } normal_contact;
 
 /* What moves in the plane of the road, and away from it, under forces in the plane and normal to it: the tire
@@ -107,6 +105,29 @@ int stick_slip_solve(stick_slip *s, double tolerance);
 int krylov(int n, int (*apply)(void *, const double *, double *), void *of, const double *right, double tolerance,
            double *x);
 
+/* A Newton step of normal and tangential forces at once, between `count` points of a grid: (contact/solver/grid_newton.py). */
+typedef struct {
+    plane *compliance;                    /* the nodes and the tread; the tire's part of it is here: */
+    const double *tire;                   /* (3p, 3p) in z, x, y, by columns; or 0, and between nodes near each other */
+    const int *n_begin, *n_column;
+    const double *n_value;
+    const double *pressed;                /* kernel zz of the tread, laid out as the others */
+    int count;
+    const int *index;                     /* (a,) points */
+    const double *slope;                  /* (a, 2) of the road under them */
+    const double *own, *beside, *spring;  /* (a,) m/N: diagonals normal to the road and in its plane; in series there */
+    const double *direction, *share;      /* (2, a), (a,) of what slips: the projection's derivative is b/|t| (I - n n^T) */
+    const uint8_t *kept;                  /* (2, a): whether the normal force, and that in the plane, is not to change */
+    double friction, caution;
+    int reads;                            /* whether the road is read where the points move to */
+    double *nodal, *nodes, *value;        /* workspace: (3p,) each */
+    int *which;
+    double *force, *field;                /* workspace: (a,), three fields on the grid */
+    long products;
+} at_once;
+
+int at_once_step(at_once *s, const double *right, double tolerance, double *step);
+
 /* A brush on the tire: normal and tangential forces of a step. */
 typedef struct {
     plane *compliance;
@@ -131,6 +152,8 @@ typedef struct {
 
 void brush_begin(brush *s);
 void brush_end(brush *s);
+void brush_offer(const brush *s, double *share, double *past);
+double brush_limit(const brush *s, double first, double most);
 int brush_solve(brush *s, normal_contact *normal, const double *q, const uint8_t *guess, const double *at_rest,
                 const double *free, double *force);
 
@@ -466,7 +489,7 @@ void plane_begin(plane *s) {
     struct plane_work *w = s->work = room(1, sizeof *w);
     w->nodal = DOUBLES(2 * p), w->nodes = DOUBLES(3 * p), w->value = DOUBLES(3 * most), w->given = DOUBLES(2 * c);
     w->field = DOUBLES(2 * (size_t)s->nx * (s->ny + 8)), w->lifted = DOUBLES(c), w->follows = DOUBLES(c);
-    if (!s->lift) w->compact = DOUBLES(6 * (size_t)p * p), w->down = DOUBLES(2 * (size_t)p * p);
+    if (s->hh && !s->lift) w->compact = DOUBLES(6 * (size_t)p * p), w->down = DOUBLES(2 * (size_t)p * p);
     w->which = INTS(3 * most), w->first = INTS(s->nx), w->last = INTS(s->nx), w->some = INTS(c);
     w->carried = INTS(p), w->bears = room(p, 1), w->kept = room(p, 1);
     if (s->lift) {
@@ -575,7 +598,7 @@ static size_t cell(const plane *s, int point) { return (size_t)s->row[point] * p
 
 /* On the grid, between `bounds` and at least `reach` cells from each force: ux, uy += kernels times forces; what else is
    in the fields is not to be read. With three kernels both components of both, with two and fy one of both, else both
-   of one. Forces of one row of the grid are taken by fours, so that displacements are read and written once for them. */
+   of one; with one kernel, given twice, one of one. Forces of one row of the grid are taken by fours, so that displacements are read and written once for them. */
 static void spread(const plane *s, int reach, int count, const int *index, const double *fx, const double *fy,
                    const double *const *kernel, int kernels, double *ux, double *uy) {
     enum { TOGETHER = 4 };
@@ -618,6 +641,9 @@ static void spread(const plane *s, int reach, int count, const int *index, const
                 for (int j = 0; j < most; j++)
                     x[j] += a0[j] * p[0] + a1[j] * p[1] + a2[j] * p[2] + a3[j] * p[3] + b0[j] * q[0] + b1[j] * q[1] +
                             b2[j] * q[2] + b3[j] * q[3];
+            else if (!uy)
+#pragma GCC ivdep
+                for (int j = 0; j < most; j++) x[j] += a0[j] * p[0] + a1[j] * p[1] + a2[j] * p[2] + a3[j] * p[3];
             else
 #pragma GCC ivdep
                 for (int j = 0; j < most; j++) {
@@ -1089,6 +1115,78 @@ int stick_slip_solve(stick_slip *s, double tolerance) {
     return found;
 }
 
+/* ---- Both at once, on a grid ---------------------------------------------------------------------------------------- */
+
+/* The displacements under forces (3, a), z, x, y, in units of the forces: of a Newton step's problem. */
+static int both(void *of, const double *given, double *out) {
+    at_once *s = of;
+    plane *c = s->compliance;
+    const int a = s->count, p = c->nodes, size = 3 * p;
+    const double *f = given, *x = given + a, *y = given + 2 * a, *n = s->direction;
+    const double *const pressed[] = {s->pressed, s->pressed};
+    double *uz = s->field, *ux = uz + cells(c), *uy = ux + cells(c);
+    s->products++;
+    memset(s->field, 0, 3 * cells(c) * sizeof(double));
+    spread(c, c->near, a, s->index, f, 0, pressed, 1, uz, 0);
+    spread(c, c->near, a, s->index, x, y, c->kernel, 3, ux, uy);
+    if (c->coupled) {
+        for (int k = 0; k < a; k++) s->force[k] = -f[k];
+        spread(c, c->near, a, s->index, x, y, c->kernel + 3, 2, uz, 0);
+        spread(c, c->near, a, s->index, s->force, 0, c->kernel + 3, 2, ux, uy);
+    }
+    memset(s->nodal, 0, size * sizeof(double));
+    for (int k = 0; k < a; k++) {
+        const int i = s->index[k];
+        const double along = s->slope[2 * k], across = s->slope[2 * k + 1];
+        const double pz = f[k] + x[k] * along + y[k] * across, px = x[k] - f[k] * along, py = y[k] - f[k] * across;
+        for (int w = c->w_begin[i]; w < c->w_begin[i + 1]; w++) {
+            const int at = c->w_column[w];
+            s->nodal[at] += c->w_value[w] * pz, s->nodal[p + at] += c->w_value[w] * px, s->nodal[2 * p + at] += c->w_value[w] * py;
+        }
+    }
+    if (s->tire) {
+        memset(s->nodes, 0, size * sizeof(double));
+        add_columns(size, size, s->tire, nonzero(size, s->nodal, s->which, s->value), s->which, s->value, s->nodes);
+    } else {
+        for (int i = 0; i < size; i++) { /* of nodes that carry some of the points */
+            if (!c->work->bears[i % p]) continue;
+            double sum = 0.0;
+            for (int k = s->n_begin[i]; k < s->n_begin[i + 1]; k++) sum += s->n_value[k] * s->nodal[s->n_column[k]];
+            s->nodes[i] = sum;
+        }
+    }
+    for (int k = 0; k < a; k++) {
+        const int i = s->index[k], slips = s->share[k] < 1.0;
+        const size_t at = cell(c, i);
+        const double tx = ux[at] + from_nodes(c, s->nodes + p, i) + s->spring[k] * x[k];
+        const double ty = uy[at] + from_nodes(c, s->nodes + 2 * p, i) + s->spring[k] * y[k];
+        double z = uz[at] + from_nodes(c, s->nodes, i);
+        if (slips && s->reads) z -= s->slope[2 * k] * tx + s->slope[2 * k + 1] * ty; /* what slips meets the road elsewhere */
+        out[k] = s->kept[k] ? f[k] : z / s->own[k];
+        if (s->kept[a + k]) {
+            out[a + k] = x[k], out[2 * a + k] = y[k];
+            continue;
+        }
+        const double r = (slips ? s->caution : 1.0) / s->beside[k];
+        double dx = r * tx - x[k], dy = r * ty - y[k];
+        const double along = n[k] * dx + n[a + k] * dy, follows = s->friction * f[k];
+        dx = s->share[k] * (dx - n[k] * along) - n[k] * follows, dy = s->share[k] * (dy - n[a + k] * along) - n[a + k] * follows;
+        out[a + k] = x[k] + dx, out[2 * a + k] = y[k] + dy;
+    }
+    return 0;
+}
+
+/* step (3, a) N to the `tolerance` of what `right` (3, a) N is left of. */
+int at_once_step(at_once *s, const double *right, double tolerance, double *step) {
+    plane *c = s->compliance;
+    int done;
+    bounds(c, s->count, s->index);
+    memset(c->work->bears, 0, c->nodes);
+    for (int k = 0; k < s->count; k++)
+        for (int w = c->w_begin[s->index[k]]; w < c->w_begin[s->index[k] + 1]; w++) c->work->bears[c->w_column[w]] = 1;
+    return cycle(3 * s->count, SHORT, both, s, right, tolerance, step, &done);
+}
+
 /* ---- Both in turn -------------------------------------------------------------------------------------------------- */
 
 /* Turns in which the normal forces follow in a Newton step; after which stick and slip are solved in each. */
@@ -1129,8 +1227,14 @@ void brush_end(brush *s) {
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) free(all[i]);
 }
 
+/* Residual (N) of the forces in the plane that a step may leave, of the `first` one and the `most` that a point may bear. Small
+   changes are not to be lost step by step: bristles would carry the error through the patch. */
+double brush_limit(const brush *s, double first, double most) {
+    return fmin(s->tolerance * most, fmax(SHRUNK * first, SMALL * most));
+}
+
 /* share (c,) and past (2, c) of e = share u + past at the end of the step (contact.tread.brush). */
-static void offer(const brush *s, double *share, double *past) {
+void brush_offer(const brush *s, double *share, double *past) {
     const int c = s->compliance->points;
     for (int i = 0; i < c; i++) share[i] = 1.0, past[i] = past[c + i] = 0.0;
     if (s->spring_kind) return;
@@ -1378,12 +1482,11 @@ int brush_solve(brush *s, normal_contact *normal, const double *q, const uint8_t
     int held = 0, failed;
     double before = INFINITY, first = INFINITY, caution = 1.0;
     retrace(s);
-    offer(s, w->share, w->past);
+    brush_offer(s, w->share, w->past);
     memset(w->lifted, 0, c);
     for (int i = 0; i < 2 * c; i++) w->trial[i] = s->again ? s->horizontal[i] : 2.0 * s->horizontal[i] - s->before[i];
     for (s->turns = 1; s->turns <= TURNS; s->turns++) {
-        const int *looked = normal->usual ? normal->usual->places : normal->some ? normal->some : w->every;
-        lifted_by(s, q, w->trial, normal->usual ? normal->usual->taken : normal->some ? normal->count : c, looked);
+        lifted_by(s, q, w->trial, normal->usual ? normal->usual->taken : c, normal->usual ? normal->usual->places : w->every);
         if ((failed = normal_forces(normal, s->turns, w->q, guess, at_rest, force))) return failed;
         drag(s, force, free, w->moved);
         for (int i = 0; i < c; i++) w->set[i] = force[i] > 0.0;
@@ -1403,10 +1506,8 @@ int brush_solve(brush *s, normal_contact *normal, const double *q, const uint8_t
         if (!isfinite(problem.off)) return NOT_FINITE;
         if (problem.off > FALLS * before) caution = fmax(CAUTION * caution, LEAST_CAUTION);
         before = problem.off;
-        /* Small changes are not to be lost step by step: bristles would carry the error through the patch. */
         if (s->turns == 1) first = problem.off;
-        const double shrunk = fmax(SHRUNK * first, SMALL * problem.largest);
-        const double limit = fmin(s->tolerance * problem.largest, shrunk);
+        const double limit = brush_limit(s, first, problem.largest);
         double cut = 0.0; /* what the bounds have cut off still acted on the normal forces */
         scatter(w, a, c);
         for (int i = 0; i < 2 * c; i++) cut = fmax(cut, fabs(w->found[i] - w->trial[i]));

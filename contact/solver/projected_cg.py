@@ -46,7 +46,7 @@ class SpreadCompliance:
     """
 
     def __init__(self, tire: Array, weights: sparse.csr_matrix, tread: KernelTread) -> None:
-        self._tire, self._weights, self._tread = tire, weights, tread
+        self._tire, self._weights, self.tread = tire, weights, tread
         self._transposed = weights.T.tocsr()
         own = weights.multiply(weights @ tire).sum(axis=1)
         self.diagonal = tread.diagonal + np.asarray(own).ravel()
@@ -55,16 +55,16 @@ class SpreadCompliance:
     def block(self, rows: Index, columns: Index) -> Array:
         """A between the points `rows` (a,) and `columns` (b,), (a, b) m/N."""
         ahead = self._weights[columns] @ self._tire.T
-        return np.asfortranarray(self._weights[rows] @ ahead.T + self._tread.block(rows, columns))
+        return np.asfortranarray(self._weights[rows] @ ahead.T + self.tread.block(rows, columns))
 
     @property
     def cells(self) -> tuple[Index, Index]:
         """Row and column (c,) of each point in the grid."""
-        return self._tread.cells
+        return self.tread.cells
 
     def inside(self, box: Box) -> tuple[SpreadCompliance, Index]:
         """The same between the points in a box of the grid, and which those are (a,)."""
-        tread, index = self._tread.inside(box)
+        tread, index = self.tread.inside(box)
         rows = self._weights[index]
         nodes = np.unique(rows.indices)
         return SpreadCompliance(self._tire[np.ix_(nodes, nodes)], rows[:, nodes], tread), index
@@ -72,7 +72,7 @@ class SpreadCompliance:
     def apply(self, force: Array) -> Array:
         """Displacement (c,) m under forces (c,) N."""
         moved = self._tire @ (self._transposed @ force)
-        return self._weights @ moved + self._tread.apply(force)
+        return self._weights @ moved + self.tread.apply(force)
 
 
 class MatrixCompliance:
@@ -102,8 +102,7 @@ class MatrixCompliance:
 
 Mask = NDArray[np.bool_]
 
-# A tenth of the tolerance, since the residual is evaluated again for the record; and where horizontal forces still change.
-TARGET, LOOSE = 1e-10, 1e-7
+TARGET = 1e-10  # a tenth of the tolerance, since the residual is evaluated again for the record
 MAX_ITERATIONS = 1000
 # Rows and columns of points around those that touch, among which a step looks for others: a footprint is half of
 # the points within reach of the road.
@@ -146,10 +145,10 @@ class ProjectedCG:
         self.diagonal = compliance.diagonal
         n = len(self.diagonal)
         self._grid = compliance if isinstance(compliance, SpreadCompliance) else None
+        self.tread = self._grid.tread if self._grid else None
         self._cells = self._grid.cells if self._grid else ()
         self._box = _EMPTY
         self._inner, self._index = compliance, np.arange(n)
-        self._base, self.force = np.zeros(n), np.zeros(n)  # of this step
         self._last: Array | None = None
         self._before: Array | None = None
         self._again = False  # the last step is solved once more
@@ -164,42 +163,21 @@ class ProjectedCG:
         self, q: Array, guess_active: Mask | None = None, reference: Array | None = None
     ) -> Array:
         """Forces f (n,) N; see ActiveSet.solve. ConvergenceError after 1000 iterations."""
-        self.begin(q, guess_active, reference)
-        while not self.settled(q):
-            pass
-        assert self._last is not None, "settled"
-        return self._last
-
-    @property
-    def index(self) -> Index:
-        """The points (a,) of the box, which take part."""
-        return self._index
-
-    def begin(self, q: Array, guess_active: Mask | None, reference: Array | None) -> None:
-        """Prepare for a step."""
         if not np.all(np.isfinite(q)):
             check_residual("projected-cg", np.nan)
-        self._base = np.zeros(len(q)) if reference is None else reference
-        self.force = self._begin(self._base, guess_active)
-        near = (self._base != 0.0) | (self.force > 0.0)
+        base = np.zeros(len(q)) if reference is None else reference
+        force = self._begin(base, guess_active)
+        near = (base != 0.0) | (force > 0.0)
         self._cover(near if guess_active is None else near | guess_active)
         self.iterations = 0
-
-    def turn(self, q: Array) -> Array:
-        """Forces (n,) N of the box's points to a residual of 1e-7, from those of the last turn; q (n,) m within it."""
-        self._iterate(q, LOOSE)
-        return self.force
-
-    def settled(self, q: Array) -> bool:
-        """Make the forces exact; whether no point beyond the box touches, else the box has grown."""
-        largest = self._iterate(q, TARGET)
-        gap = _gap(self._compliance, self.force, self._base, q)
-        scale = largest + float((self.diagonal * self.force).max())
-        self.residual = complementarity_residual(self.force, gap, self.diagonal, scale)
-        if self.residual > TOLERANCE and self._cover(gap < -TARGET * scale):
-            return False
-        self._finish(self.force, gap)
-        return True
+        while True:
+            force, largest = self._iterate(q, force, base)
+            gap = _gap(self._compliance, force, base, q)
+            scale = largest + float((self.diagonal * force).max())
+            self.residual = complementarity_residual(force, gap, self.diagonal, scale)
+            if self.residual <= TOLERANCE or not self._cover(gap < -TARGET * scale):
+                self._finish(force, gap)
+                return force
 
     def _cover(self, points: Mask) -> bool:
         """Let the box contain these points; whether it grew."""
@@ -217,21 +195,21 @@ class ProjectedCG:
         self._inner, self._index = self._grid.inside(box)
         return True
 
-    def _iterate(self, q: Array, target: float) -> float:
-        """Find the forces of the box's points to the `target`; the largest of all gaps q."""
+    def _iterate(self, q: Array, force: Array, base: Array) -> tuple[Array, float]:
+        """The forces of the box's points, and the largest of all gaps q."""
         inner, index, largest = self._inner, self._index, float(np.abs(q).max())
         diagonal = self.diagonal[index]
-        force, base, q = self.force[index], self._base[index], q[index]
+        force, base, q = force[index], base[index], q[index]
         gap = _gap(inner, force, base, q)
         touching = (force > 0.0) | (gap < 0.0)
         direction, old, old_product = None, None, 0.0
         for _ in range(MAX_ITERATIONS):
             scale = float(largest + (diagonal * force).max())
             self.residual = complementarity_residual(force, gap, diagonal, scale)
-            if self.residual <= target:
-                self.force = np.zeros(len(self.force))
-                self.force[index] = force
-                return largest
+            if self.residual <= TARGET:
+                found = np.zeros(len(self.diagonal))
+                found[index] = force
+                return found, largest
             self.iterations += 1
             defect = np.where(touching, -gap, 0.0)
             raised = np.where(touching, inner.precondition(defect), 0.0)

@@ -10,7 +10,6 @@ from scipy import sparse
 from tireroad.contact.choices import DENSE_POINTS
 from tireroad.contact.solver.active_set import COMPILED, ActiveSet, UsualSet, array, guarded
 from tireroad.contact.solver.conditions import Array, ContactSolver, Mask, check_residual
-from tireroad.contact.solver.projected_cg import ProjectedCG
 from tireroad.contact.tread.brush import Brush
 from tireroad.contact.tread.shear import Shear
 from tireroad.fem.errors import ConvergenceError
@@ -183,6 +182,13 @@ def stick_slip(
     return force.T.copy()
 
 
+def in_plane(same_step: Array, weights: sparse.csr_matrix, p: int) -> Array:
+    """Compliance (c,) m/N in the plane of each point of the tire under its own force, the mean of both directions."""
+    blocks = (same_step[d * p : (d + 1) * p, d * p : (d + 1) * p] for d in (1, 2))
+    x, y = (np.asarray(weights.multiply(weights @ block).sum(axis=1)).ravel() for block in blocks)
+    return 0.5 * (x + y)
+
+
 class BrushFriction:
     """The brush on a tire with same-step response `tire` (3p, 3p) m/N in z, x, y of the nodes.
 
@@ -235,7 +241,14 @@ class BrushFriction:
             "pitches": brush.pitches, "deflection": brush.deflected, "moved": brush.moved,
             "horizontal": self._horizontal, "before": self._before,
         }  # fmt: skip
-        self._pressed, self._dragged = pressed, np.zeros((2, c))
+        self.shear, self.pressed, self.own, self._dragged = (
+            shear,
+            pressed,
+            plane.own,
+            np.zeros((2, c)),
+        )
+        self.unbounded, self.coefficient = law.friction is None, law.friction
+        self.stiffness = doubles["stiffness"]
         self._static: Array | None = None
         self._another: tuple[ContactSolver, tuple[Any, ...], list[BaseException]] | None = None
         doubles["dragged"] = self._dragged
@@ -271,6 +284,37 @@ class BrushFriction:
     def lagging(self) -> int:
         """Number of steps so far in which normal and horizontal forces each took the other's of the step before."""
         return int(self.compiled.lagged)
+
+    def offer(self) -> tuple[Array, Array]:
+        """share (c,) and past (2, c) m of a bristle's deflection share u + past at the end of the step (contact.tread.brush)."""
+        share, past = np.empty(len(self._touched)), np.empty((2, len(self._touched)))
+        _C.brush_offer(self.compiled, COMPILED.doubles(share), COMPILED.doubles(past))
+        return share, past
+
+    def carried(self, force: Array) -> Array:
+        """Forces (3, c) N where a step has carried the road that they are of."""
+        return np.ascontiguousarray((self._brush.upstream @ force.T).T)
+
+    def bound(self, force: Array) -> Array:
+        """Largest horizontal forces (n,) N under normal forces (n,) N."""
+        if self.coefficient is None:
+            return np.full(len(force), np.inf)
+        return self.coefficient * np.maximum(force, 0.0)
+
+    def limit(self, first: float, most: float) -> float:
+        """Residual (N) that a step may leave, of its `first` one (N) and the `most` (N) that a point may bear."""
+        return float(_C.brush_limit(self.compiled, first, most))
+
+    def advance(self, force: Array, moved: Array, lags: bool) -> None:
+        """End the step with forces (3, c) N, z, x, y, and bases of bristles `moved` (2, c) m; whether normal and horizontal forces
+        have each `lags` behind the other. ConvergenceError after 40 such steps in a row."""
+        self.compiled.lagged += lags
+        self.compiled.streak = self.compiled.streak + 1 if lags else 0
+        if self.compiled.streak > _C.LAGS:
+            raise self.unsolved()
+        self._before[:], self._horizontal[:] = self._horizontal, force[1:]
+        self._brush.moved[:], self._touched[:] = moved, force[0] > 0.0
+        np.divide(force[1:], -self.stiffness, out=self._brush.deflected)
 
     def largest_unique(self, touching: Mask, normal: ContactSolver) -> float:
         """Largest friction coefficient with a unique solution, with these points touching."""
@@ -325,12 +369,10 @@ class BrushFriction:
         if static is not self._static:
             self._static = static
             self._dragged[:] = self._plane.drag(
-                static, static if self._pressed is None else self._pressed
+                static, static if self.pressed is None else self.pressed
             )
         if isinstance(normal, UsualSet):
             guess = normal.begin(q, guess, static)
-        elif isinstance(normal, ProjectedCG):
-            normal.begin(q, guess, static)
         given = (
             COMPILED.doubles(np.ascontiguousarray(q)),
             _FFI.NULL if guess is None else COMPILED.flags(np.ascontiguousarray(guess, dtype=bool)),
@@ -343,7 +385,7 @@ class BrushFriction:
         if raised:
             raise raised.pop()
         if failed == _C.UNSOLVED:
-            raise self._unsolved()
+            raise self.unsolved()
         if isinstance(normal, (ActiveSet, UsualSet)):
             normal.check(failed)
         elif failed:
@@ -359,45 +401,25 @@ class BrushFriction:
         if self._another is None or self._another[0] is not normal:
             raised: list[BaseException] = []
             self._another = normal, self._called(normal, raised), raised
-        _, (contact, *_), raised = self._another
-        if isinstance(normal, ProjectedCG):
-            self._place(contact, normal)
+        _, (contact, _), raised = self._another
         return contact, raised
 
-    def _called(self, normal: ContactSolver, raised: list[BaseException]) -> tuple[Any, ...]:
-        """The normal problem of a solver that is called back, and the callbacks, which must live as long."""
+    def _called(self, normal: ContactSolver, raised: list[BaseException]) -> tuple[Any, Any]:
+        """The normal problem of a solver that is called back, and the callback, which must live as long."""
         size = len(self._touched)
 
         def solve(q: Any, guess: Any, force: Any) -> int:
-            q = array(q, size).copy()
-            if isinstance(normal, ProjectedCG):
-                array(force, size)[:] = normal.turn(q)
-            else:
-                touching = None if guess == _FFI.NULL else array(guess, size, bool).copy()
-                array(force, size)[:] = normal.solve(q, touching, reference=self._static)
-            return int(_C.SOLVED)
-
-        def look(q: Any, force: Any) -> int:
-            assert isinstance(normal, ProjectedCG), "another solver takes all points at once"
-            if not normal.settled(array(q, size).copy()):
-                self._place(contact, normal)
-                return int(_C.AGAIN)
-            array(force, size)[:] = normal.force
+            touching = None if guess == _FFI.NULL else array(guess, size, bool).copy()
+            array(force, size)[:] = normal.solve(
+                array(q, size).copy(), touching, reference=self._static
+            )
             return int(_C.SOLVED)
 
         solver = _FFI.callback("normal_solver", guarded(solve, raised))
-        others = _FFI.callback("look", guarded(look, raised))
-        contact = _FFI.new("normal_contact *", {"another": solver})
-        if isinstance(normal, ProjectedCG):
-            contact.others = others
-        return contact, solver, others
+        return _FFI.new("normal_contact *", {"another": solver}), solver
 
-    def _place(self, contact: Any, normal: ProjectedCG) -> None:
-        """Let turns lift the points that take part."""
-        self._some = np.ascontiguousarray(normal.index, np.int32)
-        contact.count, contact.some = len(self._some), COMPILED.ints(self._some)
-
-    def _unsolved(self) -> ConvergenceError:
+    def unsolved(self) -> ConvergenceError:
+        """What ends a run whose forces do not converge."""
         unbounded = self._brush.law.friction is None
         cure = (
             "give contact.friction, which bounds them, or a smaller brush stiffness or time.step"

@@ -33,7 +33,7 @@ class KernelTread:
     """
 
     def __init__(self, grid: GridPlaces, influence: Influence) -> None:
-        self._grid, self._influence = grid, influence
+        self.grid, self._influence = grid, influence
         self._size, x, y = doubled(grid)
         a, b = (np.full(x.shape, d / 2) for d in grid.spacing)
         kernel = influence(x, y, a, b)
@@ -53,9 +53,15 @@ class KernelTread:
         self._inverse = 1.0 / np.maximum(fft.rfft2(kernel[around]).real, least)
 
     @property
+    def around(self) -> Array:
+        """The kernel (2 nx - 1, 2 ny - 1) m/N over the offsets from one end of the grid to the other."""
+        i, j = (np.arange(1 - n, n) for n in self.grid.shape)
+        return np.ascontiguousarray(self._kernel[i[:, None], j])
+
+    @property
     def cells(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Row and column (c,) of each point in the grid."""
-        rows, columns = np.divmod(self._grid.place, self._grid.shape[1])
+        rows, columns = np.divmod(self.grid.place, self.grid.shape[1])
         return rows, columns
 
     def inside(self, box: Box) -> tuple[KernelTread, NDArray[np.intp]]:
@@ -66,12 +72,12 @@ class KernelTread:
         )
         shape = bottom - top, right - left
         place = (rows[index] - top) * shape[1] + columns[index] - left
-        return KernelTread(GridPlaces(shape, self._grid.spacing, place), self._influence), index
+        return KernelTread(GridPlaces(shape, self.grid.spacing, place), self._influence), index
 
     def block(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Array:
         """The matrix between the points `rows` (a,) and `columns` (b,), (a, b) m/N."""
-        i, j = np.divmod(self._grid.place[rows, None], self._grid.shape[1])
-        k, m = np.divmod(self._grid.place[columns], self._grid.shape[1])
+        i, j = np.divmod(self.grid.place[rows, None], self.grid.shape[1])
+        k, m = np.divmod(self.grid.place[columns], self.grid.shape[1])
         return self._kernel[i - k, j - m]
 
     def apply(self, force: Array) -> Array:
@@ -83,12 +89,12 @@ class KernelTread:
         return self._convolve(approach, self._inverse, self._period)
 
     def _convolve(self, values: Array, transform: Array, size: tuple[int, ...]) -> Array:
-        nx, ny = self._grid.shape
+        nx, ny = self.grid.shape
         field = np.zeros(nx * ny)
-        field[self._grid.place] = values
+        field[self.grid.place] = values
         spectrum = fft.rfft2(field.reshape(nx, ny), size)
         spectrum *= transform
-        return fft.irfft2(spectrum, size)[:nx, :ny].ravel()[self._grid.place]
+        return fft.irfft2(spectrum, size)[:nx, :ny].ravel()[self.grid.place]
 
 
 def doubled(grid: GridPlaces) -> tuple[tuple[int, ...], Array, Array]:

@@ -27,7 +27,7 @@ from tireroad.contact.tread.compliance import (
     primitive_product,
     rectangle_potential,
 )
-from tireroad.contact.tread.kernel import GridPlaces, doubled
+from tireroad.contact.tread.kernel import Box, GridPlaces, KernelTread, doubled
 from tireroad.fem.compiled import Library
 
 Array = NDArray[np.float64]
@@ -244,24 +244,16 @@ class KernelShear:
         xx, xy, yy = self._between(index)[:3]
         return np.block([[xx, xy], [xy, yy]])
 
-    def compiled(self, library: Library) -> dict[str, Any]:
-        """The five kernels over the offsets from one end of the grid to the other, and the points on it.
+    @property
+    def around(self) -> Array:
+        """The kernels (5, 2 nx - 1, 2 ny - 1) over the offsets from one end of the grid to the other."""
+        return self._around
 
-        A Newton step reads the kernels as far as they have most of their sum (`_UNREAD`).
-        """
-        size, (nx, ny) = np.abs(self._around[[0, 2]]).max(axis=0), self._grid.shape
-        apart = np.maximum(
-            *np.meshgrid(*(abs(np.arange(1 - n, n)) for n in (nx, ny)), indexing="ij")
-        )
-        within = np.bincount(apart.ravel(), weights=size.ravel()).cumsum()
-        near = int(np.searchsorted(within, (1.0 - _UNREAD) * within[-1]))
-        row, column = np.divmod(self._grid.place, self._grid.shape[1])
-        return {
-            "tread": library.lib.GRID, "coupled": self.coupled,
-            "kernel": [library.doubles(kernel) for kernel in _in_vectors(self._around)],
-            "nx": nx, "ny": ny, "near": near,
-            "row": library.ints(row.astype(np.int32)), "column": library.ints(column.astype(np.int32)),
-        }  # fmt: skip
+    def compiled(self, library: Library) -> dict[str, Any]:
+        """The five kernels, and the points on the grid."""
+        return _on_grid(library, self._around, self._around[[0, 2]], self._grid) | {
+            "coupled": self.coupled
+        }
 
     def inverse(self, library: Library, spring: float) -> dict[str, Any]:
         """Kernels of the inverse of `spread` with a spring (m/N) in series at each point, where the grid is endless: they decay
@@ -286,6 +278,81 @@ class KernelShear:
         """All kernels between the points `index`, (5, a, a)."""
         i, j = np.divmod(self._grid.place[index], self._grid.shape[1])
         return self._kernels[:, i[:, None] - i, j[:, None] - j]
+
+
+class GridTread:
+    """Displacements of a tread on a grid in all directions, under forces normal to the road and in its plane: a
+    convolution, (3, c) m for (3, c) N, z, x, y. `shear`: None where it is rigid in its plane; `box` of the whole grid."""
+
+    def __init__(self, normal: KernelTread, shear: KernelShear | None) -> None:
+        self._normal, self._grid = normal, normal.grid
+        beside = np.zeros((5, *normal.around.shape)) if shear is None else shear.around
+        self._around = np.concatenate([normal.around[None], beside])
+        self.coupled = shear is not None and shear.coupled
+        nx, ny = self._grid.shape
+        self.box: Box = (0, nx, 0, ny)
+
+    def inside(self, box: Box) -> GridConvolution:
+        """The same between the points in a box of the grid."""
+        return GridConvolution(self._around, self.coupled, box, self._normal.cells)
+
+    def compiled(self, library: Library) -> dict[str, Any]:
+        """As KernelShear.compiled."""
+        read = self._around[[0, 1, 3]]
+        return _on_grid(library, self._around[1:], read, self._grid) | {"coupled": self.coupled}
+
+    def pressed(self, library: Library) -> Any:
+        """The kernel of displacements normal to the road by forces normal to it, in the layout of `compiled`."""
+        return library.doubles(_in_vectors(self._around[:1]))
+
+
+class GridConvolution:
+    """GridTread between the points in a `box`, by FFT over twice that."""
+
+    def __init__(self, around: Array, coupled: bool, box: Box, cells: tuple[Index, Index]) -> None:
+        top, bottom, left, right = box
+        rows, columns = cells
+        inside = (rows >= top) & (rows < bottom) & (columns >= left) & (columns < right)
+        self._row, self._column = rows[inside] - top, columns[inside] - left
+        self.shape = shape = bottom - top, right - left
+        self._size = tuple(fft.next_fast_len(2 * n - 1, real=True) for n in shape)
+        kernels, middle = np.zeros((6, *self._size)), [n // 2 for n in around.shape[1:]]
+        i, j = (np.arange(1 - n, n) for n in shape)
+        kernels[:, i[:, None], j] = around[:, middle[0] + i[:, None], middle[1] + j]
+        spectra = fft.rfft2(kernels)
+        self._even, self._odd = np.ascontiguousarray(spectra[:4].real), 1j * spectra[4:].imag
+        self._coupled = coupled
+
+    def __call__(self, force: Array) -> Array:
+        """Displacements (3, a) m under forces (3, a) N at the points of the box."""
+        field = np.zeros((3, *self._size))
+        field[:, self._row, self._column] = force
+        z, x, y = fft.rfft2(field, overwrite_x=True)
+        zz, xx, xy, yy = self._even
+        moved = np.stack([zz * z, xx * x + xy * y, xy * x + yy * y])
+        if self._coupled:
+            zx, zy = self._odd
+            moved[0] += zx * x + zy * y
+            moved[1] -= zx * z
+            moved[2] -= zy * z
+        return fft.irfft2(moved, self._size, overwrite_x=True)[:, self._row, self._column]
+
+
+def _on_grid(library: Library, around: Array, read: Array, grid: GridPlaces) -> dict[str, Any]:
+    """Kernels (5, 2 nx - 1, 2 ny - 1) and places of points in the structure `plane` of the kernel.
+
+    A Newton step reads kernels as far as those to `read` (k, ...) have most of their sum (`_UNREAD`).
+    """
+    size, (nx, ny) = np.abs(read).max(axis=0), grid.shape
+    apart = np.maximum(*np.meshgrid(*(abs(np.arange(1 - n, n)) for n in (nx, ny)), indexing="ij"))
+    within = np.bincount(apart.ravel(), weights=size.ravel()).cumsum()
+    near = int(np.searchsorted(within, (1.0 - _UNREAD) * within[-1]))
+    row, column = np.divmod(grid.place, ny)
+    return {
+        "tread": library.lib.GRID, "kernel": [library.doubles(kernel) for kernel in _in_vectors(around)],
+        "nx": nx, "ny": ny, "near": near,
+        "row": library.ints(row.astype(np.int32)), "column": library.ints(column.astype(np.int32)),
+    }  # fmt: skip
 
 
 def _in_vectors(kernels: Array) -> Array:

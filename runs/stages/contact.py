@@ -11,7 +11,7 @@ import numpy as np
 from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
-from tireroad.contact.choices import USABLE
+from tireroad.contact.choices import MOST_TOUCHING, USABLE
 from tireroad.contact.loop import ContactProblem, DrivenTire, Loop
 from tireroad.contact.model import solver_name
 from tireroad.contact.patch import Patch
@@ -102,7 +102,7 @@ def describe(
 def meeting(record: Record, contact: ContactProblem, steps: int) -> None:
     """Record how often a step was solved for where its points lie, and warn where they were not found."""
     record.indicators |= {
-        "solutions of a step, for where its points lie, in the mean": (
+        "solutions or Newton steps of a time step, in the mean": (
             contact.solutions / steps,
             "-",
         ),
@@ -447,11 +447,13 @@ class ContactStage(Stage[ContactHistory]):
 
             parts.append(f"PETSc SNES vinewtonrsls, at most {MAX_ITERATIONS} iterations")
         if scene.contact.has_friction:
+            from tireroad.contact.solver.grid_newton import GAP_TOLERANCE
             from tireroad.contact.solver.stick_slip import TOLERANCE as change
             from tireroad.contact.solver.stick_slip import TURNS
 
             parts.append(
-                f"friction to {change:g} of the largest force in at most {TURNS} iterations"
+                f"friction to {change:g} of the largest force in at most {TURNS} iterations, together with gaps to "
+                f"{GAP_TOLERANCE:g} where more than {MOST_TOUCHING} points of a grid touch at rest"
             )
         return "; ".join([*parts, f"scheme {scene.time.scheme}"])
 

@@ -1,0 +1,122 @@
+"""Normal and horizontal forces at once on a grid: resumed, split, with all of the tire's compliance. The oracle is in test_oracle."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+from tireroad.contact.loop import ContactProblem, Drive
+from tireroad.contact.solver import grid_newton
+from tireroad.contact.solver.projected_cg import ProjectedCG, SpreadCompliance
+from tireroad.contact.solver.stick_slip import BrushFriction
+from tireroad.contact.tread.brush import Brush, BrushLaw
+from tireroad.contact.tread.kernel import GridPlaces, KernelTread
+from tireroad.contact.tread.layer import LayerInfluence, LayerShear
+from tireroad.contact.tread.shear import KernelShear
+from tireroad.fem.errors import ConvergenceError
+from tireroad.runs.validation.cases import oval_patch
+
+STEP, SPEED, STEPS, FRICTION = 1e-4, 20.0, 12, 0.6
+COUNTS, NODES, SPACING = (25, 17), (13, 9), (0.004, 0.005)
+
+
+def height(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    return 2e-4 * (np.sin(90 * x + 40 * y) + np.sin(310 * x - 170 * y))
+
+
+def slope(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    one, two = np.cos(90 * x + 40 * y), np.cos(310 * x - 170 * y)
+    return 2e-4 * np.stack([90 * one + 310 * two, 40 * one - 170 * two], axis=-1)
+
+
+def problem_of(friction: float = FRICTION) -> ContactProblem:
+    """A bonded layer on nodes twice as far apart as the points."""
+    both = [
+        np.maximum(1 - np.abs(np.arange(c)[:, None] / 2 - np.arange(n)), 0.0)
+        for c, n in zip(COUNTS, NODES, strict=True)
+    ]
+    weights = sparse.csr_matrix(np.kron(*both))
+    patch = replace(oval_patch(COUNTS, SPACING, 500.0), weights=weights)
+    places = GridPlaces(COUNTS, SPACING, np.arange(len(patch.points)))
+    at = np.stack([a.ravel() for a in np.indices(NODES)], axis=-1) * 2 * np.array(SPACING)
+    apart = np.linalg.norm(at[:, None] - at[None], axis=-1)
+    parts = [[1.0, 0.1, 0.0], [0.1, 0.6, 0.0], [0.0, 0.0, 0.6]]
+    same_step = np.kron(parts, 4e-6 * np.exp(-apart / 0.01))
+    normal = KernelTread(places, LayerInfluence(5e6, 0.45, 0.008))
+    p = len(at)
+    solver = ProjectedCG(SpreadCompliance(same_step[:p, :p], weights, normal))
+    brush = Brush(
+        BrushLaw(np.inf, friction, (0.05, 0.02)), patch.points[:, 0], patch.line, SPEED, STEP
+    )
+    brush.begin(patch.force > 0)
+    shear = KernelShear(places, LayerShear(5e6, 0.45, 0.008))
+    return ContactProblem(patch, same_step, solver, BrushFriction(brush, same_step, weights, shear))
+
+
+def rolled(problem: ContactProblem, first: int, last: int) -> np.ndarray:
+    """Forces (n, 3, c) N of the steps after `first` up to `last`."""
+    drive = Drive(height, lambda t: 0.0, SPEED, slope)
+    free, found = np.zeros(len(problem.change)), []
+    for _, roads in drive.roads(problem.patch, STEP, last, first, moving=True):
+        for road in roads:
+            solved = problem.solve(road, None, free)
+            problem.commit(solved)
+            found.append(np.concatenate([solved.force[None], solved.horizontal]))
+    return np.array(found)
+
+
+def test_a_loop_taken_up_again_has_the_same_bits() -> None:
+    whole, begun, resumed = problem_of(), problem_of(), problem_of()
+    expected = rolled(whole, 0, STEPS)
+    rolled(begun, 0, STEPS // 2)
+    resumed.set_state({name: value.copy() for name, value in begun.state().items()})
+    assert np.array_equal(rolled(resumed, STEPS // 2, STEPS), expected[STEPS // 2 :])
+    assert resumed.solutions == whole.solutions
+    force = expected[-1]
+    slides = np.hypot(*force[1:]) > 0.999 * FRICTION * force[0]
+    assert 10 < np.count_nonzero(slides & (force[0] > 0)) < np.count_nonzero(force[0]) - 10
+
+
+def test_all_of_the_tire_and_its_neighbourhood_find_the_same(monkeypatch) -> None:
+    """A Newton step needs the tire's compliance only about; what is found is that of all of it."""
+    monkeypatch.setattr(grid_newton, "GAP_TOLERANCE", 1e-11)
+    monkeypatch.setattr(grid_newton, "NEAR", 2.6)
+    some = problem_of()
+    monkeypatch.setattr(grid_newton, "MOST", 0.0)
+    every = problem_of()
+    assert every._at_once is not None and every._at_once._near is None
+    assert some._at_once is not None and some._at_once._near is not None
+    both = [rolled(problem, 0, STEPS) for problem in (some, every)]
+    # Horizontal forces end at 1e-3 of the largest, places where 3 % of deflections are left of gaps.
+    assert np.abs(both[0] - both[1]).max() < 5e-3 * both[0].max()
+    assert (
+        np.abs(both[0].sum(axis=2) - both[1].sum(axis=2)).max()
+        < 1e-3 * both[0][:, 0].sum(axis=1).max()
+    )
+
+
+def test_a_step_without_a_solution_of_both_is_split(monkeypatch) -> None:
+    """Normal forces then are in balance with the horizontal ones of the step before, and these with the normal ones."""
+    problem = problem_of()
+    rolled(problem, 0, 4)
+    settle, asked = grid_newton._Step.settle, []
+
+    def never_both(step, normal: bool = True, plane: bool = True) -> bool:
+        asked.append((normal, plane))
+        return settle(step, normal, plane) and not (normal and plane)
+
+    monkeypatch.setattr(grid_newton._Step, "settle", never_both)
+    force, *t = rolled(problem, 4, 5)[0]
+    assert asked == [(True, True), (True, False), (False, True)]
+    assert problem.lagging == 1
+    assert force.min() == 0.0
+    assert (np.hypot(*t) <= FRICTION * force * (1 + 1e-9) + 2e-3 * FRICTION * force.max()).all()
+    assert problem._at_once is not None and len(problem._at_once.index) < len(force)
+
+
+def test_what_no_newton_step_settles_ends_the_run(monkeypatch) -> None:
+    problem = problem_of()
+    monkeypatch.setattr(grid_newton, "TURNS", 1)
+    with pytest.raises(ConvergenceError, match="do not converge"):
+        rolled(problem, 0, 1)
