@@ -19,7 +19,7 @@ from tireroad.greens.recursion import LoadedColumns
 
 _C, _FFI = COMPILED.lib, COMPILED.ffi
 
-# Of the largest gap: residual of normal forces and gaps. About 1e-4 of the points' deflections on rough asphalt.
+# Of the largest gap: residual of normal forces and gaps, at the worst point. On rough asphalt about a thousandth of deflections.
 GAP_TOLERANCE = 1e-5
 INNER = 0.1  # residual reduction in a Newton step
 NEAR = 4.0  # spacings of nodes up to which a Newton step has the tire's compliance between them,
@@ -27,9 +27,7 @@ MOST = 0.5  # unless what is left out is more than this share of it: then all of
 PATIENT = 12  # Newton steps, before fewer points are to be found slipping where the residual does not fall
 FALLS, CAUTION, LEAST_CAUTION = 0.7, 0.1, 1e-4
 LIFT_PATIENCE = 10  # Newton steps, before a point without a bound that comes and goes is lifted by its own bristle
-_AROUND = (
-    3  # rows and columns of points around those that touch, among which a step looks for others
-)
+_AROUND = 3  # rows and columns of points beyond those that touch, which take part too
 
 # Heights (c,) m and slopes (c, 2) of the road under points at places (2, c) m beside their own.
 Reading = Callable[[Array], tuple[Array, Array]]
@@ -45,8 +43,9 @@ class GridNewton:
 
     P the projection on the disc of radius mu f and a the compliances of single points (Alart and Curnier, Comput. Methods
     Appl. Mech. Eng. 92 (1991) 353). The road is read anew in each Newton step, where the points have moved to.
-    Residuals are exact; the linear problem of a step is solved to a tenth by GMRES with C up to some cells and A between nodes near each
-    other (all of A where it is not local: of a tire that follows its forces at once). The points of a box around those that touch take part; the gaps of all others are found afterwards.
+    Residuals are exact; the linear problem of a step is solved to a tenth by GMRES with C up to some cells and A between nodes
+    near each other (all of A where it is not local: of a tire that follows its forces at once). The points of a box around those
+    that touch take part; the gaps of all others are found afterwards.
 
     Where no solution of both is found in 40 steps, normal forces take the horizontal ones of the step before, and
     stick and slip these normal forces (BrushFriction, `lagging`). Serial; `force` (3, c) N is the last solution.
@@ -117,6 +116,7 @@ class GridNewton:
         lags = not step.settle()
         if lags and (self.friction.unbounded or not step.split()):
             raise self.friction.unsolved()
+        step.within_bounds()
         self.before, self.force, self.slope = self.force, step.force, step.slope
         self.friction.advance(step.force, step.bases, lags)
         return step
@@ -257,6 +257,12 @@ class _Step:
         self._caution = 1.0
         return self.settle(plane=False) and self.settle(normal=False)
 
+    def within_bounds(self) -> None:
+        """Let no point pull at the road or bear more than friction holds, by what the tolerances have left."""
+        self.force[0] = np.maximum(self.force[0], 0.0)
+        _onto_discs(self.force[1:], self._brush.bound(self.force[0]))
+        self.force[1:, self.force[0] <= 0.0] = 0.0
+
     def _evaluate(self) -> None:
         """Gaps and slips of the box's points, with the road read where they lie."""
         solver, (f, *t), slope = self._solver, self.force, self.slope
@@ -334,6 +340,8 @@ class _Step:
             self._bears[index[self._touches != (self.force[0, index] > 0.0)]] = False
         touches = self._touches if normal else self.force[0, index] > 0.0
         part = np.flatnonzero(touches | self.force[:, index].any(axis=0))
+        if not len(part):
+            return
         at = index[part]
         touches, trial, gap, slip = (
             touches[part],
