@@ -211,7 +211,15 @@ def _reproduce_options(reproduce: argparse.ArgumentParser) -> None:
 
 
 def _validate_options(validate: argparse.ArgumentParser) -> None:
-    _bench_options(validate)
+    validate.add_argument(
+        "names",
+        nargs="*",
+        metavar="NAME",
+        help="all by default; or a SCENE.toml of your own, which is run against full finite elements in time",
+    )
+    validate.add_argument(
+        "--out", type=Path, metavar="FILE.json", help="results, with a page beside them"
+    )
     validate.add_argument(
         "--large", action="store_true", help="on meshes of full size: hours, not minutes"
     )
@@ -477,9 +485,16 @@ def _bench(args: argparse.Namespace) -> None:
 
 
 def _validate(args: argparse.Namespace) -> None:
-    from tireroad.runs.validation.tables import run_all
+    from tireroad.runs.validation.tables import run_all, run_scenes
 
-    run_all("tireroad.runs.validation", args.names, args.out, args.large)
+    scenes = [Path(name) for name in args.names if name.endswith(".toml")]
+    if not scenes:
+        return run_all("tireroad.runs.validation", args.names, args.out, args.large)
+    if len(scenes) < len(args.names) or args.large:
+        raise InputError(
+            "validate takes names, or scenes of your own: one or the other, and no --large with them"
+        )
+    return run_scenes(scenes, args.out)
 
 
 def _results(directory: Path) -> Path:

@@ -29,7 +29,8 @@ from tireroad.runs.pipeline import Finished, run_scene
 from tireroad.runs.process import console
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.physics import turning_of
-from tireroad.runs.stages.setup import probes, scene_setup
+from tireroad.runs.stages.setup import Probes, probes, scene_setup
+from tireroad.runs.stages.stage import Job
 from tireroad.runs.validation.tables import Table
 
 
@@ -113,31 +114,12 @@ class Choice:
     step: float
 
 
-class Tires:
-    """A scene run up to its modes; its road, and the modes kept, can then be changed at low cost.
+class Elements:
+    """The full finite elements of a `run` that has come as far as its modes, between the `probes` of its contact."""
 
-    `static_seconds`, `modes_seconds`: duration of those stages. Files go to `folder`.
-    """
-
-    def __init__(self, scene: str, folder: Path):
-        self._file = folder / "scene.toml"
-        self._file.write_text(scene)
-        with console.quiet():
-            self.run: Finished = run_scene(
-                load(self._file),
-                folder,
-                MPI.COMM_SELF,
-                until="modes",
-                fresh=False,
-                petsc_options=[],
-            )
-        stages = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["stages"]
-        self.static_seconds, self.modes_seconds = (
-            stages[name]["seconds"] for name in ("static", "modes")
-        )
-        self.motions, self.modes = self.run.motions, self.run.fields
-        self._rolling: dict[int, RollingModes] = {}
-        self.change(scene)
+    def __init__(self, run: Finished, job: Job, probes: Probes | None) -> None:
+        self.run, self.job, self.probes = run, job, probes
+        self.motions, self.modes = run.motions, run.fields
 
     @property
     def unknowns(self) -> int:
@@ -145,54 +127,9 @@ class Tires:
         return self.motions.unknowns
 
     @property
-    def setting(self) -> str:
-        """Size, and cost before any road, for a title."""
-        top = self.modes.frequency[-1]
-        return (
-            f"{self.unknowns} unknowns; static state {self.static_seconds:.1f} s, "
-            f"{len(self.modes.frequency)} modes to {top:.0f} Hz {self.modes_seconds:.1f} s"
-        )
-
-    def change(self, scene: str) -> None:
-        """Switch to a scene that differs only after its modes: road, forces, contact, time."""
-        self._file.write_text(scene)
-        self.job = replace(self.run.job, scene=load(self._file))
-        self._responses: dict[tuple[int, str], tuple[Response, float]] = {}
-        static, contact = self.run.static, self.job.scene.contact
-        setup = scene_setup(self.job, static) if contact else None
-        self.probes = probes(self.job, static, setup)
-        if setup:
-            begins = contact.has_friction and self.wheel.speed > 0
-            exact = self.response(len(self.modes.frequency), "static") if begins else None
-            self.trial = Conditions(contact, setup, self.job.scene.time.duration, exact)
-
-    @property
     def wheel(self) -> Wheel:
         """The full matrices of the rotating wheel."""
         return self.run.wheel
-
-    def modal(self, choice: Choice) -> tuple[Recursion, float, float]:
-        """The lowest modes with their residual between the scene's points; step; set-up in s."""
-        key = choice.modes, choice.residual
-        if key not in self._responses:
-            began = time.perf_counter()
-            self._responses[key] = self.response(*key), time.perf_counter() - began
-        response, seconds = self._responses[key]
-        began = time.perf_counter()
-        kept = response.resolved(choice.step)
-        tire = Recursion(response=kept, step=choice.step, scheme="linear", comm=self.job.comm)
-        return tire, choice.step, seconds + time.perf_counter() - began
-
-    def response(self, count: int, residual: str, counted: bool = True) -> Response:
-        """The response of the lowest modes as the stages make it; the `counted` part, or all."""
-        if count not in self._rolling:
-            turning = turning_of(self.job.scene, self.job.speed)
-            few = fewer(self.modes, self.motions, count, turning, self.job.axle)
-            self._rolling[count] = rolling_modes(few, turning, self.job.comm)
-        rolling, points = self._rolling[count], self.probes
-        points = points.on_face if counted else points
-        given = points.outputs, points.loads, residual, lambda: rolling.basis
-        return make_response(lambda: self.wheel, rolling, *given).response
 
     def full(self, step: float, radius: float = RADIUS) -> tuple[FullTire, float, float]:
         """All degrees of freedom between the same points; step; set-up in s."""
@@ -219,6 +156,7 @@ class Tires:
     @property
     def _all_points(self) -> sparse.csr_matrix:
         """Outputs and loads of full finite elements."""
+        assert self.probes is not None, "points of a contact"
         return self.probes.on_face.loads
 
     def _damping(self) -> tuple[tuple[float, float], ModalDamping | None]:
@@ -248,6 +186,78 @@ class Tires:
             turning=(wheel.rotation, static.rolling) if wheel.speed else None,
         )
         return tire, step, time.perf_counter() - began
+
+
+class Tires(Elements):
+    """A scene run up to its modes; its road, and the modes kept, can then be changed at low cost.
+
+    `static_seconds`, `modes_seconds`: duration of those stages. Files go to `folder`.
+    """
+
+    def __init__(self, scene: str, folder: Path):
+        self._file = folder / "scene.toml"
+        self._file.write_text(scene)
+        with console.quiet():
+            run = run_scene(
+                load(self._file),
+                folder,
+                MPI.COMM_SELF,
+                until="modes",
+                fresh=False,
+                petsc_options=[],
+            )
+        stages = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["stages"]
+        self.static_seconds, self.modes_seconds = (
+            stages[name]["seconds"] for name in ("static", "modes")
+        )
+        super().__init__(run, run.job, None)
+        self._rolling: dict[int, RollingModes] = {}
+        self.change(scene)
+
+    @property
+    def setting(self) -> str:
+        """Size, and cost before any road, for a title."""
+        top = self.modes.frequency[-1]
+        return (
+            f"{self.unknowns} unknowns; static state {self.static_seconds:.1f} s, "
+            f"{len(self.modes.frequency)} modes to {top:.0f} Hz {self.modes_seconds:.1f} s"
+        )
+
+    def change(self, scene: str) -> None:
+        """Switch to a scene that differs only after its modes: road, forces, contact, time."""
+        self._file.write_text(scene)
+        self.job = replace(self.run.job, scene=load(self._file))
+        self._responses: dict[tuple[int, str], tuple[Response, float]] = {}
+        static, contact = self.run.static, self.job.scene.contact
+        setup = scene_setup(self.job, static) if contact else None
+        self.probes = probes(self.job, static, setup)
+        if setup:
+            begins = contact.has_friction and self.wheel.speed > 0
+            exact = self.response(len(self.modes.frequency), "static") if begins else None
+            self.trial = Conditions(contact, setup, self.job.scene.time.duration, exact)
+
+    def modal(self, choice: Choice) -> tuple[Recursion, float, float]:
+        """The lowest modes with their residual between the scene's points; step; set-up in s."""
+        key = choice.modes, choice.residual
+        if key not in self._responses:
+            began = time.perf_counter()
+            self._responses[key] = self.response(*key), time.perf_counter() - began
+        response, seconds = self._responses[key]
+        began = time.perf_counter()
+        kept = response.resolved(choice.step)
+        tire = Recursion(response=kept, step=choice.step, scheme="linear", comm=self.job.comm)
+        return tire, choice.step, seconds + time.perf_counter() - began
+
+    def response(self, count: int, residual: str, counted: bool = True) -> Response:
+        """The response of the lowest modes as the stages make it; the `counted` part, or all."""
+        if count not in self._rolling:
+            turning = turning_of(self.job.scene, self.job.speed)
+            few = fewer(self.modes, self.motions, count, turning, self.job.axle)
+            self._rolling[count] = rolling_modes(few, turning, self.job.comm)
+        rolling, points = self._rolling[count], self.probes
+        points = points.on_face if counted else points
+        given = points.outputs, points.loads, residual, lambda: rolling.basis
+        return make_response(lambda: self.wheel, rolling, *given).response
 
 
 TIMES = 3  # repetitions: a modal loop takes 0.1 s, and its CPU time scatters threefold

@@ -85,6 +85,25 @@ def run_all(package: str, names: list[str], out: Path | None, large: bool = Fals
         raise ConvergenceError(f"not measured: {'; '.join(failed)}")
 
 
+def run_scenes(scenes: list[Path], out: Path | None) -> None:
+    """Run scenes against full finite elements in time, show their tables, and save them as `run_all` does."""
+    from tireroad.runs.validation.own_scene import against_elements
+
+    if out is not None:
+        _check(out)
+    results, about = {}, {}
+    for scene in scenes:
+        name = str(scene)
+        about[name] = "forces of a scene against full finite elements of the same mesh, in time"
+        results[name] = against_elements(scene)
+        for table in results[name]:
+            show(table)
+        if out is not None:
+            _keep(results, about, out)
+    if out is not None:
+        console.say(f"{out} and {out.with_suffix('.html')}")
+
+
 def _check(out: Path) -> None:
     """Make the folder of `out`; InputError if no file of that name can be written there."""
     if out.is_dir():

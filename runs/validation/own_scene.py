@@ -1,0 +1,123 @@
+"""A scene of one's own: its run against full finite elements in time, on the same mesh, road and points."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from pathlib import Path
+
+from mpi4py import MPI
+
+from tireroad.contact.results.spectra import distance
+from tireroad.fem.errors import InputError
+from tireroad.runs.pipeline import Finished, run_scene
+from tireroad.runs.process import console
+from tireroad.runs.scene.load import load
+from tireroad.runs.stages.setup import probes
+from tireroad.runs.validation.full_elements import (
+    Conditions,
+    Elements,
+    FullHistory,
+    digits,
+    follow,
+    percent,
+)
+from tireroad.runs.validation.tables import Table
+
+LONGEST = 0.05  # s of the road: full finite elements take a second of CPU for a few of their steps
+REFINED = 2  # steps of the full finite elements in one of the run's, in the reference
+AXES = ("along the road", "across it", "vertical")
+
+
+def against_elements(scene: Path, duration: float = LONGEST) -> list[Table]:
+    """What the modes and the time step of a scene cost: its forces against full finite elements, direction by direction.
+
+    The scene is run as it stands but for its first `duration` s of road (or what it has), on one process. Full finite
+    elements of the same mesh, in the same state, with the same points, tread, friction and damping take steps of the same
+    size and of half of it: the second are the reference, and what the first are off from it bounds its own error. The mesh's
+    own error is not in it (`[accuracy] estimate`). InputError for a scene without contact, or that forces drive.
+    """
+    given = load(scene)
+    if given.contact is None:
+        raise InputError(
+            f"{scene}: without [contact] nothing is to be validated in time: give [contact] and [road]"
+        )
+    if given.force:
+        raise InputError(
+            f"{scene}: [[force]] drives the tire besides the road, which validate does not repeat: leave it out"
+        )
+    length = min(duration, given.time.duration)
+    changes = [
+        f"time.duration={length!r}",
+        "accuracy.estimate=false",
+        "static.error_estimate=false",
+    ]
+    with tempfile.TemporaryDirectory(prefix="tireroad-validate-") as folder:
+        began = time.process_time()
+        run = run_scene(
+            load(scene, changes),
+            Path(folder),
+            MPI.COMM_SELF,
+            until="contact",
+            fresh=False,
+            petsc_options=[],
+        )
+        seconds = time.process_time() - began
+        return [_compared(scene, run, seconds)]
+
+
+def _compared(scene: Path, run: Finished, seconds: float) -> Table:
+    """The run, whose stages took `seconds` of CPU, beside full finite elements."""
+    job, static, history = run.job, run.static, run.done["contact"].product
+    setup, response = run.setup, run.greens.contact
+    contact = job.scene.contact
+    assert contact is not None, "a scene with contact"
+    elements = Elements(run, job, probes(job, static, setup))
+    settled, _ = setup.equilibrated(response, static.normal_force, contact)
+    trial = Conditions(contact, settled, history.step * len(history.time), response)
+    found = []
+    for parts in (1, REFINED):
+        console.say(
+            f"full finite elements: {len(history.time) * parts} steps of {history.step / parts:.3g} s"
+        )
+        found.append(follow(trial, *elements.full(history.step / parts)))
+    coarser, reference = found
+    axle = history.axle_force
+    values = {"contact force": history.total_force} | ({} if axle is None else {"axle force": axle})
+    own = FullHistory(history.step, values, seconds, 0.0)
+    rows = [
+        _row(*of, own, coarser, reference)
+        for of in ((name, axis) for name in values for axis in range(3))
+    ]
+    columns = [("force", ""), ("direction", ""), ("mean", "N"), ("standard deviation", "N"),
+               ("full FE at the run's step", "%"), ("the run", "%"), ("mean of the run less that", "N")]  # fmt: skip
+    kept = len(run.fields.frequency)
+    title = (
+        f"{scene.name}: {trial.duration:.3g} s, {elements.unknowns} unknowns, {kept} modes, {len(settled.patch.points)} "
+        f"contact points, steps of {history.step:.3g} s"
+    )
+    notes = [
+        f"Against full finite elements in steps of {reference.step:.3g} s, on the same mesh, road, points, tread and friction: relative "
+        "L2 norms of what varies, in the band of the other validations. What halving the step changes in the full finite elements stands "
+        "beside what the run is off: where that is not smaller, the figure is of the reference.",
+        f"CPU time: the scene's stages and loop {seconds:.0f} s; loops of the full finite elements {coarser.seconds:.0f} and "
+        f"{reference.seconds:.0f} s, and {reference.setup:.0f} s for a factor.",
+    ]
+    return Table(title, columns, rows, notes)
+
+
+def _row(
+    force: str, axis: int, own: FullHistory, coarser: FullHistory, reference: FullHistory
+) -> list:
+    right, near, found = (of.values[force][:, axis : axis + 1] for of in (reference, coarser, own))
+    length = reference.step * len(right)
+    off = [percent(distance(right, other, length).mean) for other in (near, found)]
+    mean = float(right.mean())
+    return [
+        force,
+        AXES[axis],
+        digits(mean),
+        digits(float(right.std())),
+        *off,
+        digits(float(found.mean()) - mean),
+    ]
