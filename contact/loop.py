@@ -519,6 +519,7 @@ class ContactProblem:
             self._q, self._free, read if road.leans else None, road.known, self._tolerance
         )
         self.solutions += found.turns
+        self.unsettled += found.astray
         slope = found.slope if road.leans else None
         return Solved(
             found.force[0], found.gap, found.force[1:], found.residual, found.penetration, slope

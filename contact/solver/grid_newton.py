@@ -27,6 +27,7 @@ MOST = 0.5  # unless what is left out is more than this share of it: then all of
 PATIENT = 12  # Newton steps, before fewer points are to be found slipping where the residual does not fall
 FALLS, CAUTION, LEAST_CAUTION = 0.7, 0.1, 1e-4
 LIFT_PATIENCE = 10  # Newton steps, before a point without a bound that comes and goes is lifted by its own bristle
+READINGS = 12  # Newton steps in which the road is read, at most: on a steep flank a point may go to and fro
 _AROUND = 3  # rows and columns of points beyond those that touch, which take part too
 
 # Heights (c,) m and slopes (c, 2) of the road under points at places (2, c) m beside their own.
@@ -228,7 +229,7 @@ class _Step:
         self.force[:, ~(self.force[0] > 0.0)] = 0.0
         _onto_discs(self.force[1:], self._brush.bound(self.force[0]))
         self.slope = solver.slope if read else np.zeros((len(gap), 2))
-        self.gap, self.residual, self.turns = gap, 0.0, 0
+        self.gap, self.residual, self.turns, self.astray = gap, 0.0, 0, False
         self._height, self._reads = road, False
         self._place: Array | None = None
         self._caution, self._off, self._first, self._limit = 1.0, 0.0, 0.0, 0.0
@@ -292,8 +293,8 @@ class _Step:
         )
 
     def _meet(self, place: Array) -> None:
-        """Read the road where the points lie, (2, c) m, unless gaps have hardly changed since by where they lie: in the mean square, as
-        single points go to and fro between places."""
+        """Read the road where the points lie, (2, c) m, unless gaps have hardly changed since by where they lie, in the mean
+        square; what is `astray` after some readings stays where the road was read last."""
         (f, *_), own = self.force, self._solver.own
         self._reads = self._read is not None
         if self._place is not None:
@@ -301,9 +302,9 @@ class _Step:
                 self.slope[:, 0] * (place[0] - self._place[0])
                 + self.slope[:, 1] * (place[1] - self._place[1])
             )
-            self._reads = bool(
-                np.linalg.norm(shift[f > 0.0]) > self._tolerance * np.linalg.norm(own * f)
-            )
+            moved = np.linalg.norm(shift[f > 0.0]) > self._tolerance * np.linalg.norm(own * f)
+            self.astray = bool(moved) and self.turns > READINGS
+            self._reads = bool(moved) and not self.astray
         if self._reads and self._read is not None:
             self._place = place
             self._height, self.slope = self._read(place)
