@@ -153,7 +153,8 @@ def _unheard(wanted: float, speed: float, scene: Scene) -> float:
 
 def tread_rubber(scene: Scene, given: Given) -> Scene:
     """Rubber of the contact of a radial tire where the scene leaves it open: as much stiffer as its tread."""
-    contact, stiffer = scene.contact, scene.tire.shape.tread_over_own(scene.tire)
+    contact = scene.contact
+    stiffer = scene.tire.shape.tread_over_own(scene.tire, scene.temperature)
     if contact is None or stiffer is None or "youngs_modulus" in given.keys("contact"):
         return scene
     if not isinstance(contact.law, ElasticTread):
