@@ -373,6 +373,15 @@ class InflatedRing:
                 row += share * answer * np.cos(wave * angles)
         return out
 
+    def flexibility(self, wave: int, weights: np.ndarray, frequency: float | None) -> complex:
+        """w . K_n^-1 w, m rad/N, with the complex moduli of a frequency (Hz), or the static ones if None."""
+        load = self._radial(weights)
+        if frequency is None:
+            stiffness = self._inside(self._tangent(wave, self.pressure))
+        else:
+            stiffness = self._dynamic_stiffness(wave)(frequency)
+        return complex(load @ splu(stiffness.astype(complex)).solve(load))
+
     def modes(self, wave: int, weights: np.ndarray, count: int = 150) -> SectionModes:
         """The `count` lowest modes of a wave, and what of them a load of `weights` (n,) across sees."""
         load, mass = self._radial(weights), self._inside(self.mass).toarray()

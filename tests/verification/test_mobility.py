@@ -5,7 +5,7 @@ import pytest
 
 from tireroad.fem.sections.inflated import InflatedRing
 from tireroad.fem.sections.radial import radial
-from tireroad.runs.validation import mobility, waves_around
+from tireroad.runs.validation import mobility, slow_motions, waves_around
 
 FREQUENCY = np.array([20.0, 63.0, 100.0, 125.0])
 
@@ -51,6 +51,19 @@ def test_waves_of_elements_and_of_modes_are_those_of_the_series(monkeypatch):
     answers = zip(*waves_around._of_modes(ring, weights), strict=True)
     for found, limit in zip(map(waves_around._summed, answers), (0.02, 0.07, 0.07), strict=True):
         assert np.abs(found - exact).max() < limit * np.abs(exact).max()
+
+
+@pytest.mark.slow
+def test_slow_motions_find_moduli_between_static_and_modal_ones(monkeypatch):
+    """Static moduli are the softest; what stands on a rolling tire is the stiffer the faster, and softer than the modes."""
+    for name, value in {"ALONG": 10, "WAVES": 6, "SPEEDS": (1.0, 20.0, 72.0)}.items():
+        monkeypatch.setattr(slow_motions, name, value)
+    (table,) = slow_motions.run()
+    for _, static, modes, *waves in table.rows:
+        assert 1e3 < static < 1e4
+        assert modes < waves[2] < waves[1] < waves[0]
+        assert modes < 0.97
+        assert waves[0] < 1.1
 
 
 def test_the_plate_by_hand():
