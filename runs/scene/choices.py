@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 from tireroad.contact.choices import USABLE
 from tireroad.contact.tread.laws.elastic import ElasticTread
 from tireroad.fem.parameters import second_digit
+from tireroad.fem.tire.material import REFERENCE, wlf
 from tireroad.runs.scene.plan import skipped
 from tireroad.runs.scene.schema import Pitch, Source
 from tireroad.runs.scene.tables.scene import (
@@ -169,6 +170,17 @@ def tread_rubber(scene: Scene, given: Given) -> Scene:
     )
 
 
+def warmth(scene: Scene, given: Given) -> Scene:
+    """Say what another temperature than that of the compounds makes of pressure and moduli."""
+    if scene.temperature != REFERENCE:
+        given.say(
+            f"temperature = {scene.temperature:g} °C: {scene.static.inflation / 1e3:.4g} kPa at {REFERENCE:g} °C are "
+            f"{scene.inflation / 1e3:.4g} kPa; rubber has at f the moduli that it has there at "
+            f"{wlf(scene.temperature):.3g} f"
+        )
+    return scene
+
+
 def wheel_speed(scene: Scene, given: Given) -> Scene:
     """Set the wheel's speed for a travel speed until the static state gives its rolling radius."""
     rotation = scene.rotation
@@ -247,6 +259,7 @@ CHOICES = (
     Choice(by_band),
     Choice(mesh),
     Choice(damping, TIRE),
+    Choice(warmth),
     Choice(tread_rubber, TIRE),
     Choice(wheel_speed, TIRE),
     Choice(points, TIRE),

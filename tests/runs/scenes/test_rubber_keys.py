@@ -39,6 +39,17 @@ def test_a_warm_tire(tmp_path):
         scene(tmp_path, RADIAL, "temperature=-60")
 
 
+def test_what_the_temperature_makes_is_said(tmp_path):
+    """And nothing of a tire at 20 degrees C."""
+    path, said = tmp_path / "scene.toml", []
+    path.write_text(RADIAL + "[static]\ninflation = 2.2e5\n")
+    load(path, (), said.append)
+    assert not any("temperature" in line for line in said)
+    load(path, ("temperature=60",), said.append)
+    (line,) = (line for line in said if "temperature" in line)
+    assert "220 kPa at 20 °C are 263.8 kPa" in line and "0.0147 f" in line
+
+
 def test_a_hardness_is_written_back_as_moduli(tmp_path):
     """65 Shore A, of the built-in tire and of a torus, once: what is written back has no hardness."""
     text = '[[tire.region]]\nname = "tread"\nhardness = 70\n'
