@@ -33,13 +33,13 @@ from scipy import linalg, sparse
 from tireroad.fem import compat, kinematics
 from tireroad.fem.collective import summed
 from tireroad.fem.errors import InputError
+from tireroad.fem.gas_law import ATMOSPHERE
 from tireroad.fem.matrices.operators import Unknowns
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.mesh import INNER
 
 GAS_CONSTANT = 287.0  # J/(kg K), of dry air
 RATIO = 1.4  # of specific heats
-ATMOSPHERE = 101325.0  # Pa; inflation is measured above it
 _PRANDTL = 0.71
 WAVES = 8  # around the ring, kept by default: 1.7 kHz in a passenger tire
 _STATIONS = 16  # per wave: integrals of triple products are exact, others to 1e-6

@@ -37,16 +37,16 @@ from tireroad.fem.wheel import Axle
 
 
 class ModalDamping:
-    """`fields`: own rows (n, m) of M-orthonormal modes, kg^-1/2; `excess` (m,) 1/s. Collective.
+    """`fields`: own rows (n, m) of M-orthonormal modes, kg^-1/2; `excess` (m, m) 1/s. Collective.
 
     `body`: the matrix B of a wheel that rotates at `speed` (rad/s), None if standing.
 
     A low-rank matrix in addition to the sparse ones,
 
-        D_x = M Phi diag(e) Phi^T M,   and in the rolling pencil
-        K_x = Omega D_x M^-1 B = Omega M Phi diag(e) Phi^T B,
+        D_x = M Phi E Phi^T M,   and in the rolling pencil
+        K_x = Omega D_x M^-1 B = Omega M Phi E Phi^T B,
 
-    e_k being the damping rate of mode k in excess of the sparse matrices' uniform one. A system A + c
+    E being the damping of the modes in excess of the sparse matrices' uniform one. A system A + c
     D_x + K_x is solved with A's factorisation and a small matrix (Sherman, Morrison and Woodbury).
     """
 
@@ -60,7 +60,7 @@ class ModalDamping:
     ) -> None:
         self._comm, self._fields = operators.body.comm, fields
         self._weighted = operators.mass[:, None] * fields
-        self._push = self._weighted * excess
+        self._push = self._weighted @ excess
         # Phi^T B = -(B Phi)^T: B is skew.
         self._turned = 0.0 if body is None else -speed * multiply(body, fields)
 

@@ -62,9 +62,9 @@ def large_response(
     along = summed(comm, pushed.T @ modes.vectors)
     d, k, face = len(at_kept), pushed.shape[1], basis.shape.shape[0]
 
-    def inside(stiffer: Array | float) -> Basis:
+    def inside(pushes: Array) -> Basis:
         return replace(
-            basis, shape=np.vstack([basis.shape, at_kept, stiffer * along]), projection=projection
+            basis, shape=np.vstack([basis.shape, at_kept, pushes]), projection=projection
         )
 
     more = sparse.identity(d + k, format="csr")
@@ -80,7 +80,8 @@ def large_response(
     own, growth = on_own_rows(operators, points), wheel.growth or 1.0
     driven = sparse.hstack([own, sparse.csr_matrix(growth * pushed)], format="csr")
     read = sparse.vstack([own.T, rows, sparse.csr_matrix(growth * pushed.T)], format="csr")
-    bases = inside(projection.own_squares / projection.squares), inside(growth)
+    true = (along / projection.squares) @ projection.stiffness
+    bases = inside(true), inside(growth * along)
     return wheel.respond_inside(*bases, outputs, loads, read, driven)
 
 

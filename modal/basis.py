@@ -148,10 +148,10 @@ class Projection:
 
     `squares` (m,) omega^2; `gyroscopic`, `body` (m, m) 1/rad, skew; `convective`, `body_convective`
     (m, m) 1/rad2, symmetric; all four are None for a standing wheel. `momentum` (3, m) kg^1/2: int
-    rho phi_k, the momentum per rate of each mode. `loss_factor` (m,) by strain energy
-    (modal.damping), None where no compound has one. `squares` are those of the finite elements,
-    whose moduli are those of fem.tire.material.DYNAMIC_FREQUENCY; `rise` (m,) 1/s2 is what moduli at
-    each one's own frequency add, and `band_rise` (m,) what those in the middle of the band add, at half
+    rho phi_k, the momentum per rate of each mode. `losses` (m, m) 1/s: the damping by the compounds'
+    loss factors (modal.damping), None where no compound has one. `squares` are those of the finite elements,
+    whose moduli are those of fem.tire.material.DYNAMIC_FREQUENCY; `rise` (m, m) 1/s2 is what moduli at
+    their own frequencies add, and `band_rise` (m,) what those in the middle of the band add to each, at half
     the highest mode's frequency; None where none depends on frequency. The last `shapes` of the m coordinates are
     static shapes that joined the modes (modal.basis). Further coordinates: a of the `air` after
     the m, then c of a `corner`; a held wheel has c = 0, but its hub still carries moments.
@@ -163,7 +163,7 @@ class Projection:
     convective: np.ndarray | None = None
     body: np.ndarray | None = None
     body_convective: np.ndarray | None = None
-    loss_factor: np.ndarray | None = None
+    losses: np.ndarray | None = None
     rise: np.ndarray | None = None
     band_rise: np.ndarray | None = None
     shapes: int = 0
@@ -173,7 +173,21 @@ class Projection:
     @property
     def own_squares(self) -> np.ndarray:
         """omega^2 (m,) 1/s2 with the moduli at each one's own frequency."""
-        return self.squares if self.rise is None else self.squares + self.rise
+        return self.squares if self.rise is None else self.squares + np.diag(self.rise)
+
+    @property
+    def stiffness(self) -> np.ndarray:
+        """The stiffness (m, m) 1/s2 of the standing tire, with those moduli and what couples modes by them."""
+        held = np.diag(self.squares)
+        return held if self.rise is None else held + self.rise
+
+    @property
+    def loss_factor(self) -> np.ndarray | None:
+        """Loss factor (m,) of each mode by strain energy; 0 of rigid ones. None where no compound has one."""
+        if self.losses is None:
+            return None
+        rate, circular = np.diag(self.losses), np.sqrt(np.maximum(self.own_squares, 0.0))
+        return np.divide(rate, circular, out=np.zeros(len(rate)), where=circular > 0)
 
     @property
     def frequency(self) -> np.ndarray:
@@ -416,26 +430,47 @@ def _of_compounds(
     comm: MPI.Comm,
     known: Projection | None,
 ) -> Projection:
-    """The projection with loss factors, and with the rise where a modulus depends on frequency. Static
-    shapes respond in the band: their moduli are those in its middle. Collective.
+    """The projection with losses, and with the rise where a modulus depends on frequency. Collective.
+
+    With the compounds' part K_c of the stiffness between modes, moduli g_c and loss factors eta_c at their own
+    frequencies omega_k,
+
+        rise = sum_c (S_c K_c S_c - K_c),    S_c = diag sqrt g_c(omega_k),
+        losses = sum_c H_c K_c H_c,          H_c = diag sqrt(eta_c g_c(omega_k) / omega_k).
+
+    Both are positive semidefinite with K_c; on the diagonal they are those of fem.tire.material.own_moduli, and
+    between modes of two frequencies the moduli lie between theirs. Static shapes respond in the band: their
+    moduli are those in its middle.
     """
     squares, m = modes.squares, modes.count
     done = 0 if known is None else known.own
     stored = strain_energies(modes.vectors[:, done:], compounds, comm)
     kinds = [compound.kind for compound in compounds]
-
-    def before(name: str) -> np.ndarray:
-        values = None if known is None else getattr(known, name)
-        return np.zeros(done) if values is None else values
-
-    rise, loss = own_moduli(squares[done:m], stored[:, : max(m - done, 0)], kinds)
-    rise = np.concatenate([before("rise")[:m], rise])
-    middle = np.sqrt((squares[:m] + rise).max(initial=0.0)) / (4 * np.pi)
-    in_band, lost = own_moduli(squares[done:], stored, kinds, middle)
-    in_band = np.concatenate([before("band_rise"), in_band])
-    rise = np.concatenate([rise, in_band[m:]])
-    loss = np.concatenate([before("loss_factor"), loss, lost[max(m - done, 0) :]])
+    before = projection.squares[:0] if known is None else known.own_squares[:m]
+    own = np.concatenate([before, squares[done:m]])
+    own[len(before) :] += own_moduli(squares[done:m], stored[:, : max(m - done, 0)], kinds)[0]
+    middle = np.sqrt(own.max(initial=0.0)) / (4 * np.pi)
+    in_band = own_moduli(squares[done:], stored, kinds, middle)[0]
+    if known is not None and known.band_rise is not None:
+        in_band = np.concatenate([known.band_rise, in_band])
+    elif known is not None:
+        in_band = np.concatenate([np.zeros(done), in_band])
+    circular = np.sqrt(np.maximum(np.concatenate([own, (squares + in_band)[m:]]), 0.0))
+    frequency = np.append(circular[:m] / (2 * np.pi), np.full(len(squares) - m, middle))
+    rise, losses = (np.zeros((len(squares),) * 2) for _ in range(2))
+    nothing, elastic = np.zeros((done, done)), squares > 0
+    for compound in compounds:
+        part = projected(comm, modes.vectors, compound.stiffness, 1, nothing)
+        part *= np.outer(elastic, elastic)
+        modulus = compound.kind.spectrum.modulus(frequency)
+        loss = compound.kind.loss_factor * compound.kind.spectrum.loss_factor(frequency)
+        lost = np.divide(loss * modulus, circular, out=np.zeros(len(modulus)), where=circular > 0)
+        rise += part * (np.sqrt(np.outer(modulus, modulus)) - 1)
+        losses += part * np.sqrt(np.outer(lost, lost))
+    if known is not None:
+        rise[:done, :done] = 0.0 if known.rise is None else known.rise
+        losses[:done, :done] = 0.0 if known.losses is None else known.losses
     varies = any(kind.spectrum != CONSTANT for kind in kinds)
     loses = any(kind.loss_factor for kind in kinds)
-    projection = replace(projection, loss_factor=loss if loses else None)
+    projection = replace(projection, losses=losses if loses else None)
     return replace(projection, rise=rise, band_rise=in_band) if varies else projection

@@ -163,7 +163,7 @@ def standing_wave(
     flexible = projection.own_squares > 0
     wave = np.zeros(len(flexible))
     turn = np.eye(int(flexible.sum()))
-    squares = np.diag(projection.own_squares[flexible])
+    squares = projection.stiffness[np.ix_(flexible, flexible)]
     convective = convective[np.ix_(flexible, flexible)]
     if free_at is not None:
         values, motions = linalg.eigh(squares + free_at**2 * convective)

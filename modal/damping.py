@@ -1,24 +1,26 @@
 """Modal damping: proportional to the matrices, or by the strain energy of the rubber.
 
-    D_mod = diag(d_k),  d_k = gamma1 + gamma2 omega_k^2  or  d_k = 2 zeta_k omega_k = eta_k omega_k,
+    D_mod = diag(gamma1 + gamma2 omega_k^2)  or that of the losses (modal.basis.Projection), with the diagonal
 
-    eta_k = sum_r eta_r (phi_k . K_r phi_k) / (phi_k . K phi_k),
+    d_k = 2 zeta_k omega_k = eta_k omega_k,  eta_k = sum_r eta_r (phi_k . K_r phi_k) / (phi_k . K phi_k),
 
 where K_r is the material part of the tangent of region r and eta_r its loss factor. Cords, pressure
 and geometric stiffness store energy and dissipate none (Ungar and Kerwin 1962; Johnson and Kienholz
-1982, doi 10.2514/3.51195). D_mod acts on the body rate, which adds Omega D_mod B to the stiffness
-of the rolling tire.
+1982, doi 10.2514/3.51195). Where compounds lose differently, their losses couple modes besides:
+without it a tire moves up to 4 dB too little far from the force, from 250 Hz on
+(docs/verification/mobility.md). D_mod acts on the body rate, which adds Omega D_mod B to the
+stiffness of the rolling tire.
 
 Motions outside the modal basis are damped too: by gamma1 and gamma2 or, with loss factors, at the
 uniform rate of the highest modes,
 
-    D = M Phi diag(d_k - d_c) Phi^T M + d_c M,   d_c = eta_c omega_m,
+    D = M Phi (D_mod - d_c) Phi^T M + d_c M,   d_c = eta_c omega_m,
 
 where eta_c is the mean loss factor of the upper quarter of the modes. Their moduli, where these
 depend on frequency, are those in the middle of the band and grow as in the upper quarter: the
 stiffness is
 
-    K' = g_c K + M Phi diag(omega_k^2 - g_c squares_k) Phi^T M.
+    K' = g_c K + M Phi (stiffness - g_c diag(squares_k)) Phi^T M.
 """
 
 from __future__ import annotations
@@ -30,16 +32,21 @@ from tireroad.fem.wheel import Damping, Proportional, StrainEnergy
 from tireroad.modal.basis import Projection
 
 
-def rates(damping: Damping, projection: Projection) -> np.ndarray:
-    """Damping rates d_k (m,) 1/s of the modes. InputError if loss factors are missing."""
+def modal_damping(damping: Damping, projection: Projection) -> np.ndarray:
+    """D_mod (m, m) 1/s of the modes. InputError if loss factors are missing."""
     if isinstance(damping, StrainEnergy):
-        if projection.loss_factor is None:
+        if projection.losses is None:
             raise InputError(
                 "damping: no compound of the tire has a loss_factor: give one, or a [damping] table"
             )
-        return projection.loss_factor * np.sqrt(np.maximum(projection.own_squares, 0.0))
+        return projection.losses
     mass, stiffness = damping
-    return mass + stiffness * projection.squares
+    return np.diag(mass + stiffness * projection.squares)
+
+
+def rates(damping: Damping, projection: Projection) -> np.ndarray:
+    """Damping rates d_k (m,) 1/s of the modes, each alone. InputError if loss factors are missing."""
+    return np.diag(modal_damping(damping, projection)).copy()
 
 
 def ratios(damping: Damping, projection: Projection) -> np.ndarray:
@@ -59,7 +66,7 @@ def beyond(damping: Damping, projection: Projection) -> Proportional:
 
 def tail_loss(projection: Projection) -> float:
     """Loss factor eta_c of motions beyond the modes: the mean over their upper quarter."""
-    assert projection.loss_factor is not None, "rates() refuses modes without loss factors"
+    assert projection.loss_factor is not None, "modal_damping refuses modes without losses"
     return float(projection.loss_factor[_upper(projection)].mean())
 
 

@@ -18,7 +18,7 @@ from tireroad.fem.collective import summed
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.matrices.operators import Operators, RimMotion
 from tireroad.fem.parallel import on_root
-from tireroad.fem.wheel import Axle, Turning
+from tireroad.fem.wheel import Axle, Damping, StrainEnergy, Turning
 from tireroad.modal.basis import ModalBasis, Projection
 from tireroad.modal.campbell import Campbell
 from tireroad.modal.corner import meeting
@@ -254,9 +254,15 @@ def decouple(projection: Projection, turning: Turning, comm: MPI.Comm) -> StateM
     return _decoupled(projection, turning, comm)[0]
 
 
+def _coupled(projection: Projection, damping: Damping) -> bool:
+    """Whether the losses or the moduli of compounds couple the modes of a standing tire."""
+    return projection.rise is not None or isinstance(damping, StrainEnergy)
+
+
 def _decoupled(projection: Projection, turning: Turning, comm: MPI.Comm) -> tuple[StateModes, dict]:
     """The states, and the figures of modal.rotating.checks. Collective."""
-    if turning.speed == 0 and projection.air is None and not projection.moves:
+    alone = turning.speed == 0 and projection.air is None and not projection.moves
+    if alone and not _coupled(projection, turning.damping):
         return standing(projection, turning.damping), {}
     if turning.speed and projection.gyroscopic is None:
         raise InputError(
@@ -265,6 +271,8 @@ def _decoupled(projection: Projection, turning: Turning, comm: MPI.Comm) -> tupl
     if projection.moves:
         projection.wheel.check(turning.speed)
     given, free_motions = pencil(projection, turning), projection.free_motions
+    if alone:
+        free_motions = np.eye(projection.own)[:, projection.squares == 0]
 
     def solve() -> tuple[StateModes, dict]:
         if free_motions.shape[1]:

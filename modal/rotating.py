@@ -16,7 +16,7 @@ from scipy import linalg
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.modal.basis import Projection
-from tireroad.modal.damping import Damping, rates
+from tireroad.modal.damping import Damping, modal_damping, rates
 from tireroad.modal.states import StateModes
 
 Array = np.ndarray
@@ -159,17 +159,16 @@ def held_matrices(projection: Projection, speed: float, damping: Damping, inerti
 
 def _tire_matrices(projection: Projection, speed: float, damping: Damping, inertia: str) -> Pencil:
     """The same for the tire without its air."""
-    rate = rates(damping, projection)
-    stiffness, drag = np.diag(projection.own_squares), np.diag(rate)
+    stiffness, drag = projection.stiffness, modal_damping(damping, projection)
     if speed == 0:
         return drag, stiffness
     gyroscopic, convective, body = projection.rotating(inertia)
-    turning = speed * rate[:, None] * body
+    turning = speed * drag @ body
     return drag + 2 * speed * gyroscopic, stiffness + speed**2 * convective + turning
 
 
 def standing(projection: Projection, damping: Damping) -> StateModes:
-    """Uncoupled states without rotation: s = -d/2 +- sqrt(d^2/4 - omega^2), a = 2 s + d."""
+    """States without rotation of modes that nothing couples: s = -d/2 +- sqrt(d^2/4 - omega^2), a = 2 s + d."""
     squares = projection.own_squares
     m = len(squares)
     half = rates(damping, projection) / 2

@@ -47,7 +47,7 @@ from tireroad.fem.static.press import press as press_tire
 from tireroad.fem.static.state import StaticState
 from tireroad.fem.static.virtual_work import AT_REST
 from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.material import CONSTANT, Material, compound
+from tireroad.fem.tire.material import CONSTANT, REFERENCE, Material, compound, wlf
 from tireroad.fem.wheel import StrainEnergy, Turning
 from tireroad.greens.coupling import Wheel, wheel_of
 from tireroad.greens.outputs import by_momentum
@@ -217,13 +217,15 @@ def radial(
     segments: int = 40,
     elements_arc: int = 26,
     footprint_size: float = NEAR_ROAD,
+    temperature: float = REFERENCE,
     comm: MPI.Comm = MPI.COMM_WORLD,
 ) -> TireModel:
     """The built-in radial passenger tire of a size, without loads (docs/radial-tire.md).
 
     `segments` elements around and `elements_arc` from bead to bead, quadratic; those near the road
     are `footprint_size` of the others; `grooves` around its tread; `rim_width` m, of the size's measuring rim if
-    None; `scale`: factors on its compounds and cords, as [tire.scale] of a scene: {"tread": 1.1, "belt angle": 0.9}.
+    None; `scale`: factors on its compounds and cords, as [tire.scale] of a scene: {"tread": 1.1, "belt angle": 0.9};
+    `temperature` of its rubber in degrees C, which sets its moduli (fem.tire.material).
     Its rubbers have loss factors: with damping = tireroad.StrainEnergy() the rotating tire loses by them. Raises
     InputError for a size that is none, or a value out of the range that it has in a scene.
     """
@@ -241,7 +243,8 @@ def radial(
         made = scaled(tire, shape.scale or {})
     except InputError as problem:
         raise InputError(in_arguments(f"radial: {problem}")) from None
-    return make_tire(comm, made)
+    wlf(temperature)
+    return make_tire(comm, made, temperature)
 
 
 def _check_ranges(torus: Torus) -> None:

@@ -11,7 +11,7 @@ from tireroad.contact.patch import LEAST_REACH, Patch
 from tireroad.contact.results.chatter import Alternation, Chatter
 from tireroad.greens.recursion import ahead_of_mean
 from tireroad.greens.response import Response
-from tireroad.modal.damping import rates
+from tireroad.modal.damping import modal_damping
 from tireroad.modal.rolling import RollingModes, pencil
 
 AT_ONCE = 64  # steps of which the work is computed at a time: it takes nine arrays of their size
@@ -88,8 +88,8 @@ class Dissipation:
         held: np.ndarray | None = None,
         hub: np.ndarray | None = None,
     ) -> None:
-        """`damping` (n,) 1/s; `turning` Omega P (n, n) 1/s; `step` s; `held` (n, m); `hub` C (m, m) 1/s."""
-        self._damping, self._turning, self._step = damping[:, None], turning, step
+        """`damping` (n, n) 1/s; `turning` Omega P (n, n) 1/s; `step` s; `held` (n, m); `hub` C (m, m) 1/s."""
+        self._damping, self._turning, self._step = damping, turning, step
         self._held, self._hub = held, hub
         self.lost = self.drive = 0.0
         self._last = np.zeros(2)
@@ -101,7 +101,7 @@ class Dissipation:
             coordinates, rates = self._held @ coordinates, self._held @ rates
         turned = self._turning @ coordinates
         body = rates + turned
-        braked = self._damping * body
+        braked = self._damping @ body
         power = np.stack([_power(body, braked) + beside, _power(turned, braked)])
         power = np.column_stack([self._last, power])
         # Step by step, so that the sums do not depend on how steps are blocked.
@@ -222,11 +222,11 @@ class StateMotion:
         self._real, self._imaginary = right.real.copy(), right.imag.copy()
         self._eigenvalue = states.eigenvalue[slow][:, None]
         self._block, self._block_right = states.block, states.block_right
-        damping = rates(turning.damping, projection)
+        damping = modal_damping(turning.damping, projection)
         _, _, body = projection.rotating(turning.inertia)
         if projection.air is not None:
             duct = projection.air.duct
-            damping = np.concatenate([damping, duct.loss])
+            damping = linalg.block_diag(damping, np.diag(duct.loss))
             body = linalg.block_diag(body, duct.gyroscopic)
         moving = projection.hub_damping() if projection.moves else (None, None)
         self.losses = Dissipation(damping, turning.speed * body, step, *moving)

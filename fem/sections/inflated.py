@@ -30,13 +30,14 @@ from typing import Any, Protocol
 
 import numpy as np
 from scipy import sparse
+from scipy.linalg import eigh
 from scipy.sparse.linalg import eigsh, splu
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.sections import mesh2d
 from tireroad.fem.sections.construction import CordLine
 from tireroad.fem.sections.mesh2d import SectionMesh
-from tireroad.fem.tire.material import Spectrum, kinds, own_moduli, power_law
+from tireroad.fem.tire.material import Kind, Spectrum, kinds, own_moduli, power_law
 
 STEPS = (0.02, 0.1, 0.3, 0.6, 1.0)  # shares of the inflation pressure
 _SMALL = 1e-10  # m: size of the last Newton step
@@ -186,6 +187,20 @@ class RigidMode:
     frequency: float
     damping: float
     inertia: float
+
+
+@dataclass(frozen=True)
+class SectionModes:
+    """Modes of a wave, of unit mass over one radian, at dynamic moduli.
+
+    `squares` (m,) 1/s2; `push` (m,) N kg^-1/2 of a load; `parts` (m, m) 1/s2 of the stiffness, of each kind of
+    compounds (fem.tire.material.kinds); `flexibility` w . K_n^-1 w, m rad/N, of the load at its own place.
+    """
+
+    squares: np.ndarray
+    push: np.ndarray
+    parts: Sequence[np.ndarray]
+    flexibility: float
 
 
 def mean_over(
@@ -352,11 +367,35 @@ class InflatedRing:
         load, mass = self._radial(weights), self._inside(self.mass)
         out = np.zeros((len(frequency), len(angles)), complex)
         for wave in range(waves + 1):
-            stiffness, share = self._dynamic_stiffness(wave), _share(wave, half_angle)
+            stiffness, share = self._dynamic_stiffness(wave), patch_share(wave, half_angle)
             for row, f in zip(out, frequency, strict=True):
                 answer = load @ splu(stiffness(f) - (2 * np.pi * f) ** 2 * mass).solve(load)
                 row += share * answer * np.cos(wave * angles)
         return out
+
+    def flexibility(self, wave: int, weights: np.ndarray, frequency: float | None) -> complex:
+        """w . K_n^-1 w, m rad/N, with the complex moduli of a frequency (Hz), or the static ones if None."""
+        load = self._radial(weights)
+        if frequency is None:
+            stiffness = self._inside(self._tangent(wave, self.pressure))
+        else:
+            stiffness = self._dynamic_stiffness(wave)(frequency)
+        return complex(load @ splu(stiffness.astype(complex)).solve(load))
+
+    def modes(self, wave: int, weights: np.ndarray, count: int = 150) -> SectionModes:
+        """The `count` lowest modes of a wave, and what of them a load of `weights` (n,) across sees."""
+        load, mass = self._radial(weights), self._inside(self.mass).toarray()
+        stiffness = self._inside(self._tangent(wave, self.pressure, dynamic=True)).toarray()
+        squares, fields = eigh(
+            (stiffness + stiffness.T.conj()) / 2, mass, subset_by_index=[0, count - 1]
+        )
+        parts = [self._inside(self._of_kind(wave, share)) for share in self._kinds.values()]
+        return SectionModes(
+            squares=squares,
+            push=fields.T.conj() @ load,
+            parts=[fields.T.conj() @ (part @ fields) for part in parts],
+            flexibility=float((load @ np.linalg.solve(stiffness, load)).real),
+        )
 
     def rolling(
         self, weights: np.ndarray, half_angle: float, waves: int = 60
@@ -375,8 +414,8 @@ class InflatedRing:
             stiffness = self._dynamic_stiffness(wave)(wave * self.speed / (2 * np.pi))
             inertia = self.speed**2 * self._inside(self._carried(wave))
             answer = load @ splu(stiffness - inertia).solve(load)
-            deflection += _share(wave, half_angle) * answer.real
-            moment -= wave * _share(wave, half_angle) * answer.imag
+            deflection += patch_share(wave, half_angle) * answer.real
+            moment -= wave * patch_share(wave, half_angle) * answer.imag
         return float(deflection), float(moment)
 
     def _radial(self, weights: np.ndarray) -> np.ndarray:
@@ -404,6 +443,11 @@ class InflatedRing:
         known = np.array(stored).reshape(-1, count)
         rise, loss = own_moduli(per_turn**2 * squares, per_turn**2 * known, list(self._kinds))
         return squares + rise / per_turn**2, loss, fields
+
+    @property
+    def kinds(self) -> list[Kind]:
+        """The kinds of its compounds."""
+        return list(self._kinds)
 
     @property
     def weight(self) -> float:
@@ -487,7 +531,7 @@ class InflatedRing:
         return matrix[self._free][:, self._free].tocsc()
 
 
-def _share(wave: int, half_angle: float) -> float:
+def patch_share(wave: int, half_angle: float) -> float:
     """Share of a wave in the mean over a patch of a load on it, 1/rad."""
     return float((2 if wave else 1) * np.sinc(wave * half_angle / np.pi) ** 2 / (2 * np.pi))
 

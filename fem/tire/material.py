@@ -6,9 +6,18 @@ and the range tests follow from it.
 
 The storage modulus of a filled rubber grows by a third to two thirds from 10 Hz to 1 kHz, its loss
 factor by less. A `Spectrum` gives both relative to those at DYNAMIC_FREQUENCY: a power law (a
-fractional element, E* ~ (i w)^b, whose own loss factor is tan(pi b / 2)), or a Prony series
+fractional element, E* ~ (i w)^b, whose own loss factor is tan(pi b / 2)), a measured master curve, or a Prony series
 
     E*(w) / E_0 = 1 - sum g_k + sum g_k i w t_k / (1 + i w t_k).
+
+At another temperature the rubber has at a frequency f the moduli that it has at a_T f where they were given, at
+REFERENCE (time-temperature superposition), with the shift of Williams, Landel and Ferry (J. Am. Chem. Soc. 77 (1955)
+3701) about the glass transition T_g,
+
+    log10 a_T = C(T) - C(T_ref),   C(T) = -17.44 (T - T_g) / (51.6 + T - T_g).
+
+The static state is loaded at the rate of LOADING and follows the same law. That rubber gets stiffer in proportion
+to its absolute temperature (14 % from 20 to 60 degrees C) is left out.
 """
 
 from __future__ import annotations
@@ -29,7 +38,14 @@ if TYPE_CHECKING:
 DYNAMIC_FREQUENCY = (
     100.0  # Hz, at which `dynamic` and `loss_factor` hold, in the middle of 10 Hz to 1 kHz
 )
-_SAMPLED = 0.1, 1e5, 20  # Hz, Hz, samples in a decade of a Prony series
+REFERENCE = 20.0  # degrees C, at which compounds are given
+LOADING = 0.1  # Hz, of a load that comes in seconds
+GLASS = (
+    -50.0
+)  # degrees C: rubbers of tires have transitions from -70 (natural rubber) to -20 (wet grip)
+COLDEST = GLASS + 20.0  # degrees C; the shift does not hold near the transition
+_SAMPLED = 1e-4, 1e7, 20  # Hz, Hz, samples in a decade of a Prony series
+_DYNAMIC = np.array([DYNAMIC_FREQUENCY])
 _TURNS, _SETTLED = 50, 1e-12  # of the own frequencies; relative change of their squares
 
 
@@ -105,16 +121,33 @@ class Spectrum:
     exponent: float = 0.0
 
     def modulus(self, frequency: np.ndarray) -> np.ndarray:
-        """Storage modulus over that at DYNAMIC_FREQUENCY, at frequencies in Hz."""
+        """Storage modulus over that at DYNAMIC_FREQUENCY, at frequencies in Hz; below LOADING that at LOADING."""
+        return self._unbounded(np.maximum(frequency, LOADING))
+
+    def _unbounded(self, frequency: np.ndarray) -> np.ndarray:
         inside = np.clip(frequency, self.frequency[0], self.frequency[-1])
         known = np.interp(np.log(inside), np.log(self.frequency), np.log(self.storage))
-        beyond = self.exponent * np.log(np.maximum(frequency, _SAMPLED[0]) / inside)
-        return np.exp(known + beyond)
+        return np.exp(known + self.exponent * np.log(frequency / inside))
 
     def loss_factor(self, frequency: np.ndarray) -> np.ndarray:
         """Loss factor over that at DYNAMIC_FREQUENCY, at frequencies in Hz."""
         inside = np.clip(frequency, self.frequency[0], self.frequency[-1])
         return np.interp(np.log(inside), np.log(self.frequency), self.loss)
+
+    def stiffer(self, factor: float, frequency: float = DYNAMIC_FREQUENCY) -> float:
+        """Storage modulus at `factor` times a frequency (Hz) over that there."""
+        slow, fast = self._unbounded(frequency * np.array([1.0, factor]))
+        return float(fast / slow)
+
+    def shifted(self, factor: float) -> Spectrum:
+        """The spectrum of the moduli at `factor` times the frequency, relative to those at DYNAMIC_FREQUENCY."""
+        storage, loss = self.stiffer(factor), float(self.loss_factor(factor * _DYNAMIC)[0])
+        return Spectrum(
+            tuple(f / factor for f in self.frequency),
+            tuple(g / storage for g in self.storage),
+            tuple(part / (loss or 1.0) for part in self.loss),
+            self.exponent,
+        )
 
 
 CONSTANT = Spectrum()
@@ -150,6 +183,59 @@ def prony(
     return float(storage[-1] / (1 - g.sum())), float(loss[-1]), spectrum
 
 
+def measured(
+    frequency: Sequence[float] | np.ndarray,
+    storage: Sequence[float] | np.ndarray,
+    loss: Sequence[float] | np.ndarray,
+) -> tuple[float, float, Spectrum]:
+    """Storage modulus (Pa) and loss factor at DYNAMIC_FREQUENCY, and the spectrum, of a master curve.
+
+    `frequency` (k,) Hz ascending, with DYNAMIC_FREQUENCY among or between them; `storage` and `loss` (k,) Pa.
+    Straight lines over the logarithm of the frequency between them, for the modulus of its logarithm; constant beyond.
+    InputError for numbers that are none of a rubber.
+    """
+    f, stored, lost = (np.array(values, float) for values in (frequency, storage, loss))
+    if not (len(f) >= 2 and f[0] > 0 and (np.diff(f) > 0).all()):
+        raise InputError("a master curve needs two frequencies or more, above 0 Hz and ascending")
+    if not ((stored > 0).all() and (lost >= 0).all() and (np.diff(stored) >= 0).all()):
+        raise InputError(
+            "a master curve needs storage moduli above 0 that do not fall with the frequency, and loss moduli of 0 or more"
+        )
+    if not f[0] <= DYNAMIC_FREQUENCY <= f[-1]:
+        raise InputError(
+            f"a master curve must have {DYNAMIC_FREQUENCY:g} Hz between its frequencies; it has {f[0]:g} to {f[-1]:g} Hz"
+        )
+    there, x = math.log(DYNAMIC_FREQUENCY), np.log(f)
+    modulus = float(np.exp(np.interp(there, x, np.log(stored))))
+    ratio = lost / stored
+    eta = float(np.interp(there, x, ratio))
+    storage_over, loss_over = (
+        tuple(one.tolist()) for one in (stored / modulus, ratio / (eta or 1))
+    )
+    return modulus, eta, Spectrum(tuple(f.tolist()), storage_over, loss_over)
+
+
+def wlf(temperature: float, glass: float = GLASS) -> float:
+    """a_T at a temperature over that at REFERENCE, both in degrees C, of a rubber with its transition at `glass`.
+
+    InputError below COLDEST, where it does not hold.
+    """
+    if not temperature >= COLDEST:
+        raise InputError(
+            f"temperature = {temperature:g} degrees C: the shift of moduli holds from {COLDEST:g} degrees C up"
+        )
+    at, known = (-17.44 * (T - glass) / (51.6 + T - glass) for T in (temperature, REFERENCE))
+    return float(10 ** (at - known))
+
+
+def shore_a(hardness: float) -> float:
+    """Young's modulus, Pa, of a rubber of a hardness in Shore A.
+
+    E = 0.0981 (56 + 7.62336 S) / (0.137505 (254 - 2.54 S)) MPa (A. N. Gent, Rubber Chem. Technol. 31 (1958) 896).
+    """
+    return 1e6 * 0.0981 * (56 + 7.62336 * hardness) / (0.137505 * (254 - 2.54 * hardness))
+
+
 @dataclass(frozen=True, kw_only=True)
 class Material:
     """A rubber with strain energy `law` and `density` (kg/m3).
@@ -167,6 +253,20 @@ class Material:
     def __post_init__(self) -> None:
         if not (self.density > 0 and math.isfinite(self.density)):
             raise InputError(f"material: density = {self.density:g} kg/m3 must be above 0")
+
+    def at(self, temperature: float) -> Material:
+        """The rubber at a temperature, degrees C; it is given at REFERENCE."""
+        shift, spectrum = wlf(temperature), self.spectrum
+        if shift == 1.0 or spectrum == CONSTANT:
+            return self
+        slow = spectrum.stiffer(shift, LOADING)
+        return replace(
+            self,
+            law=self.law.times(slow),
+            dynamic=self.dynamic * spectrum.stiffer(shift) / slow,
+            loss_factor=self.loss_factor * float(spectrum.loss_factor(shift * _DYNAMIC)[0]),
+            spectrum=spectrum.shifted(shift),
+        )
 
 
 def compound(

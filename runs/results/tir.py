@@ -248,6 +248,8 @@ class _AsRun:
         shape = scene.tire.shape
         self._mesh = scene.tire.ring().section
         self.cords = shape.cords(scene.tire)
+        layers = shape.in_layers(scene.tire)
+        compounds = {name: one.at(scene.temperature) for name, one in layers.items()}
         self.compounds = {
             name: {
                 "youngs_modulus": one.law.youngs,
@@ -257,7 +259,7 @@ class _AsRun:
                 "loss_factor": one.loss_factor,
                 "spectrum": one.spectrum,
             }
-            for name, one in shape.in_layers(scene.tire).items()
+            for name, one in compounds.items()
         }
 
     def section(self, elements: int, order: int) -> SectionMesh:
@@ -268,6 +270,6 @@ class _AsRun:
 def _ring(scene: Scene) -> InflatedRing | None:
     """The tire of the scene by Fourier series around; None where its inflation does not settle."""
     try:
-        return InflatedRing(_AsRun(scene), 0, 0, scene.static.inflation)
+        return InflatedRing(_AsRun(scene), 0, 0, scene.inflation)
     except ConvergenceError:
         return None

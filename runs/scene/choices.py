@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 from tireroad.contact.choices import USABLE
 from tireroad.contact.tread.laws.elastic import ElasticTread
 from tireroad.fem.parameters import second_digit
+from tireroad.fem.tire.material import REFERENCE, wlf
 from tireroad.runs.scene.plan import skipped
 from tireroad.runs.scene.schema import Pitch, Source
 from tireroad.runs.scene.tables.scene import (
@@ -153,7 +154,8 @@ def _unheard(wanted: float, speed: float, scene: Scene) -> float:
 
 def tread_rubber(scene: Scene, given: Given) -> Scene:
     """Rubber of the contact of a radial tire where the scene leaves it open: as much stiffer as its tread."""
-    contact, stiffer = scene.contact, scene.tire.shape.tread_over_own(scene.tire)
+    contact = scene.contact
+    stiffer = scene.tire.shape.tread_over_own(scene.tire, scene.temperature)
     if contact is None or stiffer is None or "youngs_modulus" in given.keys("contact"):
         return scene
     if not isinstance(contact.law, ElasticTread):
@@ -166,6 +168,17 @@ def tread_rubber(scene: Scene, given: Given) -> Scene:
     return replace(
         scene, contact=replace(contact, law=replace(contact.law, youngs_modulus=modulus))
     )
+
+
+def warmth(scene: Scene, given: Given) -> Scene:
+    """Say what another temperature than that of the compounds makes of pressure and moduli."""
+    if scene.temperature != REFERENCE:
+        given.say(
+            f"temperature = {scene.temperature:g} °C: {scene.static.inflation / 1e3:.4g} kPa at {REFERENCE:g} °C are "
+            f"{scene.inflation / 1e3:.4g} kPa; rubber has at f the moduli that it has there at "
+            f"{wlf(scene.temperature):.3g} f"
+        )
+    return scene
 
 
 def wheel_speed(scene: Scene, given: Given) -> Scene:
@@ -246,6 +259,7 @@ CHOICES = (
     Choice(by_band),
     Choice(mesh),
     Choice(damping, TIRE),
+    Choice(warmth),
     Choice(tread_rubber, TIRE),
     Choice(wheel_speed, TIRE),
     Choice(points, TIRE),

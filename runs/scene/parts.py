@@ -16,7 +16,7 @@ from typing import Any
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import keys
-from tireroad.fem.tire.material import MATERIALS, MaterialLaw
+from tireroad.fem.tire.material import MATERIALS, MaterialLaw, shore_a
 from tireroad.runs.scene.schema import Path_, Source
 from tireroad.runs.scene.tables.tire import (
     CordsTable,
@@ -27,8 +27,8 @@ from tireroad.runs.scene.tables.tire import (
     TireTable,
 )
 
-_SERIES = {"prony_shares", "prony_times"}  # states what the others state, and takes their place
-_SMALL_MOTIONS = {"dynamic", "loss_factor", "exponent"}
+# One of these states all that the others state, and takes their place.
+_WAYS = ({"prony_shares", "prony_times"}, {"dynamic", "loss_factor", "exponent"}, {"master_curve"})
 BELTS = "belt"  # in [tire.scale]: all lines whose names begin so
 _OF_COMPOUND = ("modulus", "poisson ratio", "density", "dynamic", "loss factor", "exponent")
 _OF_CORDS = ("modulus", "angle", "area", "spacing", "density", "compression")
@@ -172,16 +172,37 @@ def _spelt(name: str | None, known: Mapping[str, Raw]) -> str:
 def _over(given: Raw, base: Raw, path: Path_, source: Source) -> Raw:
     """A region's table with what it leaves out from another."""
     kept = dict(base)
-    if _SERIES & given.keys():
-        kept = {key: value for key, value in kept.items() if key not in _SMALL_MOTIONS}
-    elif _SMALL_MOTIONS & given.keys():
-        kept = {key: value for key, value in kept.items() if key not in _SERIES}
+    way = next((one for one in _WAYS if one & given.keys()), None)
+    if way is not None:
+        others = set().union(*_WAYS) - way
+        kept = {key: value for key, value in kept.items() if key not in others}
     result = kept | given
     if "material" in given and "material" in base:
         result["material"] = _material(
             given["material"], base["material"], (*path, "material"), source
         )
+    if "hardness" in given:
+        _harden(result, given, path, source)
     return result
+
+
+def _harden(region: Raw, given: Raw, path: Path_, source: Source) -> None:
+    """Write a hardness (Shore A) back as the moduli of the region's material."""
+    hardness = region.pop("hardness")
+    fits = isinstance(hardness, int | float) and 20 <= hardness <= 95
+    if not fits or not isinstance(given.get("material", {}), dict):
+        region["hardness"] = hardness  # refused where the table is read
+        return
+    material = dict(region["material"])
+    values = {key: value for key, value in material.items() if key not in ("model", "density")}
+    pascals = {item.name for item, key in keys(MATERIALS[material["model"]]) if key.unit == "Pa"}
+    if both := pascals & given.get("material", {}).keys():
+        source.add((*path, "hardness"), f"and material.{min(both)} exclude each other")
+        return
+    factor = shore_a(hardness) / MATERIALS.make(material["model"], **values).youngs
+    region["material"] = material | {
+        key: _times(value, factor) for key, value in values.items() if key in pascals
+    }
 
 
 def _material(given: Raw, base: Raw, path: Path_, source: Source) -> Raw:
@@ -330,10 +351,11 @@ def _compound_row(region: Mapping[str, Any]) -> tuple[str, ...]:
     material = dict(region["material"])
     model, density = material.pop("model"), material.pop("density")
     law = MATERIALS.make(model, **material)
-    series = "prony_shares" in region and region["prony_shares"]
+    whole = {"prony_shares": "Prony series", "master_curve": "master curve"}
+    given = next((words for key, words in whole.items() if region.get(key)), "")
     small = (
-        ("Prony series", "", "")
-        if series
+        (given, "", "")
+        if given
         else tuple(f"{region.get(key, 0.0):.4g}" for key in ("dynamic", "loss_factor", "exponent"))
     )
     moduli = f"{1e-6 * law.youngs:.4g}", f"{law.poisson:.4g}"

@@ -14,6 +14,7 @@ from tireroad.fem.static.friction_press import Friction
 from tireroad.fem.static.road import RoadShape
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.body import Body
+from tireroad.fem.tire.material import REFERENCE
 from tireroad.fem.wheel import Turning
 from tireroad.modal.damping import Damping, Proportional, StrainEnergy
 from tireroad.runs.scene.tables.scene import Scene
@@ -23,10 +24,10 @@ if TYPE_CHECKING:
     from tireroad.runs.scene.tables.tire import TireTable
 
 
-def make_tire(comm: MPI.Comm, tire: TireTable):
-    """The tire without loads; its finite elements are made on first use."""
+def make_tire(comm: MPI.Comm, tire: TireTable, temperature: float = REFERENCE):
+    """The tire without loads at a temperature, degrees C; its finite elements are made on first use."""
     section = tire.ring()
-    return TireModel(section, lambda: make_body(comm, tire, section))
+    return TireModel(section, lambda: make_body(comm, tire, section, temperature))
 
 
 def road_shape(scene: Scene) -> RoadShape:
@@ -39,9 +40,12 @@ def road_shape(scene: Scene) -> RoadShape:
     )
 
 
-def make_body(comm: MPI.Comm, tire: TireTable, section: Ring) -> Body:
-    """The finite-element body, undeformed. Collective."""
-    return Body(comm, section, tire.shape.in_layers(tire), cords=tire.shape.cords(tire))
+def make_body(
+    comm: MPI.Comm, tire: TireTable, section: Ring, temperature: float = REFERENCE
+) -> Body:
+    """The finite-element body, undeformed, at a temperature, degrees C. Collective."""
+    compounds = {name: one.at(temperature) for name, one in tire.shape.in_layers(tire).items()}
+    return Body(comm, section, compounds, cords=tire.shape.cords(tire))
 
 
 def damping_of(scene: Scene) -> Damping:

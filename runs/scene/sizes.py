@@ -95,7 +95,7 @@ def wall_of(scene: Scene) -> ModeDensity:
         area=2 * math.pi * middle * 2 * math.radians(tire.half_angle) * tire.height,
         mass=density * tire.thickness,
         bending=youngs * tire.thickness**3 / (12 * (1 - poisson**2)),
-        tension=scene.static.inflation * tire.height,
+        tension=scene.inflation * tire.height,
         slowness2=shear if cords else shear + stretch,
         fitting=math.pi / (math.sqrt(shear) * tire.height) if cords else 0.0,
         curved2=np.zeros(DIRECTIONS) if cords else youngs / density * curved**2,
@@ -257,9 +257,9 @@ def _points(scene: Scene, free: int) -> tuple[int, int, int]:
     round_ = math.sqrt(tire.outer_radius * tire.height)
     reach = contact.reach or 1.5 * road_height(scene) + MARGIN
     deflection = static.deflection or 0.01
-    if static.load is not None and static.inflation > 0:
+    if static.load is not None and scene.inflation > 0:
         # A membrane carries its load by the pressure on the flattened area.
-        deflection = min(static.load / (2 * math.pi * static.inflation * round_), tire.height)
+        deflection = min(static.load / (2 * math.pi * scene.inflation * round_), tire.height)
     section = mesh.ring().section
     area = _area_within(section, reach + deflection)
     share = PRESSED * _area_within(section, deflection) / area

@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 
 from tireroad.fem.cavity import Duct
+from tireroad.fem.gas_law import KELVIN
 from tireroad.fem.model import SmallMotions
 from tireroad.modal.basis import Air, ModalBasis
 from tireroad.modal.rolling import RollingModes
@@ -58,7 +59,7 @@ def make_air(job: Job, motions: SmallMotions) -> Column | None:
         motions.body,
         motions.operators.unknowns,
         static.inflation,
-        cavity.temperature,
+        cavity.temperature or job.scene.temperature + KELVIN,
         job.speed,
         cavity.up_to,
         cavity.loss_factor,

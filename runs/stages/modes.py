@@ -43,7 +43,7 @@ _UNITS = {
     "body": "1/rad",
     "body_convective": "1/rad2",
     "momentum": "kg^1/2",
-    "loss_factor": "-",
+    "losses": "1/s",
     "rise": "1/s2",
     "band_rise": "1/s2",
 }

@@ -125,7 +125,7 @@ class Job:
     @cached_property
     def tire(self) -> TireModel:
         """The scene's tire, unloaded."""
-        return make_tire(self.comm, self.scene.tire)
+        return make_tire(self.comm, self.scene.tire, self.scene.temperature)
 
     def value(self, name: str) -> Any:
         """A table or key of the scene by its dotted name; None where a table on the way is absent."""

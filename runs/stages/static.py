@@ -20,7 +20,7 @@ from tireroad.fem.static.press import InitialState, place
 from tireroad.fem.static.state import CordForce, StaticState, static_state
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.timing import Timing
-from tireroad.runs.files.store import put
+from tireroad.runs.files.store import file_hash, put
 from tireroad.runs.process import console
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.scene.physics import (
@@ -189,6 +189,8 @@ class StaticStage(Computed[StaticState]):
             "tire": {k: v for k, v in asdict(scene.tire).items() if k != "cavity"},
             "file": scene.tire.shape.fingerprint(scene.tire),
             "static": asdict(scene.static),
+            "temperature": scene.temperature,
+            "curves": [file_hash(file) for file in scene.tire.curves],
             "road": asdict(road_shape(scene)),
             "rolling": asdict(steady_rolling(self.job, rotation.speed if rotation else None)),
             "slip": wheel_slip(scene) if scene.static.friction is not None else None,
@@ -262,7 +264,7 @@ class StaticStage(Computed[StaticState]):
     ) -> LoadStepper:
         """Inflate the tire and press it on the road; returns the final loader. Collective."""
         static = self.job.scene.static
-        loader.inflate(static.inflation, None if initial is None else initial.inflated)
+        loader.inflate(self.job.scene.inflation, None if initial is None else initial.inflated)
         placed = static.load, static.deflection, static.road_height
         return place(loader, *placed, friction_of(self.job.scene, rolling), initial)
 

@@ -190,7 +190,7 @@ class StiffnessStage(Computed[Stiffness]):
 
     def _stuck(self, record: Record, nodes: np.ndarray, centre: np.ndarray) -> RoadStiffness:
         """Stiffness of the present footprint; `nodes` are this process's own. Collective."""
-        inflation = self.job.scene.static.inflation
+        inflation = self.job.scene.inflation
         with record.timing("stuck footprint"):
             rolling = steady_rolling(self.job)
             return road_stiffness(self.job.tire.body, inflation, nodes, centre, rolling)
@@ -210,7 +210,7 @@ class StiffnessStage(Computed[Stiffness]):
             equilibrium = Equilibrium(body, steady_rolling(self.job), state.road)
         loader = LoadStepper(equilibrium, lambda progress: None)
         try:
-            loader.inflate(self.job.scene.static.inflation)
+            loader.inflate(self.job.scene.inflation)
             points = load_curve(loader, deflections(self.job.scene.stiffness, _own(state)))
         except ConvergenceError as error:
             raise ConvergenceError(

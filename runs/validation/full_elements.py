@@ -22,7 +22,7 @@ from tireroad.greens.coupling import Wheel
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.greens.responses import make_response
-from tireroad.modal.damping import StrainEnergy, beyond, rates
+from tireroad.modal.damping import StrainEnergy, beyond, modal_damping
 from tireroad.modal.rolling import RollingModes, rolling_modes
 from tireroad.modal.standing import fewer
 from tireroad.runs.pipeline import Finished, run_scene
@@ -165,7 +165,8 @@ class Elements:
         if not isinstance(wheel.damping, StrainEnergy):
             return wheel.damping, None
         uniform = beyond(wheel.damping, modes.projection)
-        excess = rates(wheel.damping, modes.projection) - uniform.mass
+        excess = modal_damping(wheel.damping, modes.projection)
+        excess = excess - uniform.mass * np.eye(len(excess))
         turning = (wheel.rotation.body, wheel.speed) if wheel.speed else ()
         return uniform, ModalDamping(wheel.operators, modes.modes.vectors, excess, *turning)
 

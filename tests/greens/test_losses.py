@@ -18,7 +18,7 @@ from tireroad.fem.tire.mesh import Region
 from tireroad.fem.transient import FullTire, ModalDamping
 from tireroad.greens.coupling import Basis, Wheel
 from tireroad.modal.basis import project
-from tireroad.modal.damping import StrainEnergy, beyond, rates, tail_growth
+from tireroad.modal.damping import StrainEnergy, beyond, tail_growth
 from tireroad.modal.solver import undamped
 from tireroad.runs.validation.cases import thesis_torus
 
@@ -63,20 +63,20 @@ def dense(matrix) -> np.ndarray:
 
 
 def damping_matrix(t) -> np.ndarray:
-    """M Phi diag(d - d_c) Phi^T M + d_c M."""
+    """M Phi (D_mod - d_c) Phi^T M + d_c M."""
     tail = beyond(StrainEnergy(), t.projection).mass
     mass = np.diag(t.operators.mass)
     shapes = mass @ t.modes.vectors
-    excess = rates(StrainEnergy(), t.projection) - tail
-    return (shapes * excess) @ shapes.T + tail * mass
+    excess = t.projection.losses - tail * np.eye(KEPT)
+    return shapes @ excess @ shapes.T + tail * mass
 
 
 def stiffness_matrix(t) -> np.ndarray:
-    """g_c K + M Phi diag(omega^2 - g_c squares) Phi^T M."""
+    """g_c K + M Phi (stiffness - g_c squares) Phi^T M."""
     growth, projection = tail_growth(t.projection), t.projection
     shapes = t.operators.mass[:, None] * t.modes.vectors
-    excess = projection.own_squares - growth * projection.squares
-    return growth * dense(t.operators.stiffness) + (shapes * excess) @ shapes.T
+    excess = projection.stiffness - growth * np.diag(projection.squares)
+    return growth * dense(t.operators.stiffness) + shapes @ excess @ shapes.T
 
 
 def pencil(t, speed):
@@ -152,7 +152,7 @@ def test_the_reference_in_time_has_the_same_losses(speed):
     t = tire()
     projection, operators = t.projection, t.operators
     tail = beyond(StrainEnergy(), projection)
-    excess = rates(StrainEnergy(), projection) - tail.mass
+    excess = projection.losses - tail.mass * np.eye(KEPT)
     turning = (t.rotation.body, speed) if speed else ()
     modal = ModalDamping(operators, t.modes.vectors, excess, *turning)
     drag, stiffness = pencil(t, speed)

@@ -18,8 +18,11 @@ from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.cords import Cords
 from tireroad.fem.tire.material import CONSTANT, compound, power_law, prony
 from tireroad.fem.tire.mesh import Region, compounds
+from tireroad.fem.wheel import StrainEnergy
 from tireroad.modal.basis import project
+from tireroad.modal.rotating import matrices
 from tireroad.modal.solver import undamped
+from tireroad.modal.solver.fields import projected
 from tireroad.modal.standing import solved
 from tireroad.runs.validation.cases import thesis_torus
 
@@ -137,6 +140,34 @@ def test_modes_against_the_nonlinear_eigenproblem():
     assert np.abs(shift).max() > 0.07
 
 
+@pytest.mark.slow
+def test_moduli_and_losses_couple_modes():
+    """Receptances between modes at the modes' frequencies, against complex moduli at each on the same modes: two
+    compounds with strong laws of their own. Without what lies off the diagonal there are none."""
+    operators = tire(
+        {"spectrum": power_law(0.2), "loss_factor": 0.4},
+        {"spectrum": power_law(0.05), "loss_factor": 0.05},
+    )
+    modes, projection = modes_of(operators, 40)
+    drag, stiffness = matrices(projection, 0.0, StrainEnergy(), "full")
+    parts = [
+        (part.kind, projected(MPI.COMM_SELF, modes.vectors, part.stiffness, 1, None))
+        for part in operators.compounds()
+    ]
+    assert np.linalg.eigvalsh(drag)[0] > -1e-9 * drag.max()
+    off: list[float] = []
+    unit, between = np.eye(40), ~np.eye(40, dtype=bool)
+    for frequency in projection.frequency[4:36:4]:
+        w = 2 * PI * frequency
+        exact = np.diag(projection.squares) - w**2 * unit
+        exact = exact + sum((kind.modulus(frequency) - 1) * part for kind, part in parts)
+        exact = np.linalg.inv(exact)[between]
+        found = np.linalg.inv(stiffness + 1j * w * drag - w**2 * unit)[between]
+        off.append(np.linalg.norm(found - exact) / np.linalg.norm(exact))
+    assert np.median(off) < 0.25
+    assert max(off) < 0.45
+
+
 SCENE = """
 [tire]
 segments = 12
@@ -171,8 +202,9 @@ direct = 3
 
 @pytest.mark.long
 def test_receptance_against_complex_moduli_at_each_frequency(tmp_path: Path, ran) -> None:
-    """The whole chain against K*(omega) - omega^2 M of all finite elements, standing: 17 %, as with constant moduli
-    (16 %: damping by strain energy is viscous). With the moduli of 100 Hz it is 26 % at 300 Hz."""
+    """The whole chain against K*(omega) - omega^2 M of all finite elements, standing: 16 % at 100 Hz and 12 % at 300
+    (damping by strain energy is viscous: far below its own frequency a shape loses too little). With the moduli of
+    100 Hz it is 16 % there."""
     flat = SCENE.replace("exponent = 0.1", "").replace("exponent = 0.2", "")
     curves = {}
     for name, text in (("own", SCENE), ("flat", flat)):
@@ -188,8 +220,8 @@ def test_receptance_against_complex_moduli_at_each_frequency(tmp_path: Path, ran
     for name, found in curves.items():
         places = [int(np.abs(found["frequency"] - f).argmin()) for f in at]
         off[name] = np.abs(found["receptance"][places, 0, 0] - exact) / np.abs(exact)
-    assert off["own"].max() < 0.2
-    assert off["flat"][-1] > 1.5 * off["own"][-1]
+    assert off["own"].max() < 0.17
+    assert off["flat"][-1] > 1.25 * off["own"][-1]
 
 
 @pytest.mark.mpi
@@ -198,7 +230,7 @@ def test_any_number_of_processes_has_the_same_rise():
     laws = {"spectrum": power_law(0.2)}, {"spectrum": power_law(0.1), "loss_factor": 0.1}
     alone = modes_of(tire(*laws), 8)[1]
     shared = modes_of(tire(*laws, comm=MPI.COMM_WORLD), 8, MPI.COMM_WORLD)[1]
-    np.testing.assert_allclose(shared.rise.sum(), alone.rise.sum(), rtol=1e-6)
+    np.testing.assert_allclose(np.trace(shared.rise), np.trace(alone.rise), rtol=1e-6)
     np.testing.assert_allclose(shared.loss_factor.sum(), alone.loss_factor.sum(), rtol=1e-6)
 
 

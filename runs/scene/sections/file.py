@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -153,11 +154,11 @@ def _of_file(tire: TireTable, rubber: Rubber | None) -> Material:
     from tireroad.fem.tire.material import Material, compound
 
     wall = _wall(tire)
-    small = losses_of(tire)
     if rubber is None:
-        return Material(law=wall.law, density=wall.density, **small)
+        return Material(law=wall.law, density=wall.density, **losses_of(tire, wall.law))
     density = wall.density if rubber.density is None else rubber.density
-    return compound(rubber.model, density, **rubber.coefficients, **small | _small_motions(rubber))
+    made = compound(rubber.model, density, **rubber.coefficients)
+    return replace(made, **losses_of(tire, made.law) | _small_motions(rubber))
 
 
 def _wall(tire: TireTable) -> MaterialTable:

@@ -103,6 +103,7 @@ class RadialSection(SectionKind):
             "exponent",
             "prony_shares",
             "prony_times",
+            "master_curve",
         ):
             if getattr(tire, key):
                 source.add(("tire", key), whole)
@@ -176,10 +177,10 @@ class RadialSection(SectionKind):
 
         return land(self.grooves)
 
-    def tread_over_own(self, tire: TireTable) -> float:
+    def tread_over_own(self, tire: TireTable, temperature: float) -> float:
         from tireroad.fem.sections.radial import GROOVED
 
-        stated, own = self.rubbers(tire)[GROOVED], _own(GROOVED)
+        stated, own = self.rubbers(tire)[GROOVED].at(temperature), _own(GROOVED)
         if stated == own:
             return 1.0
         return stated.dynamic * stated.law.youngs / (own.dynamic * own.law.youngs)

@@ -261,5 +261,7 @@ def rubber(tire: TireTable, region: RegionTable | None = None) -> Material:
     from tireroad.fem.tire.material import Material
 
     assert tire.material is not None, "a torus has a wall of one material"
-    wall = Material(law=tire.material.law, density=tire.material.density, **losses_of(tire))
+    wall = Material(
+        law=tire.material.law, density=tire.material.density, **losses_of(tire, tire.material.law)
+    )
     return changed(wall, region)

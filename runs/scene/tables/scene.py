@@ -12,7 +12,9 @@ from tireroad.contact.choices import USABLE
 from tireroad.contact.roads.road import ROADS, RoadKind
 from tireroad.contact.roads.under_tire import Motion, Placement
 from tireroad.fem.errors import InputError
+from tireroad.fem.gas_law import warmed
 from tireroad.fem.parameters import Key, Limits, OnlyFor, described, finite, parameter, text
+from tireroad.fem.tire.material import COLDEST, REFERENCE
 from tireroad.fem.wheel import DIRECTIONS, SHAPE_TOLERANCE, Axle
 from tireroad.greens.residuals import RESIDUALS, names
 from tireroad.runs.scene.outputs import OUTPUTS, Output
@@ -669,6 +671,13 @@ class OutputTable(Collects):
 @dataclass(frozen=True)
 class Scene:
     name: str = text("scene", "name of the scene and its result folder")
+    temperature: float = number(
+        REFERENCE,
+        "°C",
+        f"temperature of the tire: compounds are given at {REFERENCE:g} °C, and so is static.inflation",
+        least=COLDEST,
+        most=150,
+    )
     tire: TireTable = table(TireTable, "geometry, mesh and materials of the tire")
     static: StaticTable = table(StaticTable, "inflation and load of the static state")
     stiffness: StiffnessTable | None = table(
@@ -708,6 +717,11 @@ class Scene:
         SoundTable, "sound pressure at microphones, of the tire's vibrations alone", optional=True
     )
     output: OutputTable = table(OutputTable, "what is computed and kept")
+
+    @property
+    def inflation(self) -> float:
+        """Pressure (Pa above the atmosphere) of the tire at its temperature: static.inflation by the gas law."""
+        return warmed(self.static.inflation, REFERENCE, self.temperature)
 
     @property
     def modes(self) -> ModalTable:

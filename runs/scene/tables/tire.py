@@ -9,14 +9,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
 from tireroad.fem.errors import InputError
-from tireroad.fem.parameters import Limits, Parameters, Registry, numbers
+from tireroad.fem.parameters import Limits, Parameters, Registry, filename, numbers
 from tireroad.fem.sections.mesh2d import SIZE
-from tireroad.fem.tire.material import CONSTANT, MATERIALS, MaterialLaw, power_law, prony
+from tireroad.fem.tire.material import (
+    CONSTANT,
+    MATERIALS,
+    MaterialLaw,
+    Spectrum,
+    measured,
+    power_law,
+    prony,
+)
 from tireroad.runs.scene.schema import (
     Source,
     Variants,
@@ -129,8 +139,11 @@ class SectionKind(Parameters):
         """The compounds as they fill their layers: without what grooves take of them."""
         return self.rubbers(tire)
 
-    def tread_over_own(self, tire: TireTable) -> float | None:
-        """Dynamic modulus of the tread over that which the section has by itself; None where it has none."""
+    def tread_over_own(self, tire: TireTable, temperature: float) -> float | None:
+        """Dynamic modulus of the tread at a temperature (degrees C) over that which the section has by itself at 20.
+
+        None where it has none.
+        """
         return None
 
     @property
@@ -208,7 +221,9 @@ class CavityTable:
         ("air", "none"),
         "gas in the tire; none: neither its mass nor its resonances are modelled",
     )
-    temperature: float = number(293.15, "K", "temperature of the gas", least=150, most=1000)
+    temperature: float | None = number(
+        None, "K", "temperature of the gas; absent: that of the tire", least=150, most=1000
+    )
     loss_factor: float | None = number(
         None,
         "-",
@@ -262,6 +277,13 @@ def _times():
     return numbers("relaxation times of the shares", "s", limits)
 
 
+def _master_curve():
+    return filename(
+        "master curve at 20 °C as CSV: frequency, Hz, storage and loss modulus in stretch, Pa; takes the place of dynamic, "
+        "loss_factor and exponent",
+    )
+
+
 def _loss_factor():
     return number(
         None,
@@ -311,6 +333,14 @@ class RegionTable:
     exponent: float | None = _exponent()
     prony_shares: tuple[float, ...] = _shares()
     prony_times: tuple[float, ...] = _times()
+    master_curve: str | None = _master_curve()
+    hardness: float | None = number(
+        None,
+        "Shore A",
+        "hardness of the rubber, from which its static moduli follow by Gent's formula; written back as these",
+        least=20,
+        most=95,
+    )
 
 
 @dataclass(frozen=True)
@@ -395,6 +425,7 @@ class TireTable(Variants):
     exponent: float | None = _exponent()
     prony_shares: tuple[float, ...] = _shares()
     prony_times: tuple[float, ...] = _times()
+    master_curve: str | None = _master_curve()
     region: tuple[RegionTable, ...] = tables(
         RegionTable, "a part of the section that is made of another material"
     )
@@ -426,6 +457,12 @@ class TireTable(Variants):
         """The ring of elements from the revolved section."""
         return self.shape.ring(self)
 
+    @property
+    def curves(self) -> list[str]:
+        """The files of its master curves."""
+        named = (self.master_curve, *(region.master_curve for region in self.region))
+        return [name for name in named if name]
+
     def free_unknowns(self) -> int:
         """Displacement unknowns of the mesh, without those held by the rim."""
         return self.shape.free_unknowns(self)
@@ -450,14 +487,15 @@ def region_of(tire: TireTable, name: str) -> RegionTable | None:
     return next((r for r in tire.region if r.name and r.name.upper() == name.upper()), None)
 
 
-def losses_of(part: TireTable | RegionTable | None) -> dict[str, Any]:
-    """Keys of [tire] or a region for small motions. A Prony series gives all of it."""
-    if part is None:
-        return {}
+def losses_of(part: TireTable | RegionTable, law: MaterialLaw) -> dict[str, Any]:
+    """Keys of [tire] or a region for small motions, of a rubber of that law. A series or a master curve gives all of it."""
+    if part.master_curve:
+        modulus, *rest = master_curve(part.master_curve)
+        return dict(zip(_SMALL_MOTIONS, (modulus / law.youngs, *rest), strict=True))
     if part.prony_shares or part.prony_times:
         return dict(zip(_SMALL_MOTIONS, prony(part.prony_shares, part.prony_times), strict=True))
-    law = None if part.exponent is None else power_law(part.exponent)
-    given = dict(zip(_SMALL_MOTIONS, (part.dynamic, part.loss_factor, law), strict=True))
+    spectrum = None if part.exponent is None else power_law(part.exponent)
+    given = dict(zip(_SMALL_MOTIONS, (part.dynamic, part.loss_factor, spectrum), strict=True))
     return {key: value for key, value in given.items() if value is not None}
 
 
@@ -468,23 +506,58 @@ def changed(compound: Material, region: RegionTable | None) -> Material:
     material = region.material
     if material is not None:
         compound = replace(compound, law=material.law, density=material.density)
-    return replace(compound, **losses_of(region))
+    return replace(compound, **losses_of(region, compound.law))
+
+
+def master_curve(file: str) -> tuple[float, float, Spectrum]:
+    """`measured` of a CSV file of frequency (Hz), storage and loss modulus (Pa); a first line may name the columns.
+
+    InputError for a file that is none.
+    """
+    rows: list[list[float]] = []
+    try:
+        lines = Path(file).read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, ValueError) as error:
+        raise InputError(f"cannot be read: {error}") from None
+    for number_, line in enumerate(lines, 1):
+        cells = [cell.strip() for cell in line.split("#")[0].replace(";", ",").split(",")]
+        if not any(cells):
+            continue
+        try:
+            row = [float(cell) for cell in cells]
+        except ValueError:
+            if rows or number_ > 1:
+                raise InputError(f"line {number_} of {file} is not three numbers") from None
+            continue
+        if len(row) != 3:
+            raise InputError(f"line {number_} of {file} has {len(row)} numbers, not three")
+        rows.append(row)
+    if not rows:
+        raise InputError(f"{file} has no line of three numbers")
+    return measured(*zip(*rows, strict=True))
 
 
 def check_series(tire: TireTable, source: Source) -> None:
-    """Note Prony series that are none, or that stand beside an exponent."""
+    """Note Prony series and master curves that are none, or that stand beside an exponent."""
     parts: list[tuple[tuple[str, ...], TireTable | RegionTable]] = [(("tire",), tire)]
     parts += [(("tire", "region", str(n)), one) for n, one in enumerate(tire.region)]
     for path, part in parts:
-        if not (part.prony_shares or part.prony_times):
-            continue
-        try:
-            prony(part.prony_shares, part.prony_times)
-        except InputError as wrong:
-            source.add((*path, "prony_shares"), f"with prony_times: {wrong}")
-        for key in ("dynamic", "loss_factor", "exponent"):
-            if getattr(part, key) is not None:
-                source.add((*path, key), "and prony_shares exclude each other")
+        ways: dict[str, tuple[str, Callable[[], object]]] = {}
+        if part.prony_shares or part.prony_times:
+            series = partial(prony, part.prony_shares, part.prony_times)
+            ways["prony_shares"] = "with prony_times: ", series
+        if part.master_curve:
+            ways["master_curve"] = "", partial(master_curve, part.master_curve)
+        for key, (before, read) in ways.items():
+            try:
+                read()
+            except InputError as wrong:
+                source.add((*path, key), f"{before}{wrong}")
+        stated = [
+            key for key in ("dynamic", "loss_factor", "exponent") if getattr(part, key) is not None
+        ]
+        for key in [*stated, *list(ways)[1:]] if ways else ():
+            source.add((*path, key), f"and {next(iter(ways))} exclude each other")
 
 
 def proportions_of(ring: Ring, drawn: SectionMesh) -> Proportions:
