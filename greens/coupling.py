@@ -286,13 +286,9 @@ class Wheel:
         """Response of probes of which some lie inside the tire, with the exact static flexibility of what the states lack.
 
         The shapes of `basis` have further rows for these, and those of `full` for what they are in the full matrices;
-        `read` (r, n) and `driven` (n, k) are the same `outputs` and `loads` there, on own unknowns. InputError for a wheel that
-        moves. Collective.
+        `read` (r, n) and `driven` (n, k) are the same `outputs` and `loads` there, on own unknowns. Those inside are relative
+        to a wheel that moves, and loads inside have no resultant on it. Collective.
         """
-        if basis.projection.moves:
-            raise InputError(
-                'large motions: a wheel that moves on an axle is not available; take axle.kind = "fixed"'
-            )
         rows = sparse.csr_matrix(self._beside(basis.of_hub(outputs)))
         shapes = LoadedShapes(self.operators, self.rotating_stiffness, self.air)
         answers = shapes.readings(sparse.vstack([read, rows], format="csr"), driven)
