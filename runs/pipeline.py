@@ -37,7 +37,8 @@ from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.stages.accuracy import STATIC_TO_GREENS, AccuracyStage
 from tireroad.runs.stages.contact import ContactStage
 from tireroad.runs.stages.failures import failure_recorded
-from tireroad.runs.stages.greens import Responses
+from tireroad.runs.stages.greens import GreensStage, Responses
+from tireroad.runs.stages.nonlinear import NonlinearStage, Restoring
 from tireroad.runs.stages.response import ResponseStage
 from tireroad.runs.stages.setup import Setup
 from tireroad.runs.stages.sound import RadiationStage, SoundStage
@@ -53,7 +54,10 @@ PARTS: tuple[type[PipelinePart], ...] = (
     StaticStage,
     RadiationStage,
     StiffnessStage,
-    *STATIC_TO_GREENS,
+    *(part for part in STATIC_TO_GREENS if part is not GreensStage),
+    Restoring,
+    NonlinearStage,
+    GreensStage,
     ContactStage,
     AccuracyStage,
     StretchesStage,
@@ -176,8 +180,7 @@ def run_scene(
                 if issubclass(kind, Stage) and kind.name in reasons:
                     found = _skipped(kind, job, done, reasons[kind.name], summary)
                 else:
-                    part = kind.with_inputs(job, done)
-                    found = part.result(summary) if part else None
+                    found = _made(kind, job, done, summary)
                 if found is not None:
                     done[kind.name] = found
                 job.settle(done)
@@ -217,6 +220,14 @@ def _begun(job: Job, until: str | None) -> tuple[Summary, float, bool]:
     _say_demand(wanted, each, directory, comm)
     on_root(comm, summary.begin)  # not before: a scene that is refused replaces nothing
     return summary, each, on_disk
+
+
+def _made(kind: type[PipelinePart], job: Job, done, summary: Summary) -> Result | None:
+    """The result of a part; None if it lacks an input, or has nothing to do after all. Collective."""
+    part = kind.with_inputs(job, done)
+    if isinstance(part, Stage) and (reason := part.idle()) is not None:
+        return _skipped(type(part), job, done, reason, summary)
+    return part.result(summary) if part else None
 
 
 def _skipped(kind: type[Stage], job: Job, done, reason: str, summary: Summary) -> Result | None:

@@ -23,7 +23,7 @@ from tireroad.fem.collective import allgather_rows, from_local_rows, summed
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.matrices.compliance import factorise, on_own_rows, solve_columns
 from tireroad.fem.nonlinear.force import RestoringForce
-from tireroad.fem.nonlinear.road import Compliance, ContactPoints, Feature, Touch
+from tireroad.fem.nonlinear.road import Compliance, ContactPoints, Ground, Touch
 
 Array = np.ndarray
 
@@ -63,7 +63,7 @@ class Linear:
         load = np.zeros(len(self.compliance))
         return Standing(load, self.points.rest[2 * len(load) // 3 :], load, np.zeros(0))
 
-    def solve(self, road: Feature, before: Standing) -> Standing:
+    def solve(self, road: Ground, before: Standing) -> Standing:
         """On a road, from a state near by."""
         nothing = np.zeros(len(before.w))
         plain = Compliance(self.compliance, np.zeros((len(nothing), 0)), np.zeros((0, 0)))
@@ -117,7 +117,7 @@ class Reduced:
         self.evaluations += 1 + len(s)
         return out
 
-    def solve(self, road: Feature, before: Standing) -> Standing:
+    def solve(self, road: Ground, before: Standing) -> Standing:
         """On a road, from a state near by. Raises ConvergenceError if it is not near enough."""
         try:
             return self._solve(road, before)
@@ -125,7 +125,7 @@ class Reduced:
             self.differentiate(before.load, before.s)
             return self._solve(road, before)
 
-    def _solve(self, road: Feature, before: Standing) -> Standing:
+    def _solve(self, road: Ground, before: Standing) -> Standing:
         s, load, w = before.s, before.load, before.w
         value, seen, one = self.evaluate(load, s), self.seen, np.eye(len(s))
         self.evaluations += 1
@@ -170,12 +170,12 @@ class Elements:
         """Motion (3 p, ...) m of the points."""
         return summed(self._comm, self.columns.T @ motion)
 
-    def residual(self, motion: Array, road: Feature) -> tuple[Array, Touch]:
+    def residual(self, motion: Array, road: Ground) -> tuple[Array, Touch]:
         """Forces out of balance (own rows) N, and the contact."""
         touch = self.points.touch(self.seen(motion), road)
         return self.force.change(motion) - self.columns @ (touch.load - self.points.rest), touch
 
-    def solve(self, road: Feature, motion: Array, most: int = 12) -> Array:
+    def solve(self, road: Ground, motion: Array, most: int = 12) -> Array:
         """The motion (own rows) in equilibrium on a road, from one near by.
 
         Raises ConvergenceError if Newton's method does not converge.
@@ -214,7 +214,7 @@ class Elements:
         part.destroy()
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
 
-    def standing(self, motion: Array, road: Feature) -> Standing:
+    def standing(self, motion: Array, road: Ground) -> Standing:
         """The contact of a motion."""
         w = self.seen(motion)
         touch = self.points.touch(w, road)
@@ -235,12 +235,12 @@ def _on_all(comm: MPI.Comm, own: sparse.csr_matrix) -> sparse.csr_matrix:
 class Tire(Protocol[State]):
     """A tire that can be solved on a road from a state near by."""
 
-    def solve(self, road: Feature, before: State, /) -> State: ...
+    def solve(self, road: Ground, before: State, /) -> State: ...
 
 
 def climb(
     tire: Tire[State],
-    road: Feature,
+    road: Ground,
     start: State,
     steps: int = 4,
     seen: Callable[[float, State], None] = lambda part, state: None,

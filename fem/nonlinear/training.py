@@ -22,7 +22,7 @@ from tireroad.fem.nonlinear.cells import cell_forms
 from tireroad.fem.nonlinear.force import RestoringForce
 from tireroad.fem.nonlinear.quasi_static import Elements, Reduced, Standing
 from tireroad.fem.nonlinear.reduced import ReducedForce, outside, reduced_force, sizes
-from tireroad.fem.nonlinear.road import ContactPoints, Feature
+from tireroad.fem.nonlinear.road import ContactPoints, Ground
 from tireroad.fem.static.symmetric import TURN, looks_the_same
 from tireroad.fem.static.virtual_work import AT_REST, tangent
 
@@ -128,9 +128,9 @@ class Trainer:
         inside = self._cells.between(self.vectors, self.motion(load, s))
         return inside - np.eye(len(s))
 
-    def visit(self, road: Feature) -> None:
+    def visit(self, road: Ground) -> Trained:
         """Climb a road and learn from the states on the way."""
-        steps = np.ceil(max(abs(road.rise), abs(road.height)) / self.settings.step - 1e-9)
+        steps = np.ceil(road.largest / self.settings.step - 1e-9)
         done, size, state = 0.0, 1.0 / max(steps, 1.0), self.tire.rest()
         smallest = _SMALLEST * size
         found = Trained(str(road), 0, 0.0, 0.0, "reduced")
@@ -152,8 +152,9 @@ class Trainer:
             f"{self.vectors.shape[1]} vectors, {len(self.motions)} states, {self.elements.tangents} tangents, "
             f"{self.tire.evaluations} evaluations"
         )
+        return found
 
-    def _learnt(self, road: Feature, before: Standing, found: Trained) -> Standing:
+    def _learnt(self, road: Ground, before: Standing, found: Trained) -> Standing:
         """The state on a road, solved for again while the vectors lack some of its K^-1 r."""
         # Vectors may have joined on the way to a state that was not found.
         lacking = self.vectors.shape[1] - len(before.s)
@@ -203,7 +204,7 @@ class Trainer:
         inside = summed(self._comm, self.vectors.T @ forces)
         return float(share[0]), answers[:, 0], (answers - self.vectors @ inside)[:, 0]
 
-    def _solved(self, road: Feature, before: Standing, found: Trained) -> Standing:
+    def _solved(self, road: Ground, before: Standing, found: Trained) -> Standing:
         """By the reduced tire, otherwise by the elements from the state before."""
         try:
             return self.tire.solve(road, before)
@@ -211,7 +212,7 @@ class Trainer:
             return self._by_elements(road, self.motion(before.load, before.s), before, found)[0]
 
     def _by_elements(
-        self, road: Feature, motion: Array, before: Standing, found: Trained
+        self, road: Ground, motion: Array, before: Standing, found: Trained
     ) -> tuple[Standing, Array]:
         """The elements' state and motion from one near by, whose K^-1 r the vectors then hold."""
         found.how = "elements"
@@ -290,7 +291,7 @@ class CellTangents:
 def train(
     force: RestoringForce,
     points: ContactPoints,
-    roads: Sequence[Feature],
+    roads: Sequence[Ground],
     settings: Settings = Settings(),
     report: Callable[[str], None] = lambda text: None,
 ) -> Training:
@@ -301,6 +302,34 @@ def train(
     trainer = Trainer(force, points, settings, report)
     for road in roads:
         trainer.visit(road)
+    return trainer.concluded()
+
+
+def train_along(
+    force: RestoringForce,
+    points: ContactPoints,
+    first: Sequence[Ground],
+    ways: Array,
+    under: Callable[[float], Ground],
+    settings: Settings = Settings(),
+    report: Callable[[str], None] = lambda text: None,
+) -> Training:
+    """The same trained on a road that passes: after the roads of `first`, where it is `under` the tire after the `ways` (n,) m.
+
+    Greedily: each fourth way, then those half between, then the others beside a way that lacked more than twice the share
+    that vectors may lack. Collective.
+    """
+    trainer = Trainer(force, points, settings, report)
+    for road in first:
+        trainer.visit(road)
+    lacked: dict[int, float] = {}
+    for stride in (4, 2, 1):
+        last = dict(lacked)
+        for number in range(0, len(ways), stride):
+            beside = [last.get(number + side, 0.0) for side in (-stride, stride)]
+            needed = stride > 1 or max(beside) > 2 * settings.share
+            if number not in lacked and needed:
+                lacked[number] = trainer.visit(under(float(ways[number]))).lacked
     return trainer.concluded()
 
 

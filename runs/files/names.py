@@ -10,6 +10,7 @@ STAGES = (
     "stiffness",
     "modes",
     "rotating",
+    "nonlinear",
     "greens",
     "contact",
     "accuracy",

@@ -17,7 +17,7 @@ STANDS_FOR = {
     "NAME": "[^/]+",
     "PART": ".+",
     "AXIS": "[^/]+",
-    "WHERE": "(contact|force)",
+    "WHERE": "(contact|force|large)",
     "FORCE": "(contact_force|axle_force)",
     "CAUSE": f"({'|'.join(CAUSES)})",
 }
@@ -158,7 +158,7 @@ DATASETS: Mapping[str, tuple[Dataset, ...]] = {
             ("campbell/name", "k", "-", "names of the branches"),
         ),
         "greens.h5": (
-            ("WHERE/eigenvalue", "q", "1/s", "poles of the response at the `contact` points or of each `force`"),
+            ("WHERE/eigenvalue", "q", "1/s", "poles of the response at the `contact` points, of each `force`, or of `large` motions"),
             ("WHERE/output", "r, q", "kg^-1/2", "their output, C"),
             ("WHERE/input", "q, k", "s/kg^1/2", "their input, P"),
             ("WHERE/block", "p, p", "1/s", "block of real states, T"),
@@ -173,6 +173,17 @@ DATASETS: Mapping[str, tuple[Dataset, ...]] = {
             ("WHERE/slope", "6, k", "m s, s", "response to the rate of a force, where states are made static"),
             ("contact/index", "c", "-", "nodes of the outer face that carry the contact points"),
             ("attached/PART", "", "as modes.h5 and rotating.h5", "modes with attachment modes, for the energy"),
+        ),
+        "nonlinear.h5": (
+            ("shape", "n, 3, v", "m J^-1/2", "vectors V of the reduced nonlinear force, at all nodes, V^T K V = 1"),
+            ("load", "n, 3, v", "N J^-1/2", "their loads K V"),
+            ("cells", "w", "-", "cells of the mesh over which the force is summed, by number"),
+            ("weight", "w", "-", "their weights"),
+            ("singular", "i", "-", "singular values of the states' answers K^-1 r over their sizes"),
+            ("road", "r", "-", "roads of the training"),
+            ("how", "r", "-", "how their states were found, or up to which part of their height"),
+            ("lacked", "r", "-", "largest share of the motion that the vectors lacked before each"),
+            ("left", "r", "-", "the same after it"),
         ),
         "contact.h5": (
             ("time", "nt", "s", "end of each step"),

@@ -20,6 +20,7 @@ from tireroad.runs.scene.tables.scene import (
     Scene,
     check_accuracy,
     check_axle,
+    check_motion,
     check_stiffness,
     has_air,
 )
@@ -477,5 +478,20 @@ RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
     (("sound", "road", "rotation", "static", "output", "contact", "time"), check_sound),
     (("static", "road", "modal", "tire"), check_shape),
     (("time",), _time),
+    (
+        (
+            "motion",
+            "greens",
+            "rotation",
+            "time",
+            "road",
+            "static",
+            "accuracy",
+            "sound",
+            "output",
+            "contact",
+        ),
+        check_motion,
+    ),
     (("accuracy", "contact", "road", "time", "static", "output", "force"), check_accuracy),
 )

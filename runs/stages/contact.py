@@ -29,10 +29,14 @@ from tireroad.contact.roads.kinds.shapes import Edges
 from tireroad.contact.rolling import make_loop, rolling_steadily
 from tireroad.contact.setup import ContactSetup
 from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.nonlinear.force import RestoringForce
 from tireroad.fem.static.footprint import Footprint
 from tireroad.fem.static.state import StaticState
+from tireroad.greens.coupling import Wheel
+from tireroad.greens.large_motion import LargeTire
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
+from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files import store
 from tireroad.runs.process import console
@@ -47,6 +51,9 @@ from tireroad.runs.stages.contact_file import (
     forget_checkpoint,
 )
 from tireroad.runs.stages.greens import Responses
+from tireroad.runs.stages.large import Instants, LargeMotion
+from tireroad.runs.stages.large import describe as describe_large
+from tireroad.runs.stages.nonlinear import Nonlinear
 from tireroad.runs.stages.rolling import (
     Integration,
     Planned,
@@ -197,7 +204,7 @@ def excursion(record: Record, most: float, deflection: float | None, *, held: bo
             f"the contact moved by up to {1e3 * most:.3g} mm beyond the static state, {share:.2g} of the static "
             f"deflection of {1e3 * deflection:.3g} mm: the tire is linear about that state, so forces are doubtful "
             "beyond a third of it (a step that lifts the whole footprint by a third gives a force 14 % too large, by "
-            "all of it 56 %); take a lower road, or a longer road.run_in or road.longest_wave"
+            'all of it 56 %); take motion.kind = "large", a lower road, or a longer road.run_in or road.longest_wave'
             + (', or a wheel that moves (axle.kind = "corner")' if held else "")
         )
 
@@ -239,24 +246,27 @@ _SLIGHT = 1e-6
 class Works:
     """Work (J) of the contact's force changes and of the prescribed forces, if any.
 
-    `lead`: additional work of the forces that the scheme applies during the steps; `begun`: energy (J) in the tire before.
+    `lead`: additional work of the forces that the scheme applies during the steps; `begun`: energy (J) in the tire before;
+    `nonlinear`: energy (J) that large motions have stored in the nonlinear force.
     """
 
     contact: float
     driven: float | None
     lead: float
     begun: float = 0.0
+    nonlinear: float | None = None
 
     @property
     def total(self) -> float:
-        """Work of all forces as if they were linear over the step."""
-        return self.contact + (self.driven or 0.0)
+        """Work of all forces as if they were linear over the step, less what the nonlinear force stores."""
+        return self.contact + (self.driven or 0.0) - (self.nonlinear or 0.0)
 
 
-def works(contact: Work, driven: DrivenTire | None) -> Works:
+def works(contact: Work, driven: DrivenTire | None, large: LargeTire | None = None) -> Works:
     """The works of a completed loop."""
-    lead = contact.lead + (driven.lead if driven else 0.0)
-    return Works(contact.total, driven.work if driven else None, lead, contact.begun)
+    lead = contact.lead + (driven.lead if driven else 0.0) + (large.lead if large else 0.0)
+    own = driven.work if driven else None
+    return Works(contact.total, own, lead, contact.begun, large.stored if large else None)
 
 
 class Losses:
@@ -346,6 +356,8 @@ def describe_energy(
         "energy left in the modes": (energies[0], "J"),
         "energy left in the residual flexibility": (energies[1], "J"),
     }
+    if work.nonlinear is not None:
+        record.indicators["energy left in the nonlinear force"] = (work.nonlinear, "J")
     if work.begun:
         record.indicators["energy in both as the run begins"] = (work.begun, "J")
     left = sum(energies) - work.begun
@@ -434,6 +446,10 @@ class ContactStage(Stage[ContactHistory]):
     rotating: Result[RollingModes]
     greens: Result[Responses]
     setup: Result[ContactSetup]
+    wheel: Result[Wheel]
+    fields: Result[ModalBasis]
+    restoring: Result[RestoringForce] | None = None
+    nonlinear: Result[Nonlinear] | None = None
 
     def solver(self) -> str:
         """The solvers' settings, for the log."""
@@ -489,7 +505,7 @@ class ContactStage(Stage[ContactHistory]):
             if rise:
                 record.indicators["rise of the tire as it settles on the grid"] = (rise, "m")
             begun = begun_with(self.job, key)
-            chosen = chosen_scheme(self.job, record, setup, plan, begun)
+            chosen = chosen_scheme(self.job, record, setup, plan, begun, self.nonlinear is not None)
             setup = self._rolling_steadily(record, setup, plan.step)
         spec, patch = self.job.scene.contact, setup.patch
         count = f"{len(patch.points)} contact points on {len(patch.index)} nodes"
@@ -538,14 +554,19 @@ class ContactStage(Stage[ContactHistory]):
         scheme: Chosen,
     ) -> None:
         """Run the loop, writing by blocks; raises Chatter beyond the scheme's limit. Collective."""
-        response, chosen = self.greens.product.contact, integration(self.job, plan, scheme.scheme)
+        large = self._large()
+        response = large.response if large else self.greens.product.contact
+        if large:
+            plan = replace(plan, response=response.resolved(plan.step))
+        chosen = integration(self.job, plan, scheme.scheme)
         if chosen.scheme == "convolution":
             setup = replace(setup, steady=None)  # its history begins at t = 0
         with record.timing("tread and solver"):
-            driven = driven_tire(self.job, chosen, setup.patch)
-            loop = self._loop(record, setup, driven or chosen.tire, chosen.step)
+            moved = self._moved(large, chosen)
+            driven = driven_tire(self.job, chosen, setup.patch, moved)
+            loop = self._loop(record, setup, driven or moved or chosen.tire, chosen.step)
         totals = Totals(setup.patch, setup.reach, scheme.limit, work=Work(scheme.scheme))
-        losses = Losses(chosen, response, self._states)
+        losses, instants = Losses(chosen, response, self._states), Instants(moved, chosen.tire)
         with ExitStack() as stack, record.timing("time loop"):
             attributes = {"step": chosen.step, "scheme": chosen.scheme, "road_relief": setup.relief}
             attributes |= {"free_slip": setup.free_slip or 0.0, "scheme_reason": scheme.reason}
@@ -554,15 +575,16 @@ class ContactStage(Stage[ContactHistory]):
             file = ContactFile(self.job, key, setup, attributes)
             kept = file.open(stack, self.job.path(self.name))
             if kept is None:
-                self._begin(loop, totals, losses, chosen.step)
+                self._begin(loop, totals, losses, response, chosen.step)
             else:
                 loop.restore(kept)
                 totals.set_state(kept)
                 losses.set_state(kept)
+                instants.set_state(kept)
                 reached = totals.figures.steps * chosen.step
                 console.say(f"  continues from the checkpoint at t = {reached:.6g} s")
             done, began = totals.figures.steps, time.thread_time()
-            self._steps(setup, loop, file, totals, losses, chosen)
+            self._steps(setup, loop, file, totals, losses, instants, chosen)
             # CPU time of this process's own thread: the cost of a step when no other process needs
             # the cores.
             busy = (time.thread_time() - began) / max(chosen.steps - done, 1)
@@ -575,26 +597,57 @@ class ContactStage(Stage[ContactHistory]):
         points(record, setup.patch, self.static.product.footprint(), setup.relief)
         highest = self.rotating.product.highest / (2 * np.pi)
         edges(record, self.job.scene.road, setup.patch, abs(setup.rolled.speed), highest)
-        deflection, held = self.static.product.deflection, self.job.scene.axle.kind == "fixed"
-        excursion(record, totals.figures.excursion, deflection, held=held)
+        if large and moved:
+            left_out = large.left_out(instants, chosen.step) if instants.kept else None
+            describe_large(record, moved, left_out, totals.figures.steps, totals.figures.excursion)
+        else:
+            deflection, held = self.static.product.deflection, self.job.scene.axle.kind == "fixed"
+            excursion(record, totals.figures.excursion, deflection, held=held)
         stages_setup.describe(record, setup)
         contact_file.describe(record, setup, self.job.scene.road)
         if chosen.scheme != "convolution":
-            work = works(totals.work, driven if self.job.scene.force else None)
+            work = works(totals.work, driven if self.job.scene.force else None, moved)
             given = self._states, response, loop.tire.snapshot(), work
             state = self.static.product
             pressed = float(state.normal_force.sum()) * (state.deflection or 0.0)
             describe_energy(record, *given, losses, chosen.step, pressed)
 
-    def _begin(self, loop: Loop, totals: Totals, losses: Losses, step: float) -> None:
+    def _begin(
+        self, loop: Loop, totals: Totals, losses: Losses, response: Response, step: float
+    ) -> None:
         """Count work and losses from the state in which the loop begins, if that is not the static one. Collective."""
         if loop.begun is None:
             return
         change, moved = loop.begun
         losses.begin()
         kept = loop.tire.snapshot()
-        energies = energies_in(self._states, self.greens.product.contact, kept, step)
+        energies = energies_in(self._states, response, kept, step)
         totals.work.begin(change[: len(moved)], moved, sum(energies or (0.0,)))
+
+    def _large(self) -> LargeMotion | None:
+        """The parts of large motions; None where the motion is linear. Collective."""
+        if self.nonlinear is None or self.restoring is None:
+            return None
+        rolling, fields = self.rotating.product, self.fields.product
+        if fields is not rolling.basis:
+            rolling = replace(rolling, basis=fields)
+        response = self.greens.product.large
+        assert response is not None, "the Green's functions are those of the nonlinear force"
+        return LargeMotion(
+            trained=self.nonlinear.product,
+            restoring=self.restoring.product,
+            response=response,
+            points=stages_setup.probes(self.job, self.static.product, self.setup.product).outputs,
+            wheel=self.wheel.product,
+            rolling=rolling,
+        )
+
+    def _moved(self, large: LargeMotion | None, chosen: Integration) -> LargeTire | None:
+        """The tire of large motions, if any. Collective."""
+        if large is None:
+            return None
+        assert isinstance(chosen.tire, Recursion), "the scene's rules refuse a convolution"
+        return large.tire(chosen.tire, chosen.scheme)
 
     @property
     def _coefficient(self) -> float:
@@ -627,7 +680,9 @@ class ContactStage(Stage[ContactHistory]):
             )
         return loop
 
-    def _steps(self, setup, loop: Loop, file: ContactFile, totals, losses, chosen) -> None:
+    def _steps(
+        self, setup, loop: Loop, file: ContactFile, totals, losses, instants: Instants, chosen
+    ) -> None:
         """Take the remaining steps; stops between two blocks of them when requested. Collective."""
         done, steps = totals.figures.steps, chosen.steps
         blocks = loop.roll(setup.drive, chosen.step, steps, done=done)
@@ -642,10 +697,12 @@ class ContactStage(Stage[ContactHistory]):
             for block in blocks:
                 file.write(block, totals.add)
                 losses.flush()
+                instants.see(float(block.time[-1]))
                 bar.advance(len(block.time))
                 stop, due = watch(deferred.asked)
                 if stop or due:
-                    file.checkpoint(loop.snapshot() | totals.state() | losses.state())
+                    kept = totals.state() | losses.state() | instants.state()
+                    file.checkpoint(loop.snapshot() | kept)
                 if stop:
                     raise Stopped(stop)
             totals.finish()
