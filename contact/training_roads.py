@@ -95,12 +95,6 @@ class TrainingRoads:
         length = self.footprint[1] - self.footprint[0] + 2 * BESIDE[0]
         return min(round(length / PITCH[0]) + 1, len(self.x))
 
-    @property
-    def trained(self) -> list[Array]:
-        """All heights of the training: of the rises, and under the tire after each way."""
-        rises = np.array([one.rise for one in self.rises()])
-        return [rises, self.y, *(self.under(way).z for way in self.ways())]
-
     def under(self, way: float) -> Passage:
         """The road under the tire after a way, m."""
         first = min(round(way / PITCH[0]), len(self.x) - self._long)

@@ -37,8 +37,7 @@ from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.stages.accuracy import STATIC_TO_GREENS, AccuracyStage
 from tireroad.runs.stages.contact import ContactStage
 from tireroad.runs.stages.failures import failure_recorded
-from tireroad.runs.stages.greens import GreensStage, Responses
-from tireroad.runs.stages.nonlinear import NonlinearStage, Restoring
+from tireroad.runs.stages.greens import Responses
 from tireroad.runs.stages.response import ResponseStage
 from tireroad.runs.stages.setup import Setup
 from tireroad.runs.stages.sound import RadiationStage, SoundStage
@@ -47,6 +46,7 @@ from tireroad.runs.stages.stage import Job, PipelinePart, Result, Stage, largest
 from tireroad.runs.stages.static import StaticStage
 from tireroad.runs.stages.stiffness import StiffnessStage
 from tireroad.runs.stages.stretches import StretchesStage
+from tireroad.runs.stages.training import NonlinearStage, Restoring
 from tireroad.runs.stages.vibration import MotionStage, VibrationStage
 from tireroad.runs.stages.whole_tire import LinesOfRun
 
@@ -54,10 +54,9 @@ PARTS: tuple[type[PipelinePart], ...] = (
     StaticStage,
     RadiationStage,
     StiffnessStage,
-    *(part for part in STATIC_TO_GREENS if part is not GreensStage),
+    *STATIC_TO_GREENS,
     Restoring,
     NonlinearStage,
-    GreensStage,
     ContactStage,
     AccuracyStage,
     StretchesStage,

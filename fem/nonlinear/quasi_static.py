@@ -81,7 +81,7 @@ class Reduced:
 
     so that contact and s are solved for together. J is corrected by Broyden's update after each evaluation
     and kept from one road to the next; where that does not do it is taken anew: by `differentiate(load, s)`, or by
-    differences.
+    differences. `tolerance`: of s, over the tire's whole motion.
     """
 
     def __init__(
@@ -91,8 +91,10 @@ class Reduced:
         seen: Array,
         evaluate: Evaluate,
         differentiate: Evaluate | None = None,
+        tolerance: float = TOLERANCE,
     ) -> None:
         self.points, self.compliance, self.seen, self.evaluate = points, compliance, seen, evaluate
+        self._tolerance = tolerance
         self._differentiate = differentiate or self._differences
         self.jacobian = np.zeros((seen.shape[1],) * 2)
         self.evaluations = 0
@@ -147,7 +149,7 @@ class Reduced:
                 self.jacobian = self.jacobian + np.outer(lacking, step) / (step @ step)
             s, load, value = changed, new, found
             off, size = np.linalg.norm(value - s), np.linalg.norm(seen.T @ load)
-            if off <= TOLERANCE * max(float(size), _FLOOR):
+            if off <= self._tolerance * max(float(size), _FLOOR):
                 return Standing(w, touch.force, load, s)
             if not np.isfinite(off):
                 break

@@ -20,7 +20,7 @@ from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.matrices.compliance import factorise, multiply, solve_columns
 from tireroad.fem.nonlinear.cells import cell_forms
 from tireroad.fem.nonlinear.force import RestoringForce
-from tireroad.fem.nonlinear.quasi_static import Elements, Reduced, Standing
+from tireroad.fem.nonlinear.quasi_static import TOLERANCE, Elements, Reduced, Standing
 from tireroad.fem.nonlinear.reduced import ReducedForce, outside, reduced_force, sizes
 from tireroad.fem.nonlinear.road import ContactPoints, Ground
 from tireroad.fem.static.symmetric import TURN, looks_the_same
@@ -29,7 +29,7 @@ from tireroad.fem.static.virtual_work import AT_REST, tangent
 Array = np.ndarray
 
 _LEAST = 0.1  # J^(1/2): the size of a motion of hundredths of a joule
-_TURNS, _SMALLEST, _NONE, _BLOCK, _MANY, _TANGENTS = 5, 0.25, 1e-9, 512, 400, 6
+_SMALLEST, _NONE, _BLOCK, _MANY, _TANGENTS = 0.25, 1e-9, 512, 400, 6
 _CELLS = 128
 _SMALL = 1 / 20
 _SAME = 1e-3  # of a force: that of a half-turned motion and the half-turned force
@@ -38,13 +38,16 @@ _SAME = 1e-3  # of a force: that of a half-turned motion and the half-turned for
 @dataclass(frozen=True, kw_only=True)
 class Settings:
     """Settings of a training: largest `share` (outside over sizes) that the vectors may lack of a state on the way, and that
-    those `kept` at last may; `tolerance` of the weights; `step` of a road's height, m; `most` vectors at last."""
+    those `kept` at last may; `tolerance` of the weights; `step` of a road's height, m; `most` vectors at last; `turns` in
+    which a state is solved for again, and its `precision`."""
 
     share: float = 0.04
     kept: float = 0.03
     tolerance: float = 0.01
     step: float = 4e-3
     most: int = 80
+    turns: int = 5
+    precision: float = TOLERANCE
 
 
 @dataclass
@@ -72,9 +75,9 @@ class Training:
     states: int
     left: float
     error: float
-    tangents: int
-    evaluations: int
     singular: Array = field(repr=False)
+    tangents: int = 0
+    evaluations: int = 0
 
 
 class Trainer:
@@ -100,7 +103,8 @@ class Trainer:
         n = len(force.at_rest)
         self.vectors = np.zeros((n, 0))
         nothing = np.zeros((count, 0))
-        self.tire = Reduced(points, compliance, nothing, self._evaluate, self._jacobian)
+        given = points, compliance, nothing, self._evaluate, self._jacobian
+        self.tire = Reduced(*given, settings.precision)
         self._cells = CellTangents(force)
         self.turn = half_turn(force)
         self.motions: list[Array] = []
@@ -154,12 +158,32 @@ class Trainer:
         )
         return found
 
+    def follow(self, ways: Array, under: Callable[[float], Ground]) -> None:
+        """Learn from a road that passes, where it is `under` the tire after the `ways` (n,) m.
+
+        Greedily: each fourth way, then those half between, then the others beside a way that lacked more than twice the
+        share that vectors may lack.
+        """
+        lacked: dict[int, float] = {}
+        for stride in (4, 2, 1):
+            last = dict(lacked)
+            for number in range(0, len(ways), stride):
+                beside = [last.get(number + side, 0.0) for side in (-stride, stride)]
+                needed = stride > 1 or max(beside) > 2 * self.settings.share
+                if number not in lacked and needed:
+                    lacked[number] = self.visit(under(float(ways[number]))).lacked
+
+    @property
+    def states(self) -> tuple[Array, Array]:
+        """Motions and answers K^-1 r (n, s) of all states, half-turned copies too."""
+        return self._with_turned(self.motions), self._with_turned(self.answers)
+
     def _learnt(self, road: Ground, before: Standing, found: Trained) -> Standing:
         """The state on a road, solved for again while the vectors lack some of its K^-1 r."""
         # Vectors may have joined on the way to a state that was not found.
         lacking = self.vectors.shape[1] - len(before.s)
         before = replace(before, s=np.append(before.s, np.zeros(lacking)))
-        for turn in range(_TURNS):
+        for turn in range(self.settings.turns):
             state = self._solved(road, before, found)
             motion = self.motion(state.load, state.s)
             share, answer, rest = self._lacking(motion)
@@ -184,8 +208,7 @@ class Trainer:
         if not self.answers:
             return
         before = multiply(self._stiffness, self.vectors)
-        motions, answers = self._with_turned(self.motions), self._with_turned(self.answers)
-        self.vectors, _ = decomposed(self.force, motions, answers, self.settings.share / 4, _MANY)
+        self.vectors, _ = decomposed(self.force, *self.states, self.settings.share / 4, _MANY)
         overlap = summed(self._comm, self.vectors.T @ before)
         self.tire.seen = self.elements.seen(self.vectors)
         self.tire.jacobian = overlap @ self.tire.jacobian @ overlap.T
@@ -241,25 +264,35 @@ class Trainer:
 
     def concluded(self) -> Training:
         """Vectors and weights from all states."""
-        force, settings = self.force, self.settings
-        motions, answers = self._with_turned(self.motions), self._with_turned(self.answers)
-        vectors, singular = decomposed(force, motions, answers, settings.kept, settings.most)
-        forces, scale = multiply(self._stiffness, answers), sizes(force, motions, answers)
-        left = outside(force, vectors, answers, forces) / _scale(scale)
-        cells, weights, error = weighted_cells(
-            force, vectors, motions, forces, _scale(scale), settings.tolerance
-        )
-        return Training(
-            force=reduced_force(self.force, vectors, cells, weights),
-            vectors=vectors,
-            record=self.record,
-            states=motions.shape[1],
-            left=float(left.max()),
-            error=error,
-            tangents=self.elements.tangents,
-            evaluations=self.tire.evaluations,
-            singular=singular,
-        )
+        found = trained_on(self.force, *self.states, self.settings, self.record)
+        return replace(found, tangents=self.elements.tangents, evaluations=self.tire.evaluations)
+
+
+def trained_on(
+    force: RestoringForce,
+    motions: Array,
+    answers: Array,
+    settings: Settings,
+    record: list[Trained],
+) -> Training:
+    """Vectors and weights from the motions and K^-1 r (n, s) of states. Collective."""
+    vectors, singular = decomposed(force, motions, answers, settings.kept, settings.most)
+    forces, scale = (
+        multiply(force.operators.stiffness, answers),
+        _scale(sizes(force, motions, answers)),
+    )
+    left = outside(force, vectors, answers, forces) / scale
+    given = force, vectors, motions, forces, scale, settings.tolerance
+    cells, weights, error = weighted_cells(*given)
+    return Training(
+        force=reduced_force(force, vectors, cells, weights),
+        vectors=vectors,
+        record=record,
+        states=motions.shape[1],
+        left=float(left.max()),
+        error=error,
+        singular=singular,
+    )
 
 
 class CellTangents:
@@ -302,34 +335,6 @@ def train(
     trainer = Trainer(force, points, settings, report)
     for road in roads:
         trainer.visit(road)
-    return trainer.concluded()
-
-
-def train_along(
-    force: RestoringForce,
-    points: ContactPoints,
-    first: Sequence[Ground],
-    ways: Array,
-    under: Callable[[float], Ground],
-    settings: Settings = Settings(),
-    report: Callable[[str], None] = lambda text: None,
-) -> Training:
-    """The same trained on a road that passes: after the roads of `first`, where it is `under` the tire after the `ways` (n,) m.
-
-    Greedily: each fourth way, then those half between, then the others beside a way that lacked more than twice the share
-    that vectors may lack. Collective.
-    """
-    trainer = Trainer(force, points, settings, report)
-    for road in first:
-        trainer.visit(road)
-    lacked: dict[int, float] = {}
-    for stride in (4, 2, 1):
-        last = dict(lacked)
-        for number in range(0, len(ways), stride):
-            beside = [last.get(number + side, 0.0) for side in (-stride, stride)]
-            needed = stride > 1 or max(beside) > 2 * settings.share
-            if number not in lacked and needed:
-                lacked[number] = trainer.visit(under(float(ways[number]))).lacked
     return trainer.concluded()
 
 

@@ -17,7 +17,7 @@ STANDS_FOR = {
     "NAME": "[^/]+",
     "PART": ".+",
     "AXIS": "[^/]+",
-    "WHERE": "(contact|force|large)",
+    "WHERE": "(contact|force)",
     "FORCE": "(contact_force|axle_force)",
     "CAUSE": f"({'|'.join(CAUSES)})",
 }
@@ -158,7 +158,7 @@ DATASETS: Mapping[str, tuple[Dataset, ...]] = {
             ("campbell/name", "k", "-", "names of the branches"),
         ),
         "greens.h5": (
-            ("WHERE/eigenvalue", "q", "1/s", "poles of the response at the `contact` points, of each `force`, or of `large` motions"),
+            ("WHERE/eigenvalue", "q", "1/s", "poles of the response at the `contact` points or of each `force`"),
             ("WHERE/output", "r, q", "kg^-1/2", "their output, C"),
             ("WHERE/input", "q, k", "s/kg^1/2", "their input, P"),
             ("WHERE/block", "p, p", "1/s", "block of real states, T"),
@@ -180,10 +180,11 @@ DATASETS: Mapping[str, tuple[Dataset, ...]] = {
             ("cells", "w", "-", "cells of the mesh over which the force is summed, by number"),
             ("weight", "w", "-", "their weights"),
             ("singular", "i", "-", "singular values of the states' answers K^-1 r over their sizes"),
-            ("road", "r", "-", "roads of the training"),
-            ("how", "r", "-", "how their states were found, or up to which part of their height"),
-            ("lacked", "r", "-", "largest share of the motion that the vectors lacked before each"),
-            ("left", "r", "-", "the same after it"),
+            ("road", "r", "-", "runs of the training"),
+            ("how", "r", "-", "whether they were whole, or where they stopped"),
+            ("lacked", "r", "-", "largest share of the motion in each that the vectors before it lacked"),
+            ("left", "r", "-", "0: the share that is left of all states is the attribute `outside`"),
+            ("response/PART", "", "as greens.h5", "response of the contact with the reduced force: behind the columns and rows of the forces K V, then what is read, and the nodes of the kept cells"),
         ),
         "contact.h5": (
             ("time", "nt", "s", "end of each step"),

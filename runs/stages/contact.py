@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -38,10 +38,9 @@ from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes
-from tireroad.runs.files import store
 from tireroad.runs.process import console
 from tireroad.runs.process.signals import Deferred, Stopped
-from tireroad.runs.scene.tables.scene import RoadTable, Scene, rolls_freely
+from tireroad.runs.scene.tables.scene import RoadTable, Scene
 from tireroad.runs.stages import contact_file
 from tireroad.runs.stages import setup as stages_setup
 from tireroad.runs.stages.contact_file import (
@@ -51,21 +50,20 @@ from tireroad.runs.stages.contact_file import (
     forget_checkpoint,
 )
 from tireroad.runs.stages.greens import Responses
-from tireroad.runs.stages.large import Instants, LargeMotion
+from tireroad.runs.stages.large import Greatest, LargeMotion
 from tireroad.runs.stages.large import describe as describe_large
-from tireroad.runs.stages.nonlinear import Nonlinear
 from tireroad.runs.stages.rolling import (
     Integration,
     Planned,
     chosen_scheme,
     driven_tire,
     integration,
-    passing_period,
     planned,
     reported,
-    shortest_period,
+    shortest_excitation,
 )
 from tireroad.runs.stages.stage import Record, Result, Stage
+from tireroad.runs.stages.training import TrainedMotion, linear_motion
 
 # Fewest point spacings per footprint width. Measured on cobblestones on two tires: deviation 23 %
 # too large at 1.8, 2 % at 2.4 (torus.toml), 5 % too small at 2.5, 3 % at 3.6. Only on a mesh
@@ -448,8 +446,8 @@ class ContactStage(Stage[ContactHistory]):
     setup: Result[ContactSetup]
     wheel: Result[Wheel]
     fields: Result[ModalBasis]
-    restoring: Result[RestoringForce] | None = None
-    nonlinear: Result[Nonlinear] | None = None
+    restoring: Result[RestoringForce]
+    nonlinear: Result[TrainedMotion] | None = None
 
     def solver(self) -> str:
         """The solvers' settings, for the log."""
@@ -473,18 +471,9 @@ class ContactStage(Stage[ContactHistory]):
 
     def inputs(self) -> dict:
         """The Green's functions, the contact, the road (a file by its content) and the time."""
-        scene = self.job.scene
-        return {
-            "greens": self.greens.key,
-            "contact": asdict(scene.contact),
-            "road": [asdict(scene.road), stages_setup.inputs(self.job)],
-            "files": [store.file_hash(file) for file in scene.road.surface.files],
-            "speed": self.setup.product.rolled.speed,
-            "slip": [rolls_freely(scene), scene.rotation.slip_angle] if scene.rotation else None,
-            "axle_force": scene.output.axle_force,
-            "forces": [asdict(force) for force in scene.force],
-            "time": {k: v for k, v in asdict(scene.time).items() if k != "checkpoint"},
-        }
+        trained = {"nonlinear": self.nonlinear.key} if self.nonlinear else {}
+        loop = stages_setup.loop_inputs(self.job, self.setup.product)
+        return {"greens": self.greens.key, **loop, **trained}
 
     def produce(self, key: str, record: Record) -> ContactHistory:
         """Run the time loop and read the history back. Collective."""
@@ -497,7 +486,8 @@ class ContactStage(Stage[ContactHistory]):
         Collective.
         """
         response, setup = self.greens.product.contact, self.setup.product
-        plan = planned(self.job, record, response, self._shortest_period())
+        shortest = shortest_excitation(self.job.scene, self.setup.product)
+        plan = planned(self.job, record, response, shortest)
         with record.timing("tread and solver"):
             setup, rise = setup.equilibrated(
                 response, self.static.product.normal_force, self.job.scene.contact
@@ -566,7 +556,7 @@ class ContactStage(Stage[ContactHistory]):
             driven = driven_tire(self.job, chosen, setup.patch, moved)
             loop = self._loop(record, setup, driven or moved or chosen.tire, chosen.step)
         totals = Totals(setup.patch, setup.reach, scheme.limit, work=Work(scheme.scheme))
-        losses, instants = Losses(chosen, response, self._states), Instants(moved, chosen.tire)
+        losses, instants = Losses(chosen, response, self._states), Greatest(moved, chosen.tire)
         with ExitStack() as stack, record.timing("time loop"):
             attributes = {"step": chosen.step, "scheme": chosen.scheme, "road_relief": setup.relief}
             attributes |= {"free_slip": setup.free_slip or 0.0, "scheme_reason": scheme.reason}
@@ -598,7 +588,7 @@ class ContactStage(Stage[ContactHistory]):
         highest = self.rotating.product.highest / (2 * np.pi)
         edges(record, self.job.scene.road, setup.patch, abs(setup.rolled.speed), highest)
         if large and moved:
-            left_out = large.left_out(instants, chosen.step) if instants.kept else None
+            left_out = large.left_out(instants, chosen.step) if len(instants) else None
             describe_large(record, moved, left_out, totals.figures.steps, totals.figures.excursion)
         else:
             deflection, held = self.static.product.deflection, self.job.scene.axle.kind == "fixed"
@@ -626,20 +616,14 @@ class ContactStage(Stage[ContactHistory]):
 
     def _large(self) -> LargeMotion | None:
         """The parts of large motions; None where the motion is linear. Collective."""
-        if self.nonlinear is None or self.restoring is None:
+        if self.nonlinear is None:
             return None
-        rolling, fields = self.rotating.product, self.fields.product
-        if fields is not rolling.basis:
-            rolling = replace(rolling, basis=fields)
-        response = self.greens.product.large
-        assert response is not None, "the Green's functions are those of the nonlinear force"
-        return LargeMotion(
-            trained=self.nonlinear.product,
-            restoring=self.restoring.product,
-            response=response,
-            points=stages_setup.probes(self.job, self.static.product, self.setup.product).outputs,
-            wheel=self.wheel.product,
-            rolling=rolling,
+        motion, trained = linear_motion(self), self.nonlinear.product
+        return replace(
+            motion,
+            force=trained.stored.force(motion.restoring),
+            vectors=trained.stored.on_unknowns(motion.restoring),
+            response=trained.response,
         )
 
     def _moved(self, large: LargeMotion | None, chosen: Integration) -> LargeTire | None:
@@ -662,12 +646,6 @@ class ContactStage(Stage[ContactHistory]):
         """The modes, with the attachment modes where there are any, whose states the loop has."""
         return self.greens.product.attached or self.rotating.product
 
-    def _shortest_period(self) -> float:
-        """Shortest period of all excitation, s."""
-        scene, setup = self.job.scene, self.setup.product
-        passing = passing_period(scene.road, setup.shortest, setup.rolled.speed)
-        return min(passing, shortest_period(scene.force))
-
     def _loop(self, record: Record, setup: ContactSetup, tire, step: float) -> Loop:
         """The loop of tire, normal solver and friction at the patch's points; recorded."""
         spec = self.job.scene.contact
@@ -681,7 +659,7 @@ class ContactStage(Stage[ContactHistory]):
         return loop
 
     def _steps(
-        self, setup, loop: Loop, file: ContactFile, totals, losses, instants: Instants, chosen
+        self, setup, loop: Loop, file: ContactFile, totals, losses, instants: Greatest, chosen
     ) -> None:
         """Take the remaining steps; stops between two blocks of them when requested. Collective."""
         done, steps = totals.figures.steps, chosen.steps

@@ -9,23 +9,19 @@ import h5py
 import numpy as np
 
 from tireroad.contact.setup import ContactSetup
-from tireroad.fem.nonlinear.force import RestoringForce
 from tireroad.fem.static.state import StaticState
-from tireroad.greens.basis import Basis
 from tireroad.greens.coupling import Wheel
-from tireroad.greens.large_motion import large_response
 from tireroad.greens.residuals import residual_of
 from tireroad.greens.response import Response
 from tireroad.greens.responses import Made, Wanted, band, judged, make_response, selected
 from tireroad.modal.basis import ModalBasis
-from tireroad.modal.rolling import RollingModes, rolling_modes
+from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
 from tireroad.runs.scene.physics import turning_of
 from tireroad.runs.scene.tables.scene import PointForceTable, has_air
 from tireroad.runs.stages import cavity, corner, rotating
 from tireroad.runs.stages.modes import fill_projection, read_projection
-from tireroad.runs.stages.nonlinear import Nonlinear
-from tireroad.runs.stages.setup import Probes, components, points_of, probes
+from tireroad.runs.stages.setup import components, points_of, probes
 from tireroad.runs.stages.stage import MUMPS, Computed, Record, Result
 
 _UNITS = {
@@ -61,18 +57,19 @@ def fill_response(file: h5py.File, name: str, response: Response, points: int) -
     file[name].attrs["pulse"] = response.pulse
 
 
+def read_response(group: h5py.Group) -> Response:
+    """The response in a group."""
+    return Response(
+        **{key: group[key][:] for key in _UNITS},
+        pulse=int(group.attrs["pulse"]),
+        rigid=int(group.attrs["rigid_states"]),
+        **{key: group[key][:] for key in _KNOWN if key in group},
+    )
+
+
 def read_responses(file: h5py.File) -> dict[str, Response]:
     """All responses in a file, by name."""
-    return {
-        name: Response(
-            **{key: group[key][:] for key in _UNITS},
-            pulse=int(group.attrs["pulse"]),
-            rigid=int(group.attrs["rigid_states"]),
-            **{key: group[key][:] for key in _KNOWN if key in group},
-        )
-        for name, group in file.items()
-        if "output" in group
-    }
+    return {name: read_response(group) for name, group in file.items() if "output" in group}
 
 
 @dataclass(frozen=True)
@@ -81,20 +78,18 @@ class Responses:
 
     `contact`: between the points of the patch, with the prescribed forces among its inputs;
     `force`: between the points of the prescribed forces. `attached`: the modes with their attachment
-    modes, whose states these are, without their fields; None without the latter. `large`: as `contact`, with the
-    reduced nonlinear force (greens.large_motion.large_response); None where the motion is linear.
+    modes, whose states these are, without their fields; None without the latter.
     """
 
     contact: Response | None = None
     force: Response | None = None
     attached: RollingModes | None = None
-    large: Response | None = None
 
     @property
     def named(self) -> dict[str, Response]:
         """The responses that exist, by name."""
-        every = {"contact": self.contact, "force": self.force, "large": self.large}
-        return {name: made for name, made in every.items() if made is not None}
+        both = {"contact": self.contact, "force": self.force}
+        return {name: made for name, made in both.items() if made is not None}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,8 +103,6 @@ class GreensStage(Computed[Responses]):
     fields: Result[ModalBasis]
     rotating: Result[RollingModes]
     setup: Result[ContactSetup | None]
-    restoring: Result[RestoringForce] | None = None
-    nonlinear: Result[Nonlinear] | None = None
 
     def solver(self) -> str:
         """The solvers' settings, for the log."""
@@ -165,9 +158,6 @@ class GreensStage(Computed[Responses]):
         responses = self._apart(points.name, response)
         if made.attached is not None:
             responses = replace(responses, **self._of_attached(made.attached))
-        if self.nonlinear is not None:
-            with record.timing("response to the nonlinear force"):
-                responses = replace(responses, large=self._large(rolling, points, self.nonlinear))
         self._describe(record, responses)
         return responses
 
@@ -188,22 +178,6 @@ class GreensStage(Computed[Responses]):
         record.indicators |= response.figures
         record.warnings += response.warnings
         return response
-
-    def _large(
-        self, rolling: RollingModes, points: Probes, nonlinear: Result[Nonlinear]
-    ) -> Response:
-        """The response of the contact with the reduced nonlinear force. Collective."""
-        assert self.restoring is not None, "it comes with the nonlinear force"
-        restoring, trained = self.restoring.product, nonlinear.product
-        fields, wheel = self.fields.product, self.wheel.product
-        if fields is not rolling.basis:  # a new solution: its states must be its own too
-            rolling = rolling_modes(fields, rolling.turning, self.job.comm)
-        assert fields.modes is not None, "the modes on all unknowns"
-        vectors = trained.on_unknowns(restoring)
-        force = trained.force(restoring)
-        loaded = self._contact_forces + len(self.job.scene.force)
-        given = points.outputs, restoring, force, vectors, loaded
-        return large_response(wheel, Basis.of(rolling), fields.modes, *given)
 
     def _of_attached(self, attached: RollingModes) -> dict[str, Any]:
         """The part that the contact needs of the modes with attachment modes: not their fields, which on
@@ -246,8 +220,8 @@ class GreensStage(Computed[Responses]):
         """The responses by name, and the nodes of the patch."""
         for name, response in product.named.items():
             forces = len(self.job.scene.force)
-            points = 0 if name == "large" else 3 * forces  # behind the reduced force there
-            if name != "force":
+            points = 3 * forces
+            if name == "contact":
                 points += self._contact_forces + forces
             fill_response(file, name, response, points)
         if self._stands_with_air:
@@ -263,9 +237,7 @@ class GreensStage(Computed[Responses]):
     def read(self, file) -> Responses:
         """The responses."""
         found = read_responses(file)
-        responses = Responses(
-            contact=found.get("contact"), force=found.get("force"), large=found.get("large")
-        )
+        responses = Responses(contact=found.get("contact"), force=found.get("force"))
         if _ATTACHED not in file:
             return responses
         group = file[_ATTACHED]

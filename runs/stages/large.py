@@ -1,4 +1,4 @@
-"""Large motions in the time loop of a run: the tire, what it stores, and how far it leaves its training."""
+"""Large motions in the time loop of a run: the tire, its motion on all unknowns, and how far that is outside the training."""
 
 from __future__ import annotations
 
@@ -10,135 +10,167 @@ from scipy import sparse
 from tireroad.contact.loop import LinearTire
 from tireroad.fem.matrices.compliance import factorise, on_own_rows, solve_columns
 from tireroad.fem.nonlinear.force import RestoringForce
-from tireroad.fem.nonlinear.reduced import extra_loads, outside, sizes
+from tireroad.fem.nonlinear.reduced import ReducedForce, extra_loads, outside, sizes
 from tireroad.greens.basis import Basis, Probes
 from tireroad.greens.coupling import Wheel
-from tireroad.greens.large_motion import LargeTire
+from tireroad.greens.large_motion import LargeTire, large_response
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.modal.corner import READINGS
 from tireroad.modal.rolling import RollingModes
 from tireroad.modal.solver.slicing import Modes
 from tireroad.runs.process import console
-from tireroad.runs.stages.nonlinear import Nonlinear
 from tireroad.runs.stages.stage import Record
 
 Array = np.ndarray
 
 KEPT = 10  # instants, those of the greatest reduced force
-FAR = 0.06  # of the motion: what may be outside the training without a warning
-_SLIGHT = 0.1  # J^(1/2): motions of which nothing is said
+FAR = 0.1  # of the motion: what may be outside the training without a warning
+_SLIGHT = 1 / 20  # of the largest motion: smaller ones are not told from none
 
 
 class Instants:
-    """The instants of the greatest reduced force, `kept` in its order: its norm J^(1/2), the time s, and all states (q,), the
-    block's (b,) and the loads (c + k,) then. Of a tire with a `linear` recursion; none are kept without one."""
+    """The states (q,) and the block's (b,) of a `linear` recursion, and its loads (c + k,), at some times, s."""
+
+    def __init__(self, linear: LinearTire) -> None:
+        self._linear = linear
+        self.kept: list[tuple[float, Array, Array, Array]] = []
+
+    def add(self, time: float) -> None:
+        """Keep the present instant. Collective where the recursion is."""
+        held = self._linear.snapshot()
+        self.kept.append((time, held["state"], held["block_state"], held["push_force"]))
+
+    def __len__(self) -> int:
+        return len(self.kept)
+
+    @property
+    def columns(self) -> tuple[Array, ...]:
+        """Times (n,) s, states (q, n), the block's (b, n), loads (c + k, n)."""
+        return tuple(np.array(part).T for part in zip(*self.kept, strict=True))
+
+
+class Greatest(Instants):
+    """The instants of the greatest reduced force of a `tire`; none of a linear one."""
 
     def __init__(self, tire: LargeTire | None, linear: LinearTire) -> None:
-        self._tire, self._linear = tire, linear
-        self.kept: list[tuple[float, float, Array, Array, Array]] = []
+        super().__init__(linear)
+        self._tire = tire
 
     def see(self, time: float) -> None:
         """Keep the present instant if it is one of the greatest. Collective where the tire is."""
         if self._tire is None:
             return
         size = float(np.linalg.norm(self._tire.s))
-        if len(self.kept) == KEPT and size <= self.kept[-1][0]:
+        if len(self) == KEPT and size <= self._size(self.kept[-1]):
             return
-        held = self._linear.snapshot()
-        self.kept.append((size, time, held["state"], held["block_state"], held["push_force"]))
-        self.kept.sort(key=lambda one: (-one[0], one[1]))
+        self.add(time)
+        self.kept.sort(key=lambda one: (-self._size(one), one[0]))
         del self.kept[KEPT:]
+
+    def _size(self, one: tuple[float, Array, Array, Array]) -> float:
+        assert self._tire is not None
+        return float(np.linalg.norm(one[3][len(one[3]) - len(self._tire.s) :]))
 
     def state(self) -> dict[str, Array]:
         """The state that a checkpoint keeps."""
-        names = "size", "time", "states", "block", "loads"
+        names = "time", "states", "block", "loads"
         if not self.kept:
             return {}
-        columns = zip(names, zip(*self.kept, strict=True), strict=True)
-        return {f"instants_{name}": np.array(values) for name, values in columns}
+        return {f"instants_{k}": v for k, v in zip(names, self.columns, strict=True)}
 
     def set_state(self, state: dict[str, Array]) -> None:
         """Continue from a `state`."""
-        names = "size", "time", "states", "block", "loads"
-        if "instants_size" in state:
-            columns = [state[f"instants_{name}"] for name in names]
-            self.kept = [(float(a), float(b), *rest) for a, b, *rest in zip(*columns, strict=True)]
+        if "instants_time" in state:
+            names = "time", "states", "block", "loads"
+            columns = [state[f"instants_{name}"].T for name in names]
+            self.kept = [(float(t), *rest) for t, *rest in zip(*columns, strict=True)]
 
 
 @dataclass(frozen=True, kw_only=True)
 class LeftOut:
-    """Motion outside the training (n,) J^(1/2) at n instants `time` (n,) s, and the `size` (n,) of the whole, in the same
-    measure (fem.nonlinear.reduced.outside, sizes)."""
+    """The motion (n, i) m at i instants `time` (i,) s and its `answer` K^-1 r (n, i), on own unknowns; `lacking` (i,) J^(1/2):
+    what is outside the training, and the `size` (i,) of the whole in the same measure (fem.nonlinear.reduced)."""
 
     time: Array
     motion: Array
+    answer: Array
+    lacking: Array
     size: Array
 
     @property
-    def share(self) -> float:
-        """The greatest share of the motion that is outside."""
-        return float((self.motion / np.maximum(self.size, _SLIGHT)).max(initial=0.0))
+    def shares(self) -> Array:
+        """The share (n,) of the motion that is outside, of the smallest over a twentieth of the largest."""
+        least = _SLIGHT * self.size.max(initial=0.0)
+        return self.lacking / np.maximum(np.maximum(self.size, least), np.finfo(float).tiny)
 
 
 @dataclass(frozen=True, kw_only=True)
 class LargeMotion:
-    """Parts of a run's large motions: the stored training, the elements' force, the `response`
-    (greens.large_motion.large_response), the probes `points` (r, 3 s or wider), and modes with fields, of the states of
-    `rolling`."""
+    """Parts of a run's large motions, or of its linear ones before the training: the elements' force, the reduced one with its
+    `vectors` V (n, k) on own unknowns (None, k = 0), the `response` (greens.large_motion.large_response), the probes `points`
+    (r, 3 s or wider), of which the first `loaded` carry forces, and modes with fields, of the states of `rolling`."""
 
-    trained: Nonlinear
     restoring: RestoringForce
+    force: ReducedForce | None
+    vectors: Array
     response: Response
     points: Probes
+    loaded: int
     wheel: Wheel
     rolling: RollingModes
 
-    @property
-    def loaded(self) -> int:
-        """Number of points that carry forces, c."""
-        return self.response.residual.shape[1] - self.trained.shape.shape[-1]
+    def trained(self, force: ReducedForce, vectors: Array) -> LargeMotion:
+        """The same with a reduced force, and the response to it. Collective."""
+        given = self.points, self.restoring, force, vectors, self.loaded
+        response = large_response(self.wheel, self._basis, self._modes, *given)
+        return replace(self, force=force, vectors=vectors, response=response)
 
-    def tire(self, linear: Recursion, scheme: str) -> LargeTire:
-        """The tire on a `linear` recursion of the response. Collective."""
-        return LargeTire(linear, self.trained.force(self.restoring), self.loaded, scheme)
+    def tire(self, linear: Recursion, scheme: str) -> LargeTire | None:
+        """The tire on a `linear` recursion of the response; None if its motion is linear."""
+        return LargeTire(linear, self.force, self.loaded, scheme) if self.force else None
+
+    def motions(self, instants: Instants, step: float) -> Array:
+        """The motion (n, i) m on own unknowns at the instants, relative to the wheel: that of the states, and what all loads
+        cause beside them (Wheel.beyond_modes). Collective."""
+        _, z, y, loads = instants.columns
+        pushed = (self.wheel.growth or 1.0) * extra_loads(self.restoring, self.vectors)
+        own = on_own_rows(self.restoring.operators, self.points[: self.loaded])
+        acting = own @ loads[: self.loaded] + pushed @ loads[self.loaded :]
+        beyond = self.wheel.beyond_modes(self._basis, self._modes, acting)
+        return beyond + self._modes.vectors @ self._coordinates(z, y, step)
 
     def left_out(self, instants: Instants, step: float) -> LeftOut:
-        """How far the motion at the instants is outside the training. Collective.
-
-        The motion is that of the states and what all loads cause beside them (Wheel.beyond_modes).
-        """
-        operators, restoring = self.restoring.operators, self.restoring
-        vectors = self.trained.on_unknowns(restoring)
-        own = on_own_rows(operators, self.points[: self.loaded])
-        pushed = (self.wheel.growth or 1.0) * extra_loads(restoring, vectors)
-        loads = np.stack([one[-1] for one in instants.kept], axis=1)
-        acting = own @ loads[: self.loaded] + pushed @ loads[self.loaded :]
-        motions = self.wheel.beyond_modes(Basis.of(self.rolling), self._modes, acting)
-        motions += self._modes.vectors @ self._coordinates(instants, step)
-        forces = restoring.nonlinear(motions)
-        factor = factorise(operators.stiffness)
-        answers = solve_columns(factor, operators.stiffness, forces)
+        """How far the motion at the instants is outside the training. Collective."""
+        motion, restoring = self.motions(instants, step), self.restoring
+        forces, stiffness = restoring.nonlinear(motion), restoring.operators.stiffness
+        factor = factorise(stiffness)
+        answer = solve_columns(factor, stiffness, forces)
         factor.destroy()
         return LeftOut(
-            time=np.array([one[1] for one in instants.kept]),
-            motion=outside(restoring, vectors, answers, forces),
-            size=sizes(restoring, motions, answers),
+            time=instants.columns[0],
+            motion=motion,
+            answer=answer,
+            lacking=outside(restoring, self.vectors, answer, forces),
+            size=sizes(restoring, motion, answer),
         )
+
+    @property
+    def _basis(self) -> Basis:
+        return Basis.of(self.rolling)
 
     @property
     def _modes(self) -> Modes:
         assert self.rolling.basis.modes is not None, "the modes on all unknowns"
         return self.rolling.basis.modes
 
-    def _coordinates(self, instants: Instants, step: float) -> Array:
-        """The coordinates (m, n) of the modes at the instants, relative to the wheel."""
+    def _coordinates(self, z: Array, y: Array, step: float) -> Array:
+        """The coordinates (m, i) of the modes, relative to the wheel, from states (q, i) and the block's (b, i)."""
         states, slow = self.rolling.states, self.response.slow(step)
-        z, y = (np.stack([one[part] for one in instants.kept], axis=1) for part in (2, 3))
         found = (states.right[:, slow] @ z).real
         if len(y) == states.block_right.shape[1]:
             found += states.block_right @ y
-        basis, m = Basis.of(self.rolling), self._modes.vectors.shape[1]
+        basis, m = self._basis, self._modes.vectors.shape[1]
         face = len(basis.shape)
         inside = np.vstack([basis.shape, np.zeros((READINGS, m)), np.eye(m)])
         probes = sparse.hstack(
@@ -150,7 +182,7 @@ class LargeMotion:
 def describe(
     record: Record, tire: LargeTire, left_out: LeftOut | None, steps: int, excursion: float
 ) -> None:
-    """Record what the reduced force took, what it stores, and how far the motion is outside its training; warn if far."""
+    """Record what the reduced force took and how far the motion is outside its training; warn if far."""
     record.headline["motion"] = ("large", "-")
     record.indicators |= {
         "largest motion of the contact beyond the static state": (excursion, "m"),
@@ -159,16 +191,16 @@ def describe(
     }
     if left_out is None:
         return
-    share = left_out.share
+    share, when = float(left_out.shares.max()), left_out.time[left_out.shares.argmax()]
     record.headline["motion outside the training at most"] = (100 * share, "%")
-    when = left_out.time[(left_out.motion / np.maximum(left_out.size, _SLIGHT)).argmax()]
     console.say(
-        f"  large motions: {100 * share:.2g} % of the motion is outside the training at most, at t = {when:.4g} s "
-        f"(of {len(left_out.time)} instants of the greatest nonlinear force); {tire.evaluations / max(steps, 1):.2g} evaluations a step"
+        f"  large motions: at most {100 * share:.2g} % of the motion is outside the training, at t = {when:.4g} s "
+        f"(of {len(left_out.time)} instants of the greatest nonlinear force); "
+        f"{tire.evaluations / max(steps, 1):.2g} evaluations a step"
     )
     if share > FAR:
         record.warnings.append(
-            f"the motion leaves the training of the nonlinear force by {100 * share:.2g} % at t = {when:.4g} s, and forces may "
-            "be off by as much: the road moves the tire there as no road of the training does. Take a lower speed or road, "
+            f"{100 * share:.2g} % of the motion at t = {when:.4g} s is outside the training of the nonlinear force, and forces "
+            "may be off by as much: the run moves the tire there as no run of the training did. Take a lower speed or road, "
             'or motion.kind = "linear" to see by how much both differ'
         )

@@ -156,6 +156,12 @@ def passing_period(road: RoadTable, spacing: float, speed: float) -> float:
     return min(periods)
 
 
+def shortest_excitation(scene: Scene, setup: ContactSetup) -> float:
+    """Shortest period of all excitation of a run in contact, s."""
+    passing = passing_period(scene.road, setup.shortest, setup.rolled.speed)
+    return min(passing, shortest_period(scene.force))
+
+
 def driven_tire(
     job: Job, chosen: Integration, patch: Patch, tire: PushedTire | None = None
 ) -> DrivenTire | None:
