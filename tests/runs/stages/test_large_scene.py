@@ -174,6 +174,21 @@ def test_auto_takes_what_the_road_asks_for(tmp_path):
     assert "greens.residual" in other["nonlinear"]["reason"]
 
 
+@pytest.mark.slow
+def test_error_bars_compare_linear_companions_with_a_linear_run(tmp_path):
+    """They are those of the linear tire with the same scheme, not its difference from the nonlinear one."""
+    text = SCENE.replace("[time]", '[time]\nscheme = "damped"').split("[accuracy]")[0]
+    found = []
+    for name, kind in (("straight", ""), ("large", LARGE)):
+        folder, _ = run(tmp_path / name, text + CLEAT + kind, until="accuracy")
+        with h5py.File(folder / "accuracy.h5") as file:
+            causes = file["contact_force"]
+            found.append({c: causes[f"{c}/deviation"][:] for c in causes})
+    assert found[0].keys() == found[1].keys() >= {"step", "points"}
+    for cause, bar in found[0].items():
+        assert np.allclose(found[1][cause], bar, rtol=1e-6, atol=1e-6 * np.abs(bar).max())
+
+
 class StopsOnce:
     """In place of the loop's watch: stops after a block."""
 
