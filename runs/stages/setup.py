@@ -71,7 +71,7 @@ def inputs(job: Job) -> list | None:
 
 
 def loop_inputs(job: Job, setup: ContactSetup) -> dict:
-    """What a time loop depends on beside the Green's functions: the contact, the road (a file by its content), the time."""
+    """Inputs of a time loop beside the Green's functions: the contact, the road (a file by its content), the time."""
     scene = job.scene
     return {
         "contact": asdict(scene.contact),
