@@ -19,7 +19,7 @@ BESIDE = 0.03, 0.02  # m that is sampled before and beside the footprint
 STEEPEST = 1.2
 SHORT = 0.02  # m: bumps that are shorter are taken by the tread and the bending of the belts
 # Lengths and heights (m) from which a road is trained on, the distance of the places, and the most of these.
-LEAST, APART, MOST = 1e-3, 0.01, 160
+LEAST, APART, MOST = 1e-3, 0.015, 120
 # Measured on rises of 1 to 25 mm and bars of 10 to 25 mm (docs/large-motions.md): 15 % for each 10 mm.
 ERROR_PER_METRE = 15.0
 
@@ -81,7 +81,7 @@ class TrainingRoads:
         return [Feature(rise=float(max(up, LEAST))), Feature(rise=-float(max(down, LEAST)))]
 
     def ways(self) -> Array:
-        """Ways (k,) m after which there are bumps under the footprint, 10 mm apart, or farther where they are many."""
+        """Ways (k,) m after which there are bumps under the footprint, 15 mm apart, or farther where they are many."""
         count = len(self.x) - self._long + 1
         bumpy = np.abs(self.z).max(axis=1) > LEAST
         under = np.array([bumpy[first : first + self._long].any() for first in range(count)])

@@ -7,12 +7,13 @@ With K the stiffness, V (n, k) and s = V^T r of fem.nonlinear.reduced, the tire 
 
 is solved within each step, with the contact, which gives the forces f for displacements w = w_free + A_ww f - A_wv s, as an
 inner problem: Newton's method on the k numbers, the derivative of s - s(u_c(s)) by Broyden's updates, kept from step to
-step. Where that does not do it is taken anew by differences, for each of which the contact is solved: the forces f, with
-friction too, follow s. (A plain fixed point diverges: ds/dq, q = V^T K u, has eigenvalues of up to 10.)
+step. Where that does not do it is taken anew for forces f that stay, 1 + (ds/du_c) A_cv: stiffer than it is, so that no step is
+too long. (A plain fixed point diverges: ds/dq, q = V^T K u, has eigenvalues of up to 10.)
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -36,7 +37,8 @@ TOLERANCE = 1e-3  # of s, over the tire's whole motion in the same measure
 FLOOR = 0.1  # J^(1/2): of that motion
 TURNS, STALE = 25, 6  # evaluations of a step at most; after so many the derivative is taken anew
 SPACES = 1e-9  # of a motion: changes that say nothing of the derivative
-PROBE = 1e-4  # of a motion: differences
+# Evaluations from which on a rest of this share of the motion is small enough.
+ENOUGH, ROUGH = 13, 2e-2
 
 
 def large_response(
@@ -101,54 +103,50 @@ def _rows(restoring: RestoringForce, nodes: Array) -> sparse.csr_matrix:
 
 class _Newton:
     """Newton's method for s (k,) = s(s), the derivative of the rest s - s(s) by Broyden's updates, kept from one solution to
-    the next; where that does not do it, by differences."""
+    the next; where that does not do it, taken anew.
+
+    The contact is solved to a tolerance of its own (contact.loop.MEETING), by which s(s) jumps: where the rest falls no further,
+    the best s is taken if its rest is small.
+    """
 
     def __init__(self, count: int) -> None:
         self.derivative = np.eye(count)
-        self.taken = 0  # derivatives by differences
-        self._base, self._rest = np.zeros((2, count))  # where differences are taken
+        self.taken = self.rough = 0  # derivatives taken anew; solutions that stay at the best s
 
     def begin(self) -> None:
         """A solution begins."""
-        self._turns = 0
+        self._turns, self._last = 0, False
         self._tried: tuple[Array, Array] | None = None
-        self._probed: list[Array] | None = None
+        self._best: tuple[float, Array] = (np.inf, np.zeros(0))
 
-    def next(self, s: Array, rest: Array, size: float) -> Array | None:
+    def next(
+        self, s: Array, rest: Array, size: float, derivative: Callable[[], Array]
+    ) -> Array | None:
         """The next s to be evaluated, None if this one is found; `size` J^(1/2) of the motion. ConvergenceError after 25
         evaluations."""
-        if self._probed is not None:
-            self._probed.append((rest - self._rest) / (PROBE * size))
-            if len(self._probed) < len(s):
-                return self._beside(size)
-            self.derivative, self._probed = np.stack(self._probed, axis=1), None
-            self.taken += 1
-            return self._stepped(self._base, self._rest)
-        if np.linalg.norm(rest) <= TOLERANCE * size:
+        off = float(np.linalg.norm(rest)) / size
+        if off <= TOLERANCE or self._last:
             return None
         self._turns += 1
-        if self._turns > TURNS or not np.isfinite(rest).all():
+        if off < self._best[0]:
+            self._best = off, s
+        if self._turns > TURNS or not np.isfinite(off):
             raise ConvergenceError(
                 "large motions: the reduced nonlinear force does not settle within a step; take a smaller time.step, or "
                 'motion.kind = "linear"'
             )
-        if self._tried is not None:
+        if self._turns >= ENOUGH and self._best[0] <= ROUGH:
+            self._last = True
+            self.rough += 1
+            return self._best[1]
+        if self._turns % STALE == 0:
+            self.derivative = derivative()
+            self.taken += 1
+        elif self._tried is not None:
             step, change = s - self._tried[0], rest - self._tried[1]
             if step @ step > (SPACES * size) ** 2:
                 lacking = change - self.derivative @ step
                 self.derivative += np.outer(lacking, step) / (step @ step)
-        if self._turns % STALE == 0:
-            self._base, self._rest, self._probed = s, rest, []
-            return self._beside(size)
-        return self._stepped(s, rest)
-
-    def _beside(self, size: float) -> Array:
-        assert self._probed is not None
-        place = self._base.copy()
-        place[len(self._probed)] += PROBE * size
-        return place
-
-    def _stepped(self, s: Array, rest: Array) -> Array:
         self._tried = s, rest
         return s - np.linalg.solve(self.derivative, rest)
 
@@ -159,8 +157,8 @@ class LargeTire:
 
     A contact.loop.IteratedTire: `settle` tells whether s is that of the motion. After a step: `s` (k,) J^(1/2); `stored`
     J, the work done by the motion against the loads -K V s so far (trapezoidal rule), and `lead` J, what the mean loads that
-    the scheme applies during the steps do beyond the same rule; `evaluations` of the reduced force, and `derivatives` taken by
-    differences. Not collective but for the linear tire's own calls.
+    the scheme applies during the steps do beyond the same rule; `evaluations` of the reduced force, and `derivatives` taken
+    anew. Not collective but for the linear tire's own calls.
     """
 
     def __init__(
@@ -185,8 +183,13 @@ class LargeTire:
 
     @property
     def derivatives(self) -> int:
-        """Number of derivatives taken by differences."""
+        """Number of derivatives taken anew."""
         return self._newton.taken
+
+    @property
+    def rough(self) -> int:
+        """Number of steps in which s is right within 2 % of the motion only."""
+        return self._newton.rough
 
     def predict(self) -> Array:
         """Displacements (r,) m at the end of the step without new forces of the contact. Collective."""
@@ -212,7 +215,12 @@ class LargeTire:
         """The next s to be tried where the kept nodes move by `inner` and V^T K u is `read`; None if it is the right one."""
         self.evaluations += 1
         rest = s - self._force.evaluate(inner)
-        return newton.next(s, rest, max(float(np.linalg.norm(read + s)), FLOOR))
+        size = max(float(np.linalg.norm(read + s)), FLOOR)
+
+        def derivative() -> Array:
+            return np.eye(len(s)) + self._force.jacobian(inner, self._bent[: self._inner])
+
+        return newton.next(s, rest, size, derivative)
 
     def advance(self, force: Array) -> None:
         """Set the contact forces (c,) N at the end of the step."""
@@ -253,7 +261,7 @@ class LargeTire:
             "large_force": np.stack([self.s, self._before, self._older, self._read]),
             "large_derivative": self._newton.derivative.copy(),
             "large_work": np.array([self.stored, self.lead]),
-            "large_count": np.array([self.evaluations, self._newton.taken]),
+            "large_count": np.array([self.evaluations, self.derivatives, self.rough]),
         }
         return self._linear.snapshot() | own
 
@@ -262,5 +270,6 @@ class LargeTire:
         self.s, self._before, self._older, self._read = state["large_force"].copy()
         self._newton.derivative = state["large_derivative"].copy()
         self.stored, self.lead = state["large_work"].tolist()
-        self.evaluations, self._newton.taken = (int(n) for n in state["large_count"])
+        newton = self._newton
+        self.evaluations, newton.taken, newton.rough = (int(n) for n in state["large_count"])
         self._linear.restore(state)

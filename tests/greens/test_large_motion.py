@@ -231,7 +231,7 @@ def test_prescribed_forces_and_readings_beside_the_contact(case):
     assert np.allclose(inner.s, whole.s, atol=2e-3 * np.linalg.norm(whole.s))
 
 
-def test_derivatives_by_differences_lead_to_the_same_forces(case, monkeypatch):
+def test_derivatives_taken_anew_lead_to_the_same_forces(case, monkeypatch):
     by_updates = forces(case.loop(case.large()))
     monkeypatch.setattr(large_motion, "STALE", 1)
     tire = case.large()
