@@ -11,6 +11,7 @@ from mpi4py import MPI
 from tireroad.fem.errors import InputError
 from tireroad.runs.pipeline import run_scene
 from tireroad.runs.process.signals import Stopped
+from tireroad.runs.report.page import write_report
 from tireroad.runs.results.datasets import declared
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages import contact
@@ -116,11 +117,13 @@ def test_a_cleat_trains_the_tire_and_changes_its_forces(cleat):
 
 @pytest.mark.slow
 def test_energy_closes_and_the_motion_stays_in_the_training(cleat):
-    _, (_, stages) = cleat
+    _, (large, stages) = cleat
     moved = abs(value(stages, "contact", "work of contact on the tire"))
     assert abs(value(stages, "contact", "energy left in the nonlinear force")) > 1e-6 * moved
     assert abs(value(stages, "contact", "energy that does not add up")) < 0.01 * moved
     assert value(stages, "contact", "motion outside the training at most") < 10.0
+    write_report(large)
+    assert "outside the nonlinear training" in (large / "report.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow
