@@ -51,7 +51,7 @@ Array = np.ndarray
 
 LIMIT = 0.03  # of forces: error of the linear tire from which on "auto" takes large motions
 BED = 1e9  # N/m3: springs of the tread under the standing tire, 10 MPa over 10 mm
-RUNS, INSTANTS, STEPS = 4, 60, 4000  # at most: runs, instants of each, steps of each
+RUNS, INSTANTS, STEPS = 6, 60, 4000  # at most: runs, instants of each, steps of each
 ENOUGH = 0.05  # of the motion: what the vectors may lack
 SETTINGS = Settings(most=160, turns=2, precision=5e-3)
 _RESPONSE = "response"
