@@ -22,6 +22,7 @@ from tireroad.runs.scene.tables.scene import (
     check_axle,
     check_motion,
     check_stiffness,
+    confined,
     has_air,
 )
 
@@ -77,6 +78,11 @@ def remarks(scene: Scene) -> list[str]:
     road = made(scene.road.surface)
     start = begun_at(road, scene.road.start)
     notes = [f"road: {moved_start(start)}"] if start != (scene.road.start or 0.0) else []
+    if scene.motion.kind != "linear" and not any(confined(scene)):
+        notes.append(
+            "large motions: their training is not part of the estimated time; it took four minutes of CPU for a bar under a passenger "
+            "tire of 19,488 unknowns"
+        )
     end = start + AHEAD + least_travel(scene) / LEAST_RADIUS
     if least_travel(scene) == 0.0:
         notes += [f"warning: {text}" for text in never_met(scene.road)]

@@ -356,6 +356,9 @@ def describe_energy(
     }
     if work.nonlinear is not None:
         record.indicators["energy left in the nonlinear force"] = (work.nonlinear, "J")
+        console.say(
+            f"  energy: of the contact's {work.contact:.4g} J the nonlinear force holds {work.nonlinear:.4g} J; the rest goes on"
+        )
     if work.begun:
         record.indicators["energy in both as the run begins"] = (work.begun, "J")
     left = sum(energies) - work.begun

@@ -14,6 +14,7 @@ from tireroad.runs.process.signals import Stopped
 from tireroad.runs.report.page import write_report
 from tireroad.runs.results.datasets import declared
 from tireroad.runs.scene.load import load
+from tireroad.runs.scene.rules import remarks
 from tireroad.runs.stages import contact
 
 COMM = MPI.COMM_WORLD
@@ -256,6 +257,14 @@ def test_what_it_does_not_have_is_refused(tmp_path, more, told):
     path.write_text(text)
     with pytest.raises(InputError, match=told):
         load(path)
+
+
+def test_check_tells_that_its_training_takes_time(tmp_path):
+    path = tmp_path / "checked.toml"
+    path.write_text(SCENE + CLEAT + LARGE)
+    assert any("their training" in note for note in remarks(load(path)))
+    path.write_text(SCENE + CLEAT)
+    assert not any("training" in note for note in remarks(load(path)))
 
 
 def test_without_a_loop_it_is_refused(tmp_path):
