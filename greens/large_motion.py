@@ -175,7 +175,7 @@ class LargeTire:
         inside = np.r_[rows - d : rows, c : c + k]
         self._inside, self._inner = LoadedColumns(answers[inside, :c]), d
         self._bent = np.ascontiguousarray(answers[inside, c:])
-        self.s, self._before, self._older, self._read = np.zeros((4, k))
+        self.s, self._before, self._older, self._read, self._begun = np.zeros((5, k))
         self._newton = _Newton(k)
         self.evaluations = 0
         self.stored = self.lead = 0.0
@@ -214,7 +214,7 @@ class LargeTire:
     def _next(self, newton: _Newton, s: Array, inner: Array, read: Array) -> Array | None:
         """The next s to be tried where the kept nodes move by `inner` and V^T K u is `read`; None if it is the right one."""
         self.evaluations += 1
-        rest = s - self._force.evaluate(inner)
+        rest = s - (self._force.evaluate(inner) - self._begun)
         size = max(float(np.linalg.norm(read + s)), FLOOR)
 
         def derivative() -> Array:
@@ -236,19 +236,17 @@ class LargeTire:
         self._linear.start(np.concatenate([force, np.zeros_like(self.s)]))
 
     def start_steady(self, force: Array, sudden: Array | None = None) -> Array:
-        """Begin at rest under contact forces (c,) N that always were, with the reduced force of that motion, and `sudden` ones
-        beside them; the displacement (r,) m. Collective."""
-        given = None if sudden is None else np.concatenate([sudden, np.zeros_like(self.s)])
-        newton, s = _Newton(len(self.s)), np.zeros_like(self.s)
-        newton.begin()
-        while True:
-            moved = self._linear.start_steady(np.concatenate([force, -s]), given)
-            self._read = moved[self._read_at].copy()
-            found = self._next(newton, s, moved[self._inner_at], self._read)
-            if found is None:
-                break
-            s = found
-        self.s, self._before, self._older = s, s.copy(), s.copy()
+        """Begin at rest under contact forces (c,) N that always were, those of steady rolling, and `sudden` ones beside them; the
+        displacement (r,) m, which is the linear tire's.
+
+        The reduced force counts from there: the contact of steady rolling was found with the linear tire, and would jump
+        with another displacement (by 5 % of the load on a passenger tire). Collective.
+        """
+        none = np.zeros_like(self.s)
+        given = None if sudden is None else np.concatenate([sudden, none])
+        moved = self._linear.start_steady(np.concatenate([force, none]), given)
+        self._read = moved[self._read_at].copy()
+        self._begun = self._force.evaluate(np.ascontiguousarray(moved[self._inner_at]))
         return moved[self._seen_at]
 
     def inertia_force(self) -> Array:
@@ -258,7 +256,7 @@ class LargeTire:
     def snapshot(self) -> dict[str, Array]:
         """The linear tire's snapshot and the reduced force. Collective."""
         own = {
-            "large_force": np.stack([self.s, self._before, self._older, self._read]),
+            "large_force": np.stack([self.s, self._before, self._older, self._read, self._begun]),
             "large_derivative": self._newton.derivative.copy(),
             "large_work": np.array([self.stored, self.lead]),
             "large_count": np.array([self.evaluations, self.derivatives, self.rough]),
@@ -267,7 +265,7 @@ class LargeTire:
 
     def restore(self, state: dict[str, Array]) -> None:
         """Continue from a snapshot. Collective when looking ahead."""
-        self.s, self._before, self._older, self._read = state["large_force"].copy()
+        self.s, self._before, self._older, self._read, self._begun = state["large_force"].copy()
         self._newton.derivative = state["large_derivative"].copy()
         self.stored, self.lead = state["large_work"].tolist()
         newton = self._newton
