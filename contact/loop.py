@@ -795,6 +795,8 @@ class DrivenTire:
         self._step = 0
         self._along = np.zeros(history.shape[1])
         self.work = self.lead = 0.0
+        if isinstance(tire, IteratedTire):
+            self._iterated, self.settle = tire, self._settled
         tire.start(np.concatenate([np.zeros(self._count), history[0]]))
 
     def start_steady(self, force: np.ndarray, sudden: np.ndarray | None = None) -> np.ndarray:
@@ -809,11 +811,21 @@ class DrivenTire:
     def predict(self) -> np.ndarray:
         """Displacement (c,) m at the end of the step without new contact forces. Collective."""
         self._step += 1
-        self._free = self._tire.predict()
+        return self._pushed(self._tire.predict())
+
+    def _pushed(self, free: np.ndarray) -> np.ndarray:
+        """What the contact sees (c,) m of motions (r,) m without the forces of the step."""
+        self._free = free
         if not self._forced:
-            return self._free[: self._seen]
+            return free[: self._seen]
         pushed = self._same[: self._seen, self._count :] @ self._history[self._step]
-        return self._free[: self._seen] + pushed
+        seen: np.ndarray = free[: self._seen] + pushed
+        return seen
+
+    def _settled(self, force: np.ndarray) -> np.ndarray | None:
+        """IteratedTire.settle, of a tire that is iterated."""
+        again = self._iterated.settle(np.concatenate([force, self._history[self._step]]))
+        return None if again is None else self._pushed(again)
 
     def advance(self, force: np.ndarray) -> None:
         """Set the contact forces (c,) N at the end of the step."""

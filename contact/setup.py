@@ -129,6 +129,10 @@ class ContactSetup:
         (x0, x1), (y0, y1) = self._bounds
         return self.road.height(np.clip(along, x0, x1), np.clip(across, y0, y1))
 
+    def heights(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Heights (n, m) m at every x (n,) with every y (m,) m of the road as it lies at t = 0, but for its motion."""
+        return self._height(*np.meshgrid(x, y, indexing="ij"))
+
     @property
     def _bounds(self) -> tuple[tuple[float, float], tuple[float, float]]:
         x0, x1, y0, y1 = self.patch.extent

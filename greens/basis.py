@@ -11,7 +11,7 @@ from scipy import sparse
 from tireroad.fem.wheel import Axle, Turning
 from tireroad.greens.response import Response, couple, reading
 from tireroad.modal.basis import Projection
-from tireroad.modal.corner import MOMENTS, SEEN
+from tireroad.modal.corner import MOMENTS, READINGS, SEEN
 from tireroad.modal.rolling import RollingModes
 from tireroad.modal.states import StateModes
 
@@ -44,7 +44,8 @@ class Basis:
     projected matrices; `states`: the decoupled states at `speed` rad/s with this `inertia`. Probes
     are weights (k, 3 s) of the outer face. Wider ones have six more columns for the motion of a
     free rim, or, with a corner, seven for wheel and body (modal.corner) and three more that read
-    the hub moments.
+    the hub moments. Columns and rows of `shape` beyond these are of places inside the tire and read
+    its motion relative to the wheel.
     """
 
     shape: np.ndarray
@@ -91,7 +92,8 @@ class Basis:
         corner = self.projection.corner
         if corner is None:
             return sparse.csr_matrix((outputs.shape[0], 3))
-        return outputs[:, 3 * len(corner.places) + SEEN :]
+        face = 3 * len(corner.places)
+        return outputs[:, face + SEEN : face + READINGS]
 
     def loaded(self, loads: sparse.csr_matrix) -> np.ndarray:
         """Moments (3, k), m, of unit loads about the axle's centre."""

@@ -25,6 +25,7 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from tireroad.fem.cavity import Column
+from tireroad.fem.collective import summed
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.compliance import (
     LoadedShapes,
@@ -286,13 +287,9 @@ class Wheel:
         """Response of probes of which some lie inside the tire, with the exact static flexibility of what the states lack.
 
         The shapes of `basis` have further rows for these, and those of `full` for what they are in the full matrices;
-        `read` (r, n) and `driven` (n, k) are the same `outputs` and `loads` there, on own unknowns. InputError for a wheel that
-        moves. Collective.
+        `read` (r, n) and `driven` (n, k) are the same `outputs` and `loads` there, on own unknowns. Those inside are relative
+        to a wheel that moves, and loads inside have no resultant on it. Collective.
         """
-        if basis.projection.moves:
-            raise InputError(
-                'large motions: a wheel that moves on an axle is not available; take axle.kind = "fixed"'
-            )
         rows = sparse.csr_matrix(self._beside(basis.of_hub(outputs)))
         shapes = LoadedShapes(self.operators, self.rotating_stiffness, self.air)
         answers = shapes.readings(sparse.vstack([read, rows], format="csr"), driven)
@@ -303,6 +300,22 @@ class Wheel:
             lacking = regained(basis.held, *stiffnesses, outputs, loads, full.held)
             flexibility, beside = flexibility + lacking.compliance, beside + lacking.momentum
         return self._completed(basis, outputs, loads, flexibility, beside)
+
+    def beyond_modes(self, basis: Basis, modes: Modes, loads: Array) -> Array:
+        """Motions (n, p) m that constant loads, own rows (n, p) N, cause beside those of the modes,
+
+            K_Omega^-1 b - Phi K~^-1 Phi^T b,
+
+        both of the full matrices, relative to the wheel. `modes` on all unknowns, whose projection `basis` is. Collective.
+        """
+        shapes = LoadedShapes(self.operators, self.rotating_stiffness, self.air)
+        found = shapes.whole(loads)
+        shapes.destroy()
+        _, uniform = self._stiffnesses(basis.held.projection)
+        m = modes.vectors.shape[1]
+        pushed = np.zeros((len(uniform), loads.shape[1]))
+        pushed[:m] = summed(self.operators.body.comm, modes.vectors.T @ loads)
+        return found - modes.vectors @ np.linalg.solve(uniform, pushed)[:m]
 
     def _completed(
         self, basis: Basis, outputs: Probes, loads: Probes, flexibility: Array, beside: Array

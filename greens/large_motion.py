@@ -7,12 +7,13 @@ With K the stiffness, V (n, k) and s = V^T r of fem.nonlinear.reduced, the tire 
 
 is solved within each step, with the contact, which gives the forces f for displacements w = w_free + A_ww f - A_wv s, as an
 inner problem: Newton's method on the k numbers, the derivative of s - s(u_c(s)) by Broyden's updates, kept from step to
-step. Where that does not do it is taken anew by differences, for each of which the contact is solved: the forces f, with
-friction too, follow s. (A plain fixed point diverges: ds/dq, q = V^T K u, has eigenvalues of up to 10.)
+step. Where that does not do it is taken anew for forces f that stay, 1 + (ds/du_c) A_cv: stiffer than it is, so that no step is
+too long. (A plain fixed point diverges: ds/dq, q = V^T K u, has eigenvalues of up to 10.)
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -23,10 +24,11 @@ from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.matrices.compliance import on_own_rows
 from tireroad.fem.nonlinear.force import RestoringForce
 from tireroad.fem.nonlinear.reduced import ReducedForce, at_nodes, extra_loads
-from tireroad.greens.basis import Basis
+from tireroad.greens.basis import Basis, Probes
 from tireroad.greens.coupling import Wheel
-from tireroad.greens.recursion import LoadedColumns, Recursion
+from tireroad.greens.recursion import LoadedColumns, Recursion, ahead_of_mean
 from tireroad.greens.response import Response
+from tireroad.modal.corner import READINGS
 from tireroad.modal.solver.slicing import Modes
 
 Array = np.ndarray
@@ -35,52 +37,55 @@ TOLERANCE = 1e-3  # of s, over the tire's whole motion in the same measure
 FLOOR = 0.1  # J^(1/2): of that motion
 TURNS, STALE = 25, 6  # evaluations of a step at most; after so many the derivative is taken anew
 SPACES = 1e-9  # of a motion: changes that say nothing of the derivative
-PROBE = 1e-4  # of a motion: differences
+# Evaluations from which on a rest of this share of the motion is small enough.
+ENOUGH, ROUGH = 13, 2e-2
 
 
 def large_response(
     wheel: Wheel,
     basis: Basis,
     modes: Modes,
-    points: sparse.csr_matrix,
+    points: Probes,
     restoring: RestoringForce,
     force: ReducedForce,
     vectors: Array,
+    loaded: int | None = None,
 ) -> Response:
-    """The response of the contact `points` (c, 3 s), the nodes of the kept cells (d,) and K V (k,) to forces at the points and K V.
+    """The response between forces and motions of probes, and of the reduced force.
 
-    Rows c + d + k, m and J^(1/2); columns c + k, N and J^(1/2). K is what small motions have in the loop: where moduli
-    depend on frequency, that of each mode, so that -K V s moves the tire by -V s at rest. `modes` on all unknowns, whose projection `basis` is;
-    `vectors` V (n, k) on own unknowns. With the exact static flexibility of all of them. Collective.
+    Columns: forces N at the first c = `loaded` of the `points` (r, 3 s or wider; by default all), and K V (k,) J^(1/2). Rows:
+    the motions of these c, K V, what is read at the other points, and the nodes of the kept cells (d,), relative to the
+    wheel. K is what small motions have in the loop: where moduli depend on frequency, that of each mode, so that -K V s moves
+    the tire by -V s at rest. `modes` on all unknowns, whose projection `basis` is; `vectors` V (n, k) on own unknowns. With
+    the exact static flexibility of all of them. Collective.
     """
     operators, comm = wheel.operators, wheel.operators.body.comm
-    # Columns beyond the face would be a corner's, which a held wheel does not need.
-    projection = replace(basis.projection, corner=None)
     pushed = extra_loads(restoring, vectors)
-    rows = _rows(restoring, force.nodes)
     at_kept = at_nodes(restoring, modes.vectors, force.nodes)
     along = summed(comm, pushed.T @ modes.vectors)
     d, k, face = len(at_kept), pushed.shape[1], basis.shape.shape[0]
+    c = points.shape[0] if loaded is None else loaded
+    # A probe of the wheel has columns of its own behind those of the face.
+    width = face + READINGS
 
     def inside(pushes: Array) -> Basis:
-        return replace(
-            basis, shape=np.vstack([basis.shape, at_kept, pushes]), projection=projection
-        )
+        wheels = np.zeros((READINGS, basis.shape.shape[1]))
+        return replace(basis, shape=np.vstack([basis.shape, wheels, pushes, at_kept]))
 
-    more = sparse.identity(d + k, format="csr")
-    outputs = sparse.block_diag([points, more], format="csr")
-    unread = sparse.csr_matrix((k, face + d))
-    loads = sparse.vstack(
-        [
-            sparse.hstack([points, sparse.csr_matrix((points.shape[0], d + k))]),
-            sparse.hstack([unread, sparse.identity(k)]),
-        ],
-        format="csr",
+    def wide(probes: Probes) -> Probes:
+        more = sparse.csr_matrix((probes.shape[0], width + k + d - probes.shape[1]))
+        return sparse.hstack([probes, more], format="csr")
+
+    within = sparse.hstack(
+        [sparse.csr_matrix((k + d, width)), sparse.identity(k + d)], format="csr"
     )
+    loads = sparse.vstack([wide(points[:c]), within[:k]], format="csr")
+    outputs = sparse.vstack([loads, wide(points[c:]), within[k:]], format="csr")
     own, growth = on_own_rows(operators, points), wheel.growth or 1.0
-    driven = sparse.hstack([own, sparse.csr_matrix(growth * pushed)], format="csr")
-    read = sparse.vstack([own.T, rows, sparse.csr_matrix(growth * pushed.T)], format="csr")
-    true = (along / projection.squares) @ projection.stiffness
+    driven = sparse.hstack([own[:, :c], sparse.csr_matrix(growth * pushed)], format="csr")
+    rows = _rows(restoring, force.nodes)
+    read = sparse.vstack([driven.T, own[:, c:].T, rows], format="csr")
+    true = (along / basis.projection.squares) @ basis.projection.stiffness
     bases = inside(true), inside(growth * along)
     return wheel.respond_inside(*bases, outputs, loads, read, driven)
 
@@ -97,118 +102,153 @@ def _rows(restoring: RestoringForce, nodes: Array) -> sparse.csr_matrix:
     return sparse.csr_matrix((ones, (here, wanted[here])), shape=(len(wanted), len(components)))
 
 
-class _Differences:
-    """Differences of the `rest` (k,) at `base` (k,) along each of its k numbers."""
+class _Newton:
+    """Newton's method for s (k,) = s(s), the derivative of the rest s - s(s) by Broyden's updates, kept from one solution to
+    the next; where that does not do it, taken anew.
 
-    def __init__(self, base: Array, rest: Array, size: float) -> None:
-        self.base, self.rest, self._size = base, rest, size
-        self.found: list[Array] = []
-
-    def next(self) -> Array:
-        """The next place to be evaluated."""
-        place = self.base.copy()
-        place[len(self.found)] += self._size
-        return place
-
-    def add(self, rest: Array) -> None:
-        """The rest found there."""
-        self.found.append((rest - self.rest) / self._size)
-
-
-class LargeTire:
-    """A tire between its contact points' c forces and displacements whose `linear` recursion has the rows and columns of
-    `large_response`.
-
-    A contact.loop.IteratedTire: `settle` tells whether s is that of the motion. After a step: `s` (k,) J^(1/2); `stored`
-    J, the work done by the motion against the loads -K V s so far (trapezoidal rule); `evaluations` of the reduced force,
-    and `derivatives` taken by differences. Not collective but for the linear tire's own calls.
+    The contact is solved to a tolerance of its own (contact.loop.MEETING), by which s(s) jumps: where the rest falls no further,
+    the best s is taken if its rest is small.
     """
 
-    def __init__(self, linear: Recursion, force: ReducedForce, points: int) -> None:
-        self._linear, self._force, self.comm = linear, force, linear.comm
-        answers, c, d = linear.same_step, points, 3 * len(force.nodes)
-        self._count, self._inner = c, d
-        self.same_step = np.ascontiguousarray(answers[:c, :c])
-        self._inside = LoadedColumns(np.ascontiguousarray(answers[c:, :c]))
-        self._moved, self._bent = answers[:c, c:].copy(), answers[c:, c:].copy()
-        k = answers.shape[1] - c
-        self.s, self._before, self._read = np.zeros(k), np.zeros(k), np.zeros(k)
-        self._derivative = np.eye(k)
-        self._probing: _Differences | None = None
+    def __init__(self, count: int) -> None:
+        self.derivative = np.eye(count)
+        self.taken = self.rough = 0  # derivatives taken anew; solutions that stay at the best s
+
+    def begin(self) -> None:
+        """A solution begins."""
+        self._turns, self._last = 0, False
         self._tried: tuple[Array, Array] | None = None
-        self.evaluations = self.derivatives = 0
-        self.stored, self.ahead = 0.0, linear.ahead
+        self._best: tuple[float, Array] = (np.inf, np.zeros(0))
 
-    def predict(self) -> Array:
-        """Displacements (c,) m at the end of the step without new forces of the contact. Collective."""
-        free = self._linear.predict()
-        self._free, self._beside = np.split(free, [self._count])
-        self.s, self._before = 2.0 * self.s - self._before, self.s
-        self._turns, self._tried = 0, None
-        return self._free - self._moved @ self.s
-
-    def settle(self, force: Array) -> Array | None:
-        """None if the reduced force is that of the motion under contact forces (c,) N, else the displacements (c,) m for which
-        the contact has to be solved again. ConvergenceError after 25 evaluations."""
-        moved = self._beside + self._inside @ force - self._bent @ self.s
-        inner, read = moved[: self._inner], moved[self._inner :]
-        rest = self.s - self._force.evaluate(inner)
-        self.evaluations += 1
-        size = max(float(np.linalg.norm(read + self.s)), FLOOR)
-        if self._probing is not None:
-            return self._probed(rest)
-        if np.linalg.norm(rest) <= TOLERANCE * size:
-            self._now = read
+    def next(
+        self, s: Array, rest: Array, size: float, derivative: Callable[[], Array]
+    ) -> Array | None:
+        """The next s to be evaluated, None if this one is found; `size` J^(1/2) of the motion. ConvergenceError after 25
+        evaluations."""
+        off = float(np.linalg.norm(rest)) / size
+        if off <= TOLERANCE or self._last:
             return None
         self._turns += 1
-        if self._turns > TURNS or not np.isfinite(rest).all():
+        if off < self._best[0]:
+            self._best = off, s
+        if self._turns > TURNS or not np.isfinite(off):
             raise ConvergenceError(
                 "large motions: the reduced nonlinear force does not settle within a step; take a smaller time.step, or "
                 'motion.kind = "linear"'
             )
-        if self._tried is not None:
-            step, change = self.s - self._tried[0], rest - self._tried[1]
-            if step @ step > (SPACES * size) ** 2:
-                lacking = change - self._derivative @ step
-                self._derivative += np.outer(lacking, step) / (step @ step)
+        if self._turns >= ENOUGH and self._best[0] <= ROUGH:
+            self._last = True
+            self.rough += 1
+            return self._best[1]
         if self._turns % STALE == 0:
-            self._probing = _Differences(self.s, rest, PROBE * size)
-            return self._freed(self._probing.next())
-        return self._corrected(rest)
+            self.derivative = derivative()
+            self.taken += 1
+        elif self._tried is not None:
+            step, change = s - self._tried[0], rest - self._tried[1]
+            if step @ step > (SPACES * size) ** 2:
+                lacking = change - self.derivative @ step
+                self.derivative += np.outer(lacking, step) / (step @ step)
+        self._tried = s, rest
+        return s - np.linalg.solve(self.derivative, rest)
 
-    def _corrected(self, rest: Array) -> Array:
-        self._tried = self.s, rest
-        return self._freed(self.s - np.linalg.solve(self._derivative, rest))
 
-    def _probed(self, rest: Array) -> Array:
-        """Take one more difference, and the step that they lead to after the last."""
-        probing = self._probing
-        assert probing is not None
-        probing.add(rest)
-        if len(probing.found) < len(self.s):
-            return self._freed(probing.next())
-        self._derivative, self._probing = np.stack(probing.found, axis=1), None
-        self.derivatives += 1
-        self.s = probing.base
-        return self._corrected(probing.rest)
+class LargeTire:
+    """A tire between forces at c points and motions (r,) at these and others, whose `linear` recursion has the rows and
+    columns of `large_response` and integrates by `scheme`.
 
-    def _freed(self, s: Array) -> Array:
-        self.s = s
-        return self._free - self._moved @ s
+    A contact.loop.IteratedTire: `settle` tells whether s is that of the motion. After a step: `s` (k,) J^(1/2); `stored`
+    J, the work done by the motion against the loads -K V s so far (trapezoidal rule), and `lead` J, what the mean loads that
+    the scheme applies during the steps do beyond the same rule; `evaluations` of the reduced force, and `derivatives` taken
+    anew. Not collective but for the linear tire's own calls.
+    """
+
+    def __init__(
+        self, linear: Recursion, force: ReducedForce, points: int, scheme: str = "linear"
+    ) -> None:
+        self._linear, self._force, self.comm = linear, force, linear.comm
+        self._scheme = scheme
+        answers, c, d = linear.same_step, points, 3 * len(force.nodes)
+        rows, k = len(answers), answers.shape[1] - c
+        self._read_at, self._inner_at = slice(c, c + k), slice(rows - d, rows)
+        self._seen_at = np.r_[0:c, c + k : rows - d]
+        self.same_step = np.ascontiguousarray(answers[self._seen_at, :c])
+        self._moved = np.ascontiguousarray(answers[self._seen_at, c:])
+        inside = np.r_[rows - d : rows, c : c + k]
+        self._inside, self._inner = LoadedColumns(answers[inside, :c]), d
+        self._bent = np.ascontiguousarray(answers[inside, c:])
+        self.s, self._before, self._older, self._read, self._begun = np.zeros((5, k))
+        self._newton = _Newton(k)
+        self.evaluations = 0
+        self.stored = self.lead = 0.0
+        self.ahead = linear.ahead
+
+    @property
+    def derivatives(self) -> int:
+        """Number of derivatives taken anew."""
+        return self._newton.taken
+
+    @property
+    def rough(self) -> int:
+        """Number of steps in which s is right within 2 % of the motion only."""
+        return self._newton.rough
+
+    def predict(self) -> Array:
+        """Displacements (r,) m at the end of the step without new forces of the contact. Collective."""
+        free = self._linear.predict()
+        self._free = free[self._seen_at]
+        self._beside = np.concatenate([free[self._inner_at], free[self._read_at]])
+        self._older, self._before, self.s = self._before, self.s, 2.0 * self.s - self._before
+        self._newton.begin()
+        return self._free - self._moved @ self.s
+
+    def settle(self, force: Array) -> Array | None:
+        """None if the reduced force is that of the motion under contact forces (c,) N, else the displacements (r,) m for which
+        the contact has to be solved again. ConvergenceError after 25 evaluations."""
+        moved = self._beside + self._inside @ force - self._bent @ self.s
+        self._now = moved[self._inner :]
+        found = self._next(self._newton, self.s, moved[: self._inner], self._now)
+        if found is None:
+            return None
+        self.s = found
+        return self._free - self._moved @ found
+
+    def _next(self, newton: _Newton, s: Array, inner: Array, read: Array) -> Array | None:
+        """The next s to be tried where the kept nodes move by `inner` and V^T K u is `read`; None if it is the right one."""
+        self.evaluations += 1
+        rest = s - (self._force.evaluate(inner) - self._begun)
+        size = max(float(np.linalg.norm(read + s)), FLOOR)
+
+        def derivative() -> Array:
+            return np.eye(len(s)) + self._force.jacobian(inner, self._bent[: self._inner])
+
+        return newton.next(s, rest, size, derivative)
 
     def advance(self, force: Array) -> None:
         """Set the contact forces (c,) N at the end of the step."""
-        self.stored += 0.5 * float((self.s + self._before) @ (self._now - self._read))
+        way = self._now - self._read
+        ahead = ahead_of_mean(self._scheme, np.stack([self._older, self._before, self.s]))[0]
+        self.stored += 0.5 * float((self.s + self._before) @ way)
+        self.lead -= float(ahead @ way)
         self._read = self._now
         self._linear.advance(np.concatenate([force, -self.s]))
 
+    def start(self, force: Array) -> None:
+        """Begin at rest, with forces (c,) N that come at t = 0. Collective when looking ahead."""
+        self._linear.start(np.concatenate([force, np.zeros_like(self.s)]))
+
     def start_steady(self, force: Array, sudden: Array | None = None) -> Array:
-        """Begin at rest under contact forces (c,) N that always were, without a nonlinear force; the displacement (c,) m."""
+        """Begin at rest under contact forces (c,) N that always were, those of steady rolling, and `sudden` ones beside them; the
+        displacement (r,) m, which is the linear tire's.
+
+        The reduced force counts from there: the contact of steady rolling was found with the linear tire, and would jump
+        with another displacement (by 5 % of the load on a passenger tire). Collective.
+        """
         none = np.zeros_like(self.s)
         given = None if sudden is None else np.concatenate([sudden, none])
         moved = self._linear.start_steady(np.concatenate([force, none]), given)
-        self._read = moved[self._count + self._inner :].copy()
-        return moved[: self._count]
+        self._read = moved[self._read_at].copy()
+        self._begun = self._force.evaluate(np.ascontiguousarray(moved[self._inner_at]))
+        return moved[self._seen_at]
 
     def inertia_force(self) -> Array:
         """Rate of momentum (3,) N."""
@@ -217,16 +257,18 @@ class LargeTire:
     def snapshot(self) -> dict[str, Array]:
         """The linear tire's snapshot and the reduced force. Collective."""
         own = {
-            "large_force": np.stack([self.s, self._before, self._read]),
-            "large_derivative": self._derivative.copy(),
-            "large_stored": np.array([self.stored, self.evaluations, self.derivatives]),
+            "large_force": np.stack([self.s, self._before, self._older, self._read, self._begun]),
+            "large_derivative": self._newton.derivative.copy(),
+            "large_work": np.array([self.stored, self.lead]),
+            "large_count": np.array([self.evaluations, self.derivatives, self.rough]),
         }
         return self._linear.snapshot() | own
 
     def restore(self, state: dict[str, Array]) -> None:
-        """Continue from a snapshot."""
-        self.s, self._before, self._read = state["large_force"].copy()
-        self._derivative = state["large_derivative"].copy()
-        self.stored = float(state["large_stored"][0])
-        self.evaluations, self.derivatives = (int(count) for count in state["large_stored"][1:])
+        """Continue from a snapshot. Collective when looking ahead."""
+        self.s, self._before, self._older, self._read, self._begun = state["large_force"].copy()
+        self._newton.derivative = state["large_derivative"].copy()
+        self.stored, self.lead = state["large_work"].tolist()
+        newton = self._newton
+        self.evaluations, newton.taken, newton.rough = (int(n) for n in state["large_count"])
         self._linear.restore(state)

@@ -46,6 +46,7 @@ from tireroad.runs.stages.stage import Job, PipelinePart, Result, Stage, largest
 from tireroad.runs.stages.static import StaticStage
 from tireroad.runs.stages.stiffness import StiffnessStage
 from tireroad.runs.stages.stretches import StretchesStage
+from tireroad.runs.stages.training import NonlinearStage, Restoring
 from tireroad.runs.stages.vibration import MotionStage, VibrationStage
 from tireroad.runs.stages.whole_tire import LinesOfRun
 
@@ -54,6 +55,8 @@ PARTS: tuple[type[PipelinePart], ...] = (
     RadiationStage,
     StiffnessStage,
     *STATIC_TO_GREENS,
+    Restoring,
+    NonlinearStage,
     ContactStage,
     AccuracyStage,
     StretchesStage,
@@ -176,8 +179,7 @@ def run_scene(
                 if issubclass(kind, Stage) and kind.name in reasons:
                     found = _skipped(kind, job, done, reasons[kind.name], summary)
                 else:
-                    part = kind.with_inputs(job, done)
-                    found = part.result(summary) if part else None
+                    found = _made(kind, job, done, summary)
                 if found is not None:
                     done[kind.name] = found
                 job.settle(done)
@@ -217,6 +219,14 @@ def _begun(job: Job, until: str | None) -> tuple[Summary, float, bool]:
     _say_demand(wanted, each, directory, comm)
     on_root(comm, summary.begin)  # not before: a scene that is refused replaces nothing
     return summary, each, on_disk
+
+
+def _made(kind: type[PipelinePart], job: Job, done, summary: Summary) -> Result | None:
+    """The result of a part; None if it lacks an input, or has nothing to do after all. Collective."""
+    part = kind.with_inputs(job, done)
+    if isinstance(part, Stage) and (reason := part.idle()) is not None:
+        return _skipped(type(part), job, done, reason, summary)
+    return part.result(summary) if part else None
 
 
 def _skipped(kind: type[Stage], job: Job, done, reason: str, summary: Summary) -> Result | None:

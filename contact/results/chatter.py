@@ -97,6 +97,14 @@ def choose(steps: float) -> Chosen:
     )
 
 
+# With forces linear over the step 300 modes grew without bound at steps of 0.2 ms (docs/large-motions.md).
+LARGE = Chosen(
+    "damped",
+    "the nonlinear force of large motions acts on the modes as springs many times as stiff as the tire",
+    ANY,
+)
+
+
 def oscillation(
     spec: ContactSpec,
     patch: Patch,

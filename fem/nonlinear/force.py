@@ -101,6 +101,7 @@ class RestoringForce:
 
     def _at(self, motion: np.ndarray, evaluate: Callable[[], T]) -> T:
         field = self.body.u.x
+        field.array[:] = self._static.x.array
         field.array[self.operators.unknowns.free] += motion
         field.scatter_forward()
         found = evaluate()

@@ -23,7 +23,7 @@ from tireroad.fem.collective import allgather_rows, from_local_rows, summed
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.matrices.compliance import factorise, on_own_rows, solve_columns
 from tireroad.fem.nonlinear.force import RestoringForce
-from tireroad.fem.nonlinear.road import Compliance, ContactPoints, Feature, Touch
+from tireroad.fem.nonlinear.road import Compliance, ContactPoints, Ground, Touch
 
 Array = np.ndarray
 
@@ -63,7 +63,7 @@ class Linear:
         load = np.zeros(len(self.compliance))
         return Standing(load, self.points.rest[2 * len(load) // 3 :], load, np.zeros(0))
 
-    def solve(self, road: Feature, before: Standing) -> Standing:
+    def solve(self, road: Ground, before: Standing) -> Standing:
         """On a road, from a state near by."""
         nothing = np.zeros(len(before.w))
         plain = Compliance(self.compliance, np.zeros((len(nothing), 0)), np.zeros((0, 0)))
@@ -81,7 +81,7 @@ class Reduced:
 
     so that contact and s are solved for together. J is corrected by Broyden's update after each evaluation
     and kept from one road to the next; where that does not do it is taken anew: by `differentiate(load, s)`, or by
-    differences.
+    differences. `tolerance`: of s, over the tire's whole motion.
     """
 
     def __init__(
@@ -91,8 +91,10 @@ class Reduced:
         seen: Array,
         evaluate: Evaluate,
         differentiate: Evaluate | None = None,
+        tolerance: float = TOLERANCE,
     ) -> None:
         self.points, self.compliance, self.seen, self.evaluate = points, compliance, seen, evaluate
+        self._tolerance = tolerance
         self._differentiate = differentiate or self._differences
         self.jacobian = np.zeros((seen.shape[1],) * 2)
         self.evaluations = 0
@@ -117,7 +119,7 @@ class Reduced:
         self.evaluations += 1 + len(s)
         return out
 
-    def solve(self, road: Feature, before: Standing) -> Standing:
+    def solve(self, road: Ground, before: Standing) -> Standing:
         """On a road, from a state near by. Raises ConvergenceError if it is not near enough."""
         try:
             return self._solve(road, before)
@@ -125,7 +127,7 @@ class Reduced:
             self.differentiate(before.load, before.s)
             return self._solve(road, before)
 
-    def _solve(self, road: Feature, before: Standing) -> Standing:
+    def _solve(self, road: Ground, before: Standing) -> Standing:
         s, load, w = before.s, before.load, before.w
         value, seen, one = self.evaluate(load, s), self.seen, np.eye(len(s))
         self.evaluations += 1
@@ -147,7 +149,7 @@ class Reduced:
                 self.jacobian = self.jacobian + np.outer(lacking, step) / (step @ step)
             s, load, value = changed, new, found
             off, size = np.linalg.norm(value - s), np.linalg.norm(seen.T @ load)
-            if off <= TOLERANCE * max(float(size), _FLOOR):
+            if off <= self._tolerance * max(float(size), _FLOOR):
                 return Standing(w, touch.force, load, s)
             if not np.isfinite(off):
                 break
@@ -170,12 +172,12 @@ class Elements:
         """Motion (3 p, ...) m of the points."""
         return summed(self._comm, self.columns.T @ motion)
 
-    def residual(self, motion: Array, road: Feature) -> tuple[Array, Touch]:
+    def residual(self, motion: Array, road: Ground) -> tuple[Array, Touch]:
         """Forces out of balance (own rows) N, and the contact."""
         touch = self.points.touch(self.seen(motion), road)
         return self.force.change(motion) - self.columns @ (touch.load - self.points.rest), touch
 
-    def solve(self, road: Feature, motion: Array, most: int = 12) -> Array:
+    def solve(self, road: Ground, motion: Array, most: int = 12) -> Array:
         """The motion (own rows) in equilibrium on a road, from one near by.
 
         Raises ConvergenceError if Newton's method does not converge.
@@ -214,7 +216,7 @@ class Elements:
         part.destroy()
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
 
-    def standing(self, motion: Array, road: Feature) -> Standing:
+    def standing(self, motion: Array, road: Ground) -> Standing:
         """The contact of a motion."""
         w = self.seen(motion)
         touch = self.points.touch(w, road)
@@ -235,12 +237,12 @@ def _on_all(comm: MPI.Comm, own: sparse.csr_matrix) -> sparse.csr_matrix:
 class Tire(Protocol[State]):
     """A tire that can be solved on a road from a state near by."""
 
-    def solve(self, road: Feature, before: State, /) -> State: ...
+    def solve(self, road: Ground, before: State, /) -> State: ...
 
 
 def climb(
     tire: Tire[State],
-    road: Feature,
+    road: Ground,
     start: State,
     steps: int = 4,
     seen: Callable[[float, State], None] = lambda part, state: None,

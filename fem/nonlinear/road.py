@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple, Protocol
 
 import numpy as np
-from scipy import sparse
+from scipy import interpolate, sparse
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.static.footprint import TreadSurface
@@ -24,6 +24,20 @@ class Surface(NamedTuple):
     height: Array
     slope: Array
     curvature: Array
+
+
+class Ground(Protocol):
+    """A road under a tire that does not roll on, x forward, y left of the axle, m, over the static road plane."""
+
+    @property
+    def largest(self) -> float:
+        """Its greatest height or depth, m."""
+
+    def times(self, part: float) -> Ground:
+        """A part of its heights."""
+
+    def at(self, x: Array, y: Array) -> Surface:
+        """Height, slopes and curvatures at places (n,) m."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,6 +59,11 @@ class Feature:
     def varies_across(self) -> bool:
         """Whether its height depends on y."""
         return bool(np.isfinite(self.across).any()) and self.height != 0.0
+
+    @property
+    def largest(self) -> float:
+        """The greater of rise and height, m."""
+        return max(abs(self.rise), abs(self.height))
 
     def times(self, part: float) -> Feature:
         """A part of its height and rise."""
@@ -96,6 +115,54 @@ def _step(distance: Array, ramp: float) -> tuple[Array, Array, Array]:
     return t * t * (3 - 2 * t), 6 * t * (1 - t) / ramp, (6 - 12 * t) * ((t > 0) & (t < 1)) / ramp**2
 
 
+@dataclass(frozen=True, kw_only=True)
+class Passage:
+    """A road where the tire meets it: heights `z` (n, m) m at x (n,) and y (m,) m, a cubic spline between them and level
+    beyond. `way` m rolled there, by which it is named; `part` of its heights."""
+
+    x: Array
+    y: Array
+    z: Array
+    way: float
+    part: float = 1.0
+    _kept: list[interpolate.RectBivariateSpline] = field(
+        default_factory=list, repr=False, compare=False
+    )
+
+    @property
+    def _spline(self) -> interpolate.RectBivariateSpline:
+        if not self._kept:  # shared by all its parts
+            self._kept.append(interpolate.RectBivariateSpline(self.x, self.y, self.z))
+        return self._kept[0]
+
+    @property
+    def largest(self) -> float:
+        """Its greatest height or depth, m."""
+        return self.part * float(np.abs(self.z).max())
+
+    def times(self, part: float) -> Passage:
+        """A part of its heights."""
+        return replace(self, part=part * self.part)
+
+    def at(self, x: Array, y: Array) -> Surface:
+        """Height, slopes and curvatures at places (n,) m."""
+        ends = (self.x[0], self.x[-1]), (self.y[0], self.y[-1])
+        places = [np.clip(one, *end) for one, end in zip((x, y), ends, strict=True)]
+        free = [one == place for one, place in zip((x, y), places, strict=True)]
+
+        def derived(along: int, across: int) -> Array:
+            found = self.part * self._spline.ev(*places, dx=along, dy=across)
+            return np.where((free[0] | (along == 0)) & (free[1] | (across == 0)), found, 0.0)
+
+        mixed = derived(1, 1)
+        curvature = np.array([[derived(2, 0), mixed], [mixed, derived(0, 2)]])
+        slope = np.stack([derived(1, 0), derived(0, 1)], axis=-1)
+        return Surface(derived(0, 0), slope, np.moveaxis(curvature, -1, 0))
+
+    def __str__(self) -> str:
+        return f"road after {self.way:.3f} m"
+
+
 class Touch(NamedTuple):
     """Contact at one motion of the points: `force` (p,) N normal, `load` (3 p,) N on the tire in x, y and z,
     `entries` (a,): those of it that depend on the motion, and their derivative (a, a), N/m."""
@@ -144,7 +211,7 @@ class ContactPoints:
         load[2 * len(self.gap) :] = self.stiffness * np.maximum(0.0, -self.gap)
         return load
 
-    def touch(self, w: Array, road: Feature, moved: bool = True) -> Touch:
+    def touch(self, w: Array, road: Ground, moved: bool = True) -> Touch:
         """The forces f (-r_x, -r_y, 1), f = k max(0, r - z), of a `road` without friction.
 
         It is read at the moved place x + u_x, y + u_y of each point, or at its place at rest.
@@ -172,7 +239,7 @@ class ContactPoints:
         return Touch(force, load, index, derivative)
 
     def solve(
-        self, compliance: Compliance, free: Array, road: Feature, w: Array, moved: bool = True
+        self, compliance: Compliance, free: Array, road: Ground, w: Array, moved: bool = True
     ) -> tuple[Array, Touch]:
         """Motion w = free + compliance (load - rest) (3 p,) m and its contact, by Newton's method from `w`.
 

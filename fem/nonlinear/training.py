@@ -20,16 +20,16 @@ from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.matrices.compliance import factorise, multiply, solve_columns
 from tireroad.fem.nonlinear.cells import cell_forms
 from tireroad.fem.nonlinear.force import RestoringForce
-from tireroad.fem.nonlinear.quasi_static import Elements, Reduced, Standing
+from tireroad.fem.nonlinear.quasi_static import TOLERANCE, Elements, Reduced, Standing
 from tireroad.fem.nonlinear.reduced import ReducedForce, outside, reduced_force, sizes
-from tireroad.fem.nonlinear.road import ContactPoints, Feature
+from tireroad.fem.nonlinear.road import ContactPoints, Ground
 from tireroad.fem.static.symmetric import TURN, looks_the_same
 from tireroad.fem.static.virtual_work import AT_REST, tangent
 
 Array = np.ndarray
 
 _LEAST = 0.1  # J^(1/2): the size of a motion of hundredths of a joule
-_TURNS, _SMALLEST, _NONE, _BLOCK, _MANY, _TANGENTS = 5, 0.25, 1e-9, 512, 400, 6
+_SMALLEST, _NONE, _BLOCK, _MANY, _TANGENTS = 0.25, 1e-9, 512, 400, 6
 _CELLS = 128
 _SMALL = 1 / 20
 _SAME = 1e-3  # of a force: that of a half-turned motion and the half-turned force
@@ -38,13 +38,16 @@ _SAME = 1e-3  # of a force: that of a half-turned motion and the half-turned for
 @dataclass(frozen=True, kw_only=True)
 class Settings:
     """Settings of a training: largest `share` (outside over sizes) that the vectors may lack of a state on the way, and that
-    those `kept` at last may; `tolerance` of the weights; `step` of a road's height, m; `most` vectors at last."""
+    those `kept` at last may; `tolerance` of the weights; `step` of a road's height, m; `most` vectors at last; `turns` in
+    which a state is solved for again, and its `precision`."""
 
     share: float = 0.04
     kept: float = 0.03
     tolerance: float = 0.01
     step: float = 4e-3
     most: int = 80
+    turns: int = 5
+    precision: float = TOLERANCE
 
 
 @dataclass
@@ -72,9 +75,9 @@ class Training:
     states: int
     left: float
     error: float
-    tangents: int
-    evaluations: int
     singular: Array = field(repr=False)
+    tangents: int = 0
+    evaluations: int = 0
 
 
 class Trainer:
@@ -100,7 +103,8 @@ class Trainer:
         n = len(force.at_rest)
         self.vectors = np.zeros((n, 0))
         nothing = np.zeros((count, 0))
-        self.tire = Reduced(points, compliance, nothing, self._evaluate, self._jacobian)
+        given = points, compliance, nothing, self._evaluate, self._jacobian
+        self.tire = Reduced(*given, settings.precision)
         self._cells = CellTangents(force)
         self.turn = half_turn(force)
         self.motions: list[Array] = []
@@ -128,9 +132,9 @@ class Trainer:
         inside = self._cells.between(self.vectors, self.motion(load, s))
         return inside - np.eye(len(s))
 
-    def visit(self, road: Feature) -> None:
+    def visit(self, road: Ground) -> Trained:
         """Climb a road and learn from the states on the way."""
-        steps = np.ceil(max(abs(road.rise), abs(road.height)) / self.settings.step - 1e-9)
+        steps = np.ceil(road.largest / self.settings.step - 1e-9)
         done, size, state = 0.0, 1.0 / max(steps, 1.0), self.tire.rest()
         smallest = _SMALLEST * size
         found = Trained(str(road), 0, 0.0, 0.0, "reduced")
@@ -152,13 +156,34 @@ class Trainer:
             f"{self.vectors.shape[1]} vectors, {len(self.motions)} states, {self.elements.tangents} tangents, "
             f"{self.tire.evaluations} evaluations"
         )
+        return found
 
-    def _learnt(self, road: Feature, before: Standing, found: Trained) -> Standing:
+    def follow(self, ways: Array, under: Callable[[float], Ground]) -> None:
+        """Learn from a road that passes, where it is `under` the tire after the `ways` (n,) m.
+
+        Greedily: each fourth way, then those half between, then the others beside a way that lacked more than twice the
+        share that vectors may lack.
+        """
+        lacked: dict[int, float] = {}
+        for stride in (4, 2, 1):
+            last = dict(lacked)
+            for number in range(0, len(ways), stride):
+                beside = [last.get(number + side, 0.0) for side in (-stride, stride)]
+                needed = stride > 1 or max(beside) > 2 * self.settings.share
+                if number not in lacked and needed:
+                    lacked[number] = self.visit(under(float(ways[number]))).lacked
+
+    @property
+    def states(self) -> tuple[Array, Array]:
+        """Motions and answers K^-1 r (n, s) of all states, half-turned copies too."""
+        return self._with_turned(self.motions), self._with_turned(self.answers)
+
+    def _learnt(self, road: Ground, before: Standing, found: Trained) -> Standing:
         """The state on a road, solved for again while the vectors lack some of its K^-1 r."""
         # Vectors may have joined on the way to a state that was not found.
         lacking = self.vectors.shape[1] - len(before.s)
         before = replace(before, s=np.append(before.s, np.zeros(lacking)))
-        for turn in range(_TURNS):
+        for turn in range(self.settings.turns):
             state = self._solved(road, before, found)
             motion = self.motion(state.load, state.s)
             share, answer, rest = self._lacking(motion)
@@ -183,8 +208,7 @@ class Trainer:
         if not self.answers:
             return
         before = multiply(self._stiffness, self.vectors)
-        motions, answers = self._with_turned(self.motions), self._with_turned(self.answers)
-        self.vectors, _ = decomposed(self.force, motions, answers, self.settings.share / 4, _MANY)
+        self.vectors, _ = decomposed(self.force, *self.states, self.settings.share / 4, _MANY)
         overlap = summed(self._comm, self.vectors.T @ before)
         self.tire.seen = self.elements.seen(self.vectors)
         self.tire.jacobian = overlap @ self.tire.jacobian @ overlap.T
@@ -203,7 +227,7 @@ class Trainer:
         inside = summed(self._comm, self.vectors.T @ forces)
         return float(share[0]), answers[:, 0], (answers - self.vectors @ inside)[:, 0]
 
-    def _solved(self, road: Feature, before: Standing, found: Trained) -> Standing:
+    def _solved(self, road: Ground, before: Standing, found: Trained) -> Standing:
         """By the reduced tire, otherwise by the elements from the state before."""
         try:
             return self.tire.solve(road, before)
@@ -211,7 +235,7 @@ class Trainer:
             return self._by_elements(road, self.motion(before.load, before.s), before, found)[0]
 
     def _by_elements(
-        self, road: Feature, motion: Array, before: Standing, found: Trained
+        self, road: Ground, motion: Array, before: Standing, found: Trained
     ) -> tuple[Standing, Array]:
         """The elements' state and motion from one near by, whose K^-1 r the vectors then hold."""
         found.how = "elements"
@@ -240,25 +264,35 @@ class Trainer:
 
     def concluded(self) -> Training:
         """Vectors and weights from all states."""
-        force, settings = self.force, self.settings
-        motions, answers = self._with_turned(self.motions), self._with_turned(self.answers)
-        vectors, singular = decomposed(force, motions, answers, settings.kept, settings.most)
-        forces, scale = multiply(self._stiffness, answers), sizes(force, motions, answers)
-        left = outside(force, vectors, answers, forces) / _scale(scale)
-        cells, weights, error = weighted_cells(
-            force, vectors, motions, forces, _scale(scale), settings.tolerance
-        )
-        return Training(
-            force=reduced_force(self.force, vectors, cells, weights),
-            vectors=vectors,
-            record=self.record,
-            states=motions.shape[1],
-            left=float(left.max()),
-            error=error,
-            tangents=self.elements.tangents,
-            evaluations=self.tire.evaluations,
-            singular=singular,
-        )
+        found = trained_on(self.force, *self.states, self.settings, self.record)
+        return replace(found, tangents=self.elements.tangents, evaluations=self.tire.evaluations)
+
+
+def trained_on(
+    force: RestoringForce,
+    motions: Array,
+    answers: Array,
+    settings: Settings,
+    record: list[Trained],
+) -> Training:
+    """Vectors and weights from the motions and K^-1 r (n, s) of states. Collective."""
+    vectors, singular = decomposed(force, motions, answers, settings.kept, settings.most)
+    forces, scale = (
+        multiply(force.operators.stiffness, answers),
+        _scale(sizes(force, motions, answers)),
+    )
+    left = outside(force, vectors, answers, forces) / scale
+    given = force, vectors, motions, forces, scale, settings.tolerance
+    cells, weights, error = weighted_cells(*given)
+    return Training(
+        force=reduced_force(force, vectors, cells, weights),
+        vectors=vectors,
+        record=record,
+        states=motions.shape[1],
+        left=float(left.max()),
+        error=error,
+        singular=singular,
+    )
 
 
 class CellTangents:
@@ -290,7 +324,7 @@ class CellTangents:
 def train(
     force: RestoringForce,
     points: ContactPoints,
-    roads: Sequence[Feature],
+    roads: Sequence[Ground],
     settings: Settings = Settings(),
     report: Callable[[str], None] = lambda text: None,
 ) -> Training:

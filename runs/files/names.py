@@ -11,6 +11,7 @@ STAGES = (
     "modes",
     "rotating",
     "greens",
+    "nonlinear",
     "contact",
     "accuracy",
     "stretches",

@@ -124,6 +124,17 @@ def _rolling(results: Results, given: Given) -> list[Fact]:
             bounded(float(force.mean()), error, "N") + ("" if error else ", error unknown"),
         ),
         (what, bounded(varies, off, "N") + ("" if off else ", error unknown")),
+        *_large(given),
+    ]
+
+
+def _large(given: Given) -> list[Fact]:
+    """Whether motions were large, and what of them was outside the training."""
+    outside = given("contact", "motion outside the training at most")
+    if outside is None:
+        return []
+    return [
+        ("motion of the tire", f"large; at most {digits(outside)} % outside the nonlinear training")
     ]
 
 

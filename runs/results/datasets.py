@@ -174,6 +174,18 @@ DATASETS: Mapping[str, tuple[Dataset, ...]] = {
             ("contact/index", "c", "-", "nodes of the outer face that carry the contact points"),
             ("attached/PART", "", "as modes.h5 and rotating.h5", "modes with attachment modes, for the energy"),
         ),
+        "nonlinear.h5": (
+            ("shape", "n, 3, v", "m J^-1/2", "vectors V of the reduced nonlinear force, at all nodes, V^T K V = 1"),
+            ("load", "n, 3, v", "N J^-1/2", "their loads K V"),
+            ("cells", "w", "-", "cells of the mesh over which the force is summed, by number"),
+            ("weight", "w", "-", "their weights"),
+            ("singular", "i", "-", "singular values of the states' answers K^-1 r over their sizes"),
+            ("road", "r", "-", "runs of the training"),
+            ("how", "r", "-", "whether they were whole, or where they stopped"),
+            ("lacked", "r", "-", "largest share of the motion in each that the vectors before it lacked"),
+            ("left", "r", "-", "0: the share that is left of all states is the attribute `outside`"),
+            ("response/PART", "", "as greens.h5", "response of the contact with the reduced force: behind the columns and rows of the forces K V, then what is read, and the nodes of the kept cells"),
+        ),
         "contact.h5": (
             ("time", "nt", "s", "end of each step"),
             ("points", "c, 3", "m", "contact points"),

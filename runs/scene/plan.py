@@ -3,7 +3,7 @@
 from dataclasses import fields
 
 from tireroad.runs.files.names import STAGES
-from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.scene.tables.scene import Scene, confined
 
 _OF_CONTACT = "accuracy", "stretches", "spectra"
 
@@ -28,6 +28,8 @@ def skipped(scene: Scene, until: str | None = None) -> dict[str, str]:
             reasons["greens"] = f"no [[force]], and {why}"
     elif not scene.output.spectra:
         reasons["spectra"] = "output.spectra is false"
+    if (small := _small(scene)) is not None:
+        reasons["nonlinear"] = small
     if "stretches" not in reasons and (idle := _no_chance(scene)):
         reasons["stretches"] = idle
     if "accuracy" not in reasons and not scene.accuracy.estimate:
@@ -63,6 +65,20 @@ def _no_chance(scene: Scene) -> str | None:
     if not scene.road.surface.sampled:
         return f'road.kind = "{scene.road.kind}" is a shape, whose levels are not by chance'
     return None
+
+
+def _small(scene: Scene) -> str | None:
+    """Why the motion of the tire stays linear; None if it does not, or if its road will tell."""
+    if not scene.in_contact:
+        return _no_contact(scene)
+    if scene.motion.kind == "linear":
+        return 'motion.kind is "linear"'
+    found = next(confined(scene), None) if scene.motion.kind == "auto" else None
+    return (
+        f'motion.kind = "auto" takes a linear tire: {".".join(found[0])} {found[1]}'
+        if found
+        else None
+    )
 
 
 def _no_contact(scene: Scene) -> str:

@@ -61,6 +61,7 @@ from tireroad.runs.stages.rotating import FullMatrices, RotatingStage
 from tireroad.runs.stages.setup import Setup, points_of, tread_surface
 from tireroad.runs.stages.stage import Computed, Job, PipelinePart, Record, Result
 from tireroad.runs.stages.static import StaticStage
+from tireroad.runs.stages.training import TrainedMotion
 
 _WHOLE = 0.9  # share of the wall from which a compound counts as all of it
 
@@ -138,6 +139,7 @@ class Given:
     scheme: str = "linear"
     most: float = MOST
     comm: MPI.Comm | None = None
+    large: bool = False
 
     @property
     def points_ratio(self) -> float:
@@ -163,6 +165,11 @@ class Given:
         return self.repeated(self.equilibrated, self.response, coarser=2)
 
     @cached_property
+    def own(self) -> ContactForces | None:
+        """The run with its own step where it is no reference of its companions itself. Collective on `comm`."""
+        return self.repeated(self.equilibrated, self.response, coarser=1) if self.large else None
+
+    @cached_property
     def base(self) -> ContactForces | None:
         """Reference for the companions of points, modes and mesh: the run with twice the step.
 
@@ -173,15 +180,15 @@ class Given:
         step, spec = 2 * self.step, self.job.scene.contact
         kept = self.response.resolved(step)
         if len(kept.every) < len(self.response.resolved(self.step).every):
-            return None
+            return self.own
         patch = self.equilibrated.patch
         steps = oscillation(spec, patch, kept, step, bristles(spec, patch))
         if self.scheme == "linear" and choose(steps).scheme != "linear":
-            return None
+            return self.own
         try:
             return self.longer
         except (ConvergenceError, InputError):
-            return None
+            return self.own
 
     def first(self, steps: int) -> Given:
         """The same for fewer steps."""
@@ -189,7 +196,7 @@ class Given:
 
     def of(self, job: Job) -> Given:
         """The same with another job; `base` stays that of the run."""
-        return self._keeping("base", job=job)
+        return self._keeping("base", "own", job=job)
 
     def alone(self) -> Given:
         """The same for this process by itself, with what all processes have found."""
@@ -213,7 +220,7 @@ class Given:
 
         `coarser`: factor on the time step, by default that of `base`. Collective on `comm`.
         """
-        times = coarser or (1 if self.base is None else 2)
+        times = coarser or (1 if self.base is self.own else 2)
         step, steps = times * self.step, self.steps // times
         comm = self.comm or self.job.comm
         return forces(self.job, setup, response, step, steps, self.scheme, comm, contact)
@@ -499,7 +506,7 @@ def companions(cause: str, given: Given) -> list[Companion]:
     not those of its job, its coarser mesh is known before.
     """
     with console.quiet():
-        beside = None if cause == "step" else given.base
+        beside = given.own if cause == "step" else given.base
         found = [Companion(COMPANIONS[cause](given), beside, _share(cause, given))]
         if cause == "mesh":
             with suppress(InputError, ConvergenceError):
@@ -576,6 +583,7 @@ class AccuracyStage(Computed[Accuracy]):
     greens: Result[Responses]
     setup: Result[ContactSetup]
     contact: Result[ContactHistory]
+    nonlinear: Result[TrainedMotion] | None = None
 
     def inputs(self) -> dict:
         """The key of the contact forces, and the upper frequency."""
@@ -623,6 +631,10 @@ class AccuracyStage(Computed[Accuracy]):
         record.indicators["errors are estimated from"] = (start * history.step, "s")
         record.indicators["errors are estimated up to"] = (product.window, "s")
         _describe(record, product, exact, limit)
+        if self.nonlinear is not None:
+            record.notes.append(
+                "the error bars are those of the linear tire; what the training of large motions leaves out is told by the stage contact"
+            )
         return product
 
     def _companions(
@@ -684,6 +696,7 @@ class AccuracyStage(Computed[Accuracy]):
             steps=steps,
             scheme=recursive(self.contact.product.scheme),
             most=most,
+            large=self.nonlinear is not None,
         )
 
     def write(self, file, product: Accuracy) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -29,15 +29,18 @@ from tireroad.contact.roads.kinds.shapes import Edges
 from tireroad.contact.rolling import make_loop, rolling_steadily
 from tireroad.contact.setup import ContactSetup
 from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.nonlinear.force import RestoringForce
 from tireroad.fem.static.footprint import Footprint
 from tireroad.fem.static.state import StaticState
+from tireroad.greens.coupling import Wheel
+from tireroad.greens.large_motion import LargeTire
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
+from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes
-from tireroad.runs.files import store
 from tireroad.runs.process import console
 from tireroad.runs.process.signals import Deferred, Stopped
-from tireroad.runs.scene.tables.scene import RoadTable, Scene, rolls_freely
+from tireroad.runs.scene.tables.scene import RoadTable, Scene
 from tireroad.runs.stages import contact_file
 from tireroad.runs.stages import setup as stages_setup
 from tireroad.runs.stages.contact_file import (
@@ -47,18 +50,20 @@ from tireroad.runs.stages.contact_file import (
     forget_checkpoint,
 )
 from tireroad.runs.stages.greens import Responses
+from tireroad.runs.stages.large import Greatest, LargeMotion
+from tireroad.runs.stages.large import describe as describe_large
 from tireroad.runs.stages.rolling import (
     Integration,
     Planned,
     chosen_scheme,
     driven_tire,
     integration,
-    passing_period,
     planned,
     reported,
-    shortest_period,
+    shortest_excitation,
 )
 from tireroad.runs.stages.stage import Record, Result, Stage
+from tireroad.runs.stages.training import TrainedMotion, linear_motion
 
 # Fewest point spacings per footprint width. Measured on cobblestones on two tires: deviation 23 %
 # too large at 1.8, 2 % at 2.4 (torus.toml), 5 % too small at 2.5, 3 % at 3.6. Only on a mesh
@@ -197,7 +202,7 @@ def excursion(record: Record, most: float, deflection: float | None, *, held: bo
             f"the contact moved by up to {1e3 * most:.3g} mm beyond the static state, {share:.2g} of the static "
             f"deflection of {1e3 * deflection:.3g} mm: the tire is linear about that state, so forces are doubtful "
             "beyond a third of it (a step that lifts the whole footprint by a third gives a force 14 % too large, by "
-            "all of it 56 %); take a lower road, or a longer road.run_in or road.longest_wave"
+            'all of it 56 %); take motion.kind = "large", a lower road, or a longer road.run_in or road.longest_wave'
             + (', or a wheel that moves (axle.kind = "corner")' if held else "")
         )
 
@@ -239,24 +244,27 @@ _SLIGHT = 1e-6
 class Works:
     """Work (J) of the contact's force changes and of the prescribed forces, if any.
 
-    `lead`: additional work of the forces that the scheme applies during the steps; `begun`: energy (J) in the tire before.
+    `lead`: additional work of the forces that the scheme applies during the steps; `begun`: energy (J) in the tire before;
+    `nonlinear`: energy (J) that large motions have stored in the nonlinear force.
     """
 
     contact: float
     driven: float | None
     lead: float
     begun: float = 0.0
+    nonlinear: float | None = None
 
     @property
     def total(self) -> float:
-        """Work of all forces as if they were linear over the step."""
-        return self.contact + (self.driven or 0.0)
+        """Work of all forces as if they were linear over the step, less what the nonlinear force stores."""
+        return self.contact + (self.driven or 0.0) - (self.nonlinear or 0.0)
 
 
-def works(contact: Work, driven: DrivenTire | None) -> Works:
+def works(contact: Work, driven: DrivenTire | None, large: LargeTire | None = None) -> Works:
     """The works of a completed loop."""
-    lead = contact.lead + (driven.lead if driven else 0.0)
-    return Works(contact.total, driven.work if driven else None, lead, contact.begun)
+    lead = contact.lead + (driven.lead if driven else 0.0) + (large.lead if large else 0.0)
+    own = driven.work if driven else None
+    return Works(contact.total, own, lead, contact.begun, large.stored if large else None)
 
 
 class Losses:
@@ -346,6 +354,11 @@ def describe_energy(
         "energy left in the modes": (energies[0], "J"),
         "energy left in the residual flexibility": (energies[1], "J"),
     }
+    if work.nonlinear is not None:
+        record.indicators["energy left in the nonlinear force"] = (work.nonlinear, "J")
+        console.say(
+            f"  energy: of the contact's {work.contact:.4g} J the nonlinear force holds {work.nonlinear:.4g} J; the rest goes on"
+        )
     if work.begun:
         record.indicators["energy in both as the run begins"] = (work.begun, "J")
     left = sum(energies) - work.begun
@@ -434,6 +447,10 @@ class ContactStage(Stage[ContactHistory]):
     rotating: Result[RollingModes]
     greens: Result[Responses]
     setup: Result[ContactSetup]
+    wheel: Result[Wheel]
+    fields: Result[ModalBasis]
+    restoring: Result[RestoringForce]
+    nonlinear: Result[TrainedMotion] | None = None
 
     def solver(self) -> str:
         """The solvers' settings, for the log."""
@@ -459,18 +476,9 @@ class ContactStage(Stage[ContactHistory]):
 
     def inputs(self) -> dict:
         """The Green's functions, the contact, the road (a file by its content) and the time."""
-        scene = self.job.scene
-        return {
-            "greens": self.greens.key,
-            "contact": asdict(scene.contact),
-            "road": [asdict(scene.road), stages_setup.inputs(self.job)],
-            "files": [store.file_hash(file) for file in scene.road.surface.files],
-            "speed": self.setup.product.rolled.speed,
-            "slip": [rolls_freely(scene), scene.rotation.slip_angle] if scene.rotation else None,
-            "axle_force": scene.output.axle_force,
-            "forces": [asdict(force) for force in scene.force],
-            "time": {k: v for k, v in asdict(scene.time).items() if k != "checkpoint"},
-        }
+        trained = {"nonlinear": self.nonlinear.key} if self.nonlinear else {}
+        loop = stages_setup.loop_inputs(self.job, self.setup.product)
+        return {"greens": self.greens.key, **loop, **trained}
 
     def produce(self, key: str, record: Record) -> ContactHistory:
         """Run the time loop and read the history back. Collective."""
@@ -483,7 +491,8 @@ class ContactStage(Stage[ContactHistory]):
         Collective.
         """
         response, setup = self.greens.product.contact, self.setup.product
-        plan = planned(self.job, record, response, self._shortest_period())
+        shortest = shortest_excitation(self.job.scene, self.setup.product)
+        plan = planned(self.job, record, response, shortest)
         with record.timing("tread and solver"):
             setup, rise = setup.equilibrated(
                 response, self.static.product.normal_force, self.job.scene.contact
@@ -491,7 +500,7 @@ class ContactStage(Stage[ContactHistory]):
             if rise:
                 record.indicators["rise of the tire as it settles on the grid"] = (rise, "m")
             begun = begun_with(self.job, key)
-            chosen = chosen_scheme(self.job, record, setup, plan, begun)
+            chosen = chosen_scheme(self.job, record, setup, plan, begun, self.nonlinear is not None)
             setup = self._rolling_steadily(record, setup, plan.step)
         spec, patch = self.job.scene.contact, setup.patch
         count = f"{len(patch.points)} contact points on {len(patch.index)} nodes"
@@ -540,14 +549,19 @@ class ContactStage(Stage[ContactHistory]):
         scheme: Chosen,
     ) -> None:
         """Run the loop, writing by blocks; raises Chatter beyond the scheme's limit. Collective."""
-        response, chosen = self.greens.product.contact, integration(self.job, plan, scheme.scheme)
+        large = self._large()
+        response = large.response if large else self.greens.product.contact
+        if large:
+            plan = replace(plan, response=response.resolved(plan.step))
+        chosen = integration(self.job, plan, scheme.scheme)
         if chosen.scheme == "convolution":
             setup = replace(setup, steady=None)  # its history begins at t = 0
         with record.timing("tread and solver"):
-            driven = driven_tire(self.job, chosen, setup.patch)
-            loop = self._loop(record, setup, driven or chosen.tire, chosen.step)
+            moved = self._moved(large, chosen)
+            driven = driven_tire(self.job, chosen, setup.patch, moved)
+            loop = self._loop(record, setup, driven or moved or chosen.tire, chosen.step)
         totals = Totals(setup.patch, setup.reach, scheme.limit, work=Work(scheme.scheme))
-        losses = Losses(chosen, response, self._states)
+        losses, instants = Losses(chosen, response, self._states), Greatest(moved, chosen.tire)
         with ExitStack() as stack, record.timing("time loop"):
             attributes = {"step": chosen.step, "scheme": chosen.scheme, "road_relief": setup.relief}
             attributes |= {"free_slip": setup.free_slip or 0.0, "scheme_reason": scheme.reason}
@@ -556,15 +570,16 @@ class ContactStage(Stage[ContactHistory]):
             file = ContactFile(self.job, key, setup, attributes)
             kept = file.open(stack, self.job.path(self.name))
             if kept is None:
-                self._begin(loop, totals, losses, chosen.step)
+                self._begin(loop, totals, losses, response, chosen.step)
             else:
                 loop.restore(kept)
                 totals.set_state(kept)
                 losses.set_state(kept)
+                instants.set_state(kept)
                 reached = totals.figures.steps * chosen.step
                 console.say(f"  continues from the checkpoint at t = {reached:.6g} s")
             done, began = totals.figures.steps, time.thread_time()
-            self._steps(setup, loop, file, totals, losses, chosen)
+            self._steps(setup, loop, file, totals, losses, instants, chosen)
             # CPU time of this process's own thread: the cost of a step when no other process needs
             # the cores.
             busy = (time.thread_time() - began) / max(chosen.steps - done, 1)
@@ -577,26 +592,51 @@ class ContactStage(Stage[ContactHistory]):
         points(record, setup.patch, self.static.product.footprint(), setup.relief)
         highest = self.rotating.product.highest / (2 * np.pi)
         edges(record, self.job.scene.road, setup.patch, abs(setup.rolled.speed), highest)
-        deflection, held = self.static.product.deflection, self.job.scene.axle.kind == "fixed"
-        excursion(record, totals.figures.excursion, deflection, held=held)
+        if large and moved:
+            left_out = large.left_out(instants, chosen.step) if len(instants) else None
+            describe_large(record, moved, left_out, totals.figures.steps, totals.figures.excursion)
+        else:
+            deflection, held = self.static.product.deflection, self.job.scene.axle.kind == "fixed"
+            excursion(record, totals.figures.excursion, deflection, held=held)
         stages_setup.describe(record, setup)
         contact_file.describe(record, setup, self.job.scene.road)
         if chosen.scheme != "convolution":
-            work = works(totals.work, driven if self.job.scene.force else None)
+            work = works(totals.work, driven if self.job.scene.force else None, moved)
             given = self._states, response, loop.tire.snapshot(), work
             state = self.static.product
             pressed = float(state.normal_force.sum()) * (state.deflection or 0.0)
             describe_energy(record, *given, losses, chosen.step, pressed)
 
-    def _begin(self, loop: Loop, totals: Totals, losses: Losses, step: float) -> None:
+    def _begin(
+        self, loop: Loop, totals: Totals, losses: Losses, response: Response, step: float
+    ) -> None:
         """Count work and losses from the state in which the loop begins, if that is not the static one. Collective."""
         if loop.begun is None:
             return
         change, moved = loop.begun
         losses.begin()
         kept = loop.tire.snapshot()
-        energies = energies_in(self._states, self.greens.product.contact, kept, step)
+        energies = energies_in(self._states, response, kept, step)
         totals.work.begin(change[: len(moved)], moved, sum(energies or (0.0,)))
+
+    def _large(self) -> LargeMotion | None:
+        """The parts of large motions; None where the motion is linear. Collective."""
+        if self.nonlinear is None:
+            return None
+        motion, trained = linear_motion(self), self.nonlinear.product
+        return replace(
+            motion,
+            force=trained.stored.force(motion.restoring),
+            vectors=trained.stored.on_unknowns(motion.restoring),
+            response=trained.response,
+        )
+
+    def _moved(self, large: LargeMotion | None, chosen: Integration) -> LargeTire | None:
+        """The tire of large motions, if any. Collective."""
+        if large is None:
+            return None
+        assert isinstance(chosen.tire, Recursion), "the scene's rules refuse a convolution"
+        return large.tire(chosen.tire, chosen.scheme)
 
     @property
     def _coefficient(self) -> float:
@@ -611,12 +651,6 @@ class ContactStage(Stage[ContactHistory]):
         """The modes, with the attachment modes where there are any, whose states the loop has."""
         return self.greens.product.attached or self.rotating.product
 
-    def _shortest_period(self) -> float:
-        """Shortest period of all excitation, s."""
-        scene, setup = self.job.scene, self.setup.product
-        passing = passing_period(scene.road, setup.shortest, setup.rolled.speed)
-        return min(passing, shortest_period(scene.force))
-
     def _loop(self, record: Record, setup: ContactSetup, tire, step: float) -> Loop:
         """The loop of tire, normal solver and friction at the patch's points; recorded."""
         spec = self.job.scene.contact
@@ -629,7 +663,9 @@ class ContactStage(Stage[ContactHistory]):
             )
         return loop
 
-    def _steps(self, setup, loop: Loop, file: ContactFile, totals, losses, chosen) -> None:
+    def _steps(
+        self, setup, loop: Loop, file: ContactFile, totals, losses, instants: Greatest, chosen
+    ) -> None:
         """Take the remaining steps; stops between two blocks of them when requested. Collective."""
         done, steps = totals.figures.steps, chosen.steps
         blocks = loop.roll(setup.drive, chosen.step, steps, done=done)
@@ -644,10 +680,12 @@ class ContactStage(Stage[ContactHistory]):
             for block in blocks:
                 file.write(block, totals.add)
                 losses.flush()
+                instants.see(float(block.time[-1]))
                 bar.advance(len(block.time))
                 stop, due = watch(deferred.asked)
                 if stop or due:
-                    file.checkpoint(loop.snapshot() | totals.state() | losses.state())
+                    kept = totals.state() | losses.state() | instants.state()
+                    file.checkpoint(loop.snapshot() | kept)
                 if stop:
                     raise Stopped(stop)
             totals.finish()

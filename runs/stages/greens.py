@@ -57,18 +57,19 @@ def fill_response(file: h5py.File, name: str, response: Response, points: int) -
     file[name].attrs["pulse"] = response.pulse
 
 
+def read_response(group: h5py.Group) -> Response:
+    """The response in a group."""
+    return Response(
+        **{key: group[key][:] for key in _UNITS},
+        pulse=int(group.attrs["pulse"]),
+        rigid=int(group.attrs["rigid_states"]),
+        **{key: group[key][:] for key in _KNOWN if key in group},
+    )
+
+
 def read_responses(file: h5py.File) -> dict[str, Response]:
     """All responses in a file, by name."""
-    return {
-        name: Response(
-            **{key: group[key][:] for key in _UNITS},
-            pulse=int(group.attrs["pulse"]),
-            rigid=int(group.attrs["rigid_states"]),
-            **{key: group[key][:] for key in _KNOWN if key in group},
-        )
-        for name, group in file.items()
-        if "output" in group
-    }
+    return {name: read_response(group) for name, group in file.items() if "output" in group}
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """Stage modes: the lowest modes about the static state, and rotation matrices projected on them.
 
 Their fields on all unknowns are kept in the shared cache beside modes.h5, so that a family with
-attachment modes solves them once. They are not in the result folder: 38 MB for 157 modes of 30,240
+attachment modes or large motions solves them once. They are not in the result folder: 38 MB for 157 modes of 30,240
 unknowns. Those above LARGEST are solved again by each member.
 """
 
@@ -266,7 +266,9 @@ class ModesStage(Computed[ModalBasis]):
 
     def end(self, key: str, product: ModalBasis) -> None:
         """Cache the fields for other members of a family. Collective."""
-        if residual_of(self.job.scene.greens.residual).joins and product.modes is not None:
+        scene = self.job.scene
+        seen_whole = residual_of(scene.greens.residual).joins or scene.motion.kind != "linear"
+        if seen_whole and product.modes is not None:
             keep(self.job, key, self.motions.product.operators, product.modes)
         forget_checkpoint(self.job, self.name)
 

@@ -17,8 +17,8 @@ class Nonlinear:
     """A training as it is stored; arrays over all nodes n of the lattice, k vectors and c cells.
 
     `shape` V and `load` K V (n, 3, k): the tire is the linear one with the loads -K V s. `weight` (c,) of the
-    `cells`, by their numbers in the mesh; `road` (r,) trained, the shares that V `lacked` and `left` (r,)
-    of its states, and `how` (r,) they were found. `states`, half-turned copies included; largest share `outside` V of
+    `cells`, by their numbers in the mesh; `road` (r,) trained, or run of the loop, the shares that V
+    `lacked` and `left` (r,) of its states, and `how` (r,) they were found. `states`, half-turned copies included; largest share `outside` V of
     them; relative `error` of the weighted cells.
     """
 
@@ -27,8 +27,8 @@ class Nonlinear:
     cells: np.ndarray = dataset("-")
     weight: np.ndarray = dataset("-")
     singular: np.ndarray = dataset("-")
-    road: np.ndarray = dataset("")
-    how: np.ndarray = dataset("")
+    road: np.ndarray = dataset("-")
+    how: np.ndarray = dataset("-")
     lacked: np.ndarray = dataset("-")
     left: np.ndarray = dataset("-")
     states: int = attribute()

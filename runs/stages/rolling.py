@@ -12,9 +12,9 @@ from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
 from tireroad.contact.choices import LEAST_STEPS, TURN
-from tireroad.contact.loop import Block, DrivenTire, LinearTire, equal_steps, steps_of
+from tireroad.contact.loop import Block, DrivenTire, LinearTire, PushedTire, equal_steps, steps_of
 from tireroad.contact.patch import Patch
-from tireroad.contact.results.chatter import Chosen, choose, oscillation
+from tireroad.contact.results.chatter import LARGE, Chosen, choose, oscillation
 from tireroad.contact.rolling import bristles, make_loop, rolling_steadily
 from tireroad.contact.setup import ContactSetup
 from tireroad.greens.recursion import Convolution, Recursion, sharers
@@ -156,14 +156,24 @@ def passing_period(road: RoadTable, spacing: float, speed: float) -> float:
     return min(periods)
 
 
-def driven_tire(job: Job, chosen: Integration, patch: Patch) -> DrivenTire | None:
-    """The tire under prescribed forces and with wheel readings; None if the scene has neither."""
+def shortest_excitation(scene: Scene, setup: ContactSetup) -> float:
+    """Shortest period of all excitation of a run in contact, s."""
+    passing = passing_period(scene.road, setup.shortest, setup.rolled.speed)
+    return min(passing, shortest_period(scene.force))
+
+
+def driven_tire(
+    job: Job, chosen: Integration, patch: Patch, tire: PushedTire | None = None
+) -> DrivenTire | None:
+    """The tire, by default that of the integration, under prescribed forces and with wheel readings; None if the scene has
+    neither."""
     forces = job.scene.force
     if not forces and not corner.readings(job):
         return None
     time = chosen.step * np.arange(chosen.steps + 1)
     seen = (3 if job.scene.horizontal_forces else 1) * len(patch.index)
-    return DrivenTire(chosen.tire, histories(forces, time), directions(forces), chosen.scheme, seen)
+    given = histories(forces, time), directions(forces), chosen.scheme, seen
+    return DrivenTire(tire or chosen.tire, *given)
 
 
 class ContactForces(NamedTuple):
@@ -224,11 +234,11 @@ def blocks(
 
 
 def chosen_scheme(
-    job: Job, record: Record, setup: ContactSetup, plan: Planned, begun: Chosen | None
+    job: Job, record: Record, setup: ContactSetup, plan: Planned, begun: Chosen | None, large: bool
 ) -> Chosen:
     """The scheme and the reason for it; both are reported.
 
-    `begun`: the choice stored in the checkpoint that the loop continues from, or None.
+    `begun`: the choice stored in the checkpoint that the loop continues from, or None; `large`: whether motions are.
     """
     scheme = job.scene.time.scheme
     spec, patch = job.scene.contact, setup.patch
@@ -236,7 +246,9 @@ def chosen_scheme(
     if math.isfinite(steps):
         record.indicators["steps in the fastest oscillation of the contact"] = (steps, "-")
     chosen = Chosen(scheme, f'time.scheme = "{scheme}"')
-    return reported(record, begun or (choose(steps) if scheme == "auto" else chosen))
+    if scheme == "auto":
+        chosen = LARGE if large else choose(steps)
+    return reported(record, begun or chosen)
 
 
 def reported(record: Record, chosen: Chosen) -> Chosen:

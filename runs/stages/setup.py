@@ -70,6 +70,21 @@ def inputs(job: Job) -> list | None:
     return [asdict(pattern), store.file_hash(pattern.file) if pattern.file else None]
 
 
+def loop_inputs(job: Job, setup: ContactSetup) -> dict:
+    """Inputs of a time loop beside the Green's functions: the contact, the road (a file by its content), the time."""
+    scene = job.scene
+    return {
+        "contact": asdict(scene.contact),
+        "road": [asdict(scene.road), inputs(job)],
+        "files": [store.file_hash(file) for file in scene.road.surface.files],
+        "speed": setup.rolled.speed,
+        "slip": [rolls_freely(scene), scene.rotation.slip_angle] if scene.rotation else None,
+        "axle_force": scene.output.axle_force,
+        "forces": [asdict(force) for force in scene.force],
+        "time": {k: v for k, v in asdict(scene.time).items() if k != "checkpoint"},
+    }
+
+
 def describe(record: Record, setup: ContactSetup) -> None:
     """Record the land ratio of the pattern under the footprint, and the pitch-passing frequency."""
     pattern, patch = setup.pattern, setup.patch

@@ -277,6 +277,10 @@ class Stage(PipelinePart[P]):
             _tell_computed(self, key, record, time.perf_counter() - began, summary)
         return Result(key, lambda: product)
 
+    def idle(self) -> str | None:
+        """Why there is nothing to do, which only the parts before tell; None: there is. On every process."""
+        return None
+
     @classmethod
     def if_skipped(cls, job: Job, done: Mapping[str, Result]) -> Result[P] | None:
         """The result that later parts receive if this stage is skipped; None: nothing."""

@@ -6,7 +6,7 @@ from mpi4py import MPI
 from scipy import sparse
 
 import tireroad as tr
-from tireroad.contact.loop import ContactProblem, Drive, Loop
+from tireroad.contact.loop import ContactProblem, Drive, DrivenTire, Loop
 from tireroad.contact.setup import nodes_within
 from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.solver.stick_slip import BrushFriction
@@ -114,12 +114,9 @@ def test_its_static_response_is_that_of_the_finite_elements(case):
     found = case.response.static() + case.response.residual
     columns = [*some, *range(count, count + vectors.shape[1])]
     inside = at_nodes(case.restoring, shapes, force.nodes)
-    for rows, wanted in (
-        (slice(count), own.T @ shapes),
-        (slice(count, count + len(inside)), inside),
-    ):
+    for rows, wanted in ((slice(count), own.T @ shapes), (slice(-len(inside), None), inside)):
         assert np.allclose(found[rows][:, columns], wanted, rtol=0, atol=1e-7 * abs(wanted).max())
-    along = found[count + len(inside) :][:, columns[len(some) :]]
+    along = found[count : -len(inside)][:, columns[len(some) :]]
     assert np.allclose(along, np.eye(vectors.shape[1]), atol=1e-7)
 
 
@@ -143,7 +140,7 @@ def test_vectors_loads_at_rest_and_rolling_and_with_moduli_over_frequency(expone
     rolling = tr.roll(standing, Turning(speed=speed, damping=DAMPING))
     basis, modes = Basis.of(rolling.states), standing.basis.modes
     found = large_response(rolling.wheel, basis, modes, points, restoring, force, vectors)
-    whole = (found.static() + found.residual)[3:-2, 3:]
+    whole = (found.static() + found.residual)[5:, 3:]
     pushed = sparse.csr_matrix(multiply(operators.stiffness, vectors))
     moved = vectors if not speed else solve_all(rolling.wheel.rotating_stiffness, pushed)
     wanted = at_nodes(restoring, moved, force.nodes)
@@ -180,7 +177,61 @@ def test_without_motion_it_is_at_rest_and_small_motions_are_linear(case):
     assert abs(found[0] - found[1]).max() < 5e-3 * abs(found[1]).max()
 
 
-def test_derivatives_by_differences_lead_to_the_same_forces(case, monkeypatch):
+def test_it_begins_at_rest_under_forces_that_always_were(case):
+    """Where the linear tire does, and stays there while these act on; from there on its force is nonlinear."""
+    count = case.points.shape[0]
+    force = np.zeros(count)
+    touching = np.flatnonzero(case.patch.force > 0)
+    force[touching] = 0.2 * case.patch.force[touching]
+    tire = case.large()
+    begun = tire.start_steady(force)
+    assert np.array_equal(begun, case.linear(slice(count)).start_steady(force))
+    for share in (1.0,) * 20 + (3.0,) * 20:
+        free = tire.predict()
+        while (again := tire.settle(share * force)) is not None:
+            free = again
+        moved = free + tire.same_step @ (share * force)
+        tire.advance(share * force)
+        if share == 1.0:
+            assert abs(moved - begun).max() < 1e-9 * abs(begun).max()
+            assert not tire.stored
+    assert np.linalg.norm(tire.s) > 0.05 and tire.stored
+
+
+def test_prescribed_forces_and_readings_beside_the_contact(case):
+    """The first point is loaded and the last one read; with the same forces on all points they move as one tire."""
+    count = case.points.shape[0]
+    # The points of the contact, of the prescribed force, and what is read.
+    order = np.r_[1 : count - 1, 0, count - 1]
+    given = case.points[order], case.restoring, case.trained.force, case.trained.vectors
+    basis = Basis.of(tr.roll(case.standing, Turning(speed=0.0, damping=DAMPING)).states)
+    response = large_response(case.wheel, basis, case.standing.basis.modes, *given, count - 1)
+    linear = Recursion(
+        response=response.resolved(STEP), step=STEP, scheme="linear", comm=MPI.COMM_SELF
+    )
+    history = 400.0 * np.linspace(0.0, 1.0, 9)[:, None] ** 2
+    inner = LargeTire(linear, case.trained.force, count - 1)
+    driven = DrivenTire(inner, history, np.array([[0.0, 0.0, 1.0]]), seen=count - 2)
+    whole = case.large()
+    force = np.zeros(count)
+    for pushed in history[1:, 0]:
+        force[0], force[1 : count - 1] = pushed, 0.01 * pushed
+        free = driven.predict()
+        while (again := driven.settle(force[1 : count - 1])) is not None:
+            free = again
+        driven.advance(force[1 : count - 1])
+        moved = whole.predict()
+        while (again := whole.settle(force)) is not None:
+            moved = again
+        moved = moved + whole.same_step @ force
+        whole.advance(force)
+        seen = free + driven.same_step @ force[1 : count - 1]
+        assert np.allclose(seen, moved[1 : count - 1], rtol=0, atol=2e-3 * abs(moved).max())
+        assert np.allclose(driven.reading, moved[-1:], rtol=0, atol=2e-3 * abs(moved).max())
+    assert np.allclose(inner.s, whole.s, atol=2e-3 * np.linalg.norm(whole.s))
+
+
+def test_derivatives_taken_anew_lead_to_the_same_forces(case, monkeypatch):
     by_updates = forces(case.loop(case.large()))
     monkeypatch.setattr(large_motion, "STALE", 1)
     tire = case.large()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -624,6 +624,16 @@ class GreensTable:
 
 
 @dataclass(frozen=True)
+class MotionTable:
+    kind: str = choice(
+        "linear",
+        ("linear", "large", "auto"),
+        "motion of the tire in the time loop: small about its static state; with the nonlinear force of its elements, reduced "
+        "by a training on the road of the run; auto: large where the road makes the forces of a linear tire more than 3 % wrong",
+    )
+
+
+@dataclass(frozen=True)
 class PointForceTable:
     angle: float = number(
         0.0,
@@ -699,6 +709,7 @@ class Scene:
     rotation: RotationTable | None = table(RotationTable, "rotation of the wheel", optional=True)
     axle: AxleTable = table(AxleTable, "support of the wheel")
     greens: GreensTable = table(GreensTable, "Green's functions")
+    motion: MotionTable = table(MotionTable, "small or large motions of the tire in the time loop")
     force: tuple[PointForceTable, ...] = tables(
         PointForceTable, "a prescribed force on the outer face"
     )
@@ -758,6 +769,66 @@ class Scene:
         if rotation is None or self.modes.rim == "free":
             return False
         return rotation.shapes and rotation.method == "projected"
+
+
+def confined(scene: Scene) -> Iterator[tuple[tuple[str, ...], str]]:
+    """Why a scene has no large motions: (path of the key, reason with advice)."""
+    rotation, time, road = scene.rotation, scene.time, scene.road
+    if not scene.in_contact:
+        yield (
+            ("motion", "kind"),
+            "is of the time loop: add [contact], [time], and load (N) to [static]",
+        )
+        return
+    if scene.greens.residual != "static":
+        yield (
+            ("greens", "residual"),
+            f'= "{scene.greens.residual}" leaves out how the tire gives way at once: large motions need "static"',
+        )
+    if scene.greens.dynamic is not None:
+        yield (
+            ("greens", "dynamic"),
+            "chooses states by what forces of the road move: large motions need all; leave it out",
+        )
+    if rotation is not None and rotation.speed and rotation.method == "full":
+        yield ("rotation", "method"), '= "full" has no large motions: take "projected"'
+    if time is not None and time.scheme == "convolution":
+        yield ("time", "scheme"), '= "convolution" has no large motions: take "auto"'
+    if (road is not None and road.drum_radius is not None) or scene.static.camber:
+        key = ("static", "camber") if scene.static.camber else ("road", "drum_radius")
+        yield (
+            key,
+            "is not available with large motions, which are trained on a level road: leave it out",
+        )
+    if scene.accuracy.chance_db is not None:
+        yield (
+            ("accuracy", "chance_db"),
+            "asks for further stretches, on which large motions are not trained: leave it out",
+        )
+    if scene.accuracy.searches:
+        yield (
+            ("accuracy", "target"),
+            'and target_db search on linear tires: take accuracy.search = false, or motion.kind = "linear"',
+        )
+    output = scene.output
+    for path, asked in (
+        (("sound",), scene.sound is not None),
+        (("output", "vibration"), output.vibration),
+        (("output", "fields"), output.fields),
+    ):
+        if asked:
+            yield (
+                path,
+                'is seen through the linear tire\'s modes alone: leave it out, or take motion.kind = "linear"',
+            )
+
+
+def check_motion(scene: Scene, raw: dict[str, Any], error: Where) -> Iterator[InputError]:
+    """Refuse what large motions do not have, where the scene asks for them."""
+    if scene.motion.kind != "large":
+        return
+    for path, reason in confined(scene):
+        yield error(path, reason)
 
 
 def filled(scene: Scene) -> Scene:

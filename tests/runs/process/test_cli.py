@@ -203,6 +203,6 @@ def test_stages_follow_from_the_scene(scene: Path, overrides, until, expected) -
     reasons = skipped(load(scene, overrides, until=until), until)
     wanted = expected if expected is not None else {"response", "spectra", "stiffness"}
     bars = {"accuracy"} if "contact" in wanted else set()
-    unasked = {"radiation", "sound", "vibration", "motion", "stretches"}
+    unasked = {"radiation", "sound", "vibration", "motion", "stretches", "nonlinear"}
     assert set(reasons) == wanted | unasked | bars
     assert all(reasons.values())

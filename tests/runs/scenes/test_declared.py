@@ -57,6 +57,7 @@ FREE = {  # no result depends on them, or not by their own names
     "Scene.name",  # provenance
     "TimeTable.checkpoint",  # how often a loop is stored
     "GreensTable.residual",  # for the modes: whether their fields are kept for other runs
+    "MotionTable.kind",  # likewise; for all others, which stages there are
     "AxleTable.kind",  # modes.h5 holds the rim's matrices for any axle; the axle is in the hash of its states
 }
 # Helpers that take a table whole, and what is written beside a result: the scene, as text.

@@ -1,0 +1,102 @@
+"""The roads on which the reduced force of large motions is trained: what the road of a run has under the footprint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from tireroad.contact.setup import ContactSetup
+from tireroad.fem.nonlinear.road import Feature, Passage
+
+Array = np.ndarray
+
+PITCH = 4e-3, 8e-3  # m along and across, of the sampled road
+CLOSE = 5e-4  # m: gap at rest of points that count as the footprint
+BESIDE = 0.03, 0.02  # m that is sampled before and beside the footprint
+# Without inertia and friction single points jump over flanks that are steeper.
+STEEPEST = 1.2
+SHORT = 0.02  # m: bumps that are shorter are taken by the tread and the bending of the belts
+# Lengths and heights (m) from which a road is trained on, the distance of the places, and the most of these.
+LEAST, APART, MOST = 1e-3, 0.015, 120
+# Measured on rises of 1 to 25 mm and bars of 10 to 25 mm (docs/large-motions.md): 15 % for each 10 mm.
+ERROR_PER_METRE = 15.0
+
+
+def expected(setup: ContactSetup) -> float:
+    """Height or depth (m) to which the road takes the tire in the run: the largest mean over 20 mm, and its motion."""
+    road = TrainingRoads.of(setup)
+    size = [max(round(SHORT / pitch), 1) for pitch in PITCH]
+    return float(np.abs(ndimage.uniform_filter(road.z, size, mode="nearest")).max()) + road.lift
+
+
+@dataclass(frozen=True)
+class TrainingRoads:
+    """Heights `z` (n, m) m of the road that a run passes over, at x (n,) and y (m,) m, as its tire stands at t = 0; the
+    `footprint` reaches from and to x, m; `lift` m of the road's own motion."""
+
+    x: Array
+    y: Array
+    z: Array
+    footprint: tuple[float, float]
+    lift: float
+
+    @staticmethod
+    def of(setup: ContactSetup) -> TrainingRoads:
+        """Of the setup of a run, level where it has no relief."""
+        # Grids of points are not settled yet and have no forces.
+        touching = setup.patch.points[setup.patch.gap < CLOSE, :2]
+        low, high = touching.min(axis=0) - BESIDE, touching.max(axis=0) + BESIDE
+        last = high[0] + setup.rolled.travel
+        x, y = (
+            start + step * np.arange(max(np.ceil((end - start) / step), 3.0) + 1)
+            for start, end, step in zip(low, (last, high[1]), PITCH, strict=True)
+        )
+        ends = float(touching[:, 0].min()), float(touching[:, 0].max())
+        return TrainingRoads(x, y, setup.heights(x, y), ends, setup.rolled.lift)
+
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Half length and half width (m) about the lowest meridian that the sampled road has under the footprint."""
+        return max(-self.footprint[0], self.footprint[1]) + BESIDE[0], float(np.abs(self.y).max())
+
+    def smooth(self) -> TrainingRoads:
+        """The same with flanks no steeper than 1.2."""
+        z, width = self.z, PITCH[0]
+        while self._slope(z) > STEEPEST:
+            z = ndimage.gaussian_filter(self.z, [width / pitch for pitch in PITCH], mode="nearest")
+            width *= 1.25
+        return TrainingRoads(self.x, self.y, z, self.footprint, self.lift)
+
+    def _slope(self, z: Array) -> float:
+        return float(np.hypot(*np.gradient(z, *PITCH)).max())
+
+    def rises(self) -> list[Feature]:
+        """Level rises and falls as far as the road takes the whole footprint, or half as far as its bumps reach."""
+        long = max(round((self.footprint[1] - self.footprint[0]) / PITCH[0]), 1)
+        mean = ndimage.uniform_filter1d(self.z.mean(axis=1), long, mode="nearest")
+        up = max(mean.max(), 0.5 * self.z.max(), 0.0) + self.lift
+        down = max(-mean.min(), -0.5 * self.z.min(), 0.5 * up, 0.0) + self.lift
+        return [Feature(rise=float(max(up, LEAST))), Feature(rise=-float(max(down, LEAST)))]
+
+    def ways(self) -> Array:
+        """Ways (k,) m after which there are bumps under the footprint, 15 mm apart, or farther where they are many."""
+        count = len(self.x) - self._long + 1
+        bumpy = np.abs(self.z).max(axis=1) > LEAST
+        under = np.array([bumpy[first : first + self._long].any() for first in range(count)])
+        found = np.flatnonzero(under)
+        stride = max(round(APART / PITCH[0]), -(-len(found) // MOST))
+        return PITCH[0] * found[::stride]
+
+    @property
+    def _long(self) -> int:
+        """Samples along that are under the tire at once."""
+        length = self.footprint[1] - self.footprint[0] + 2 * BESIDE[0]
+        return min(round(length / PITCH[0]) + 1, len(self.x))
+
+    def under(self, way: float) -> Passage:
+        """The road under the tire after a way, m."""
+        first = min(round(way / PITCH[0]), len(self.x) - self._long)
+        some = slice(first, first + self._long)
+        return Passage(x=self.x[some] - way, y=self.y, z=self.z[some], way=way)

@@ -1,0 +1,286 @@
+"""Stage nonlinear: the reduced nonlinear force of the tire, trained on the road of the run and by the run itself.
+
+First the standing tire climbs rises, and the road as it lies under the footprint at places along the run. Then the time
+loop runs with the force found so far: at instants of it the elements' force of the whole motion is evaluated, and where
+the vectors lack some of it the instants join the states. Standing tires alone do not do: one of 205/60 R15 that rolls
+over a bar of 10 mm at 30 km/h swings by millimetres, and two thirds of its motion were outside the training on 94 such
+states. Runs alone do not, either: with vectors of a linear tire's motion the loop did not settle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from tireroad.contact.results.chatter import LARGE
+from tireroad.contact.rolling import make_loop, rolling_steadily
+from tireroad.contact.setup import ContactSetup
+from tireroad.contact.training_roads import ERROR_PER_METRE, TrainingRoads, expected
+from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.model import SmallMotions
+from tireroad.fem.nonlinear.force import RestoringForce
+from tireroad.fem.nonlinear.road import contact_points
+from tireroad.fem.nonlinear.training import Settings, Trained, Trainer, Training, trained_on
+from tireroad.fem.static.state import StaticState
+from tireroad.greens.coupling import Wheel
+from tireroad.greens.recursion import Recursion
+from tireroad.greens.response import Response
+from tireroad.modal.basis import ModalBasis
+from tireroad.modal.rolling import RollingModes
+from tireroad.runs.files import store
+from tireroad.runs.process import console
+from tireroad.runs.stages import setup as stages_setup
+from tireroad.runs.stages.greens import Responses, fill_response, read_response
+from tireroad.runs.stages.large import Instants, LargeMotion
+from tireroad.runs.stages.nonlinear import Nonlinear, stored
+from tireroad.runs.stages.rolling import (
+    Integration,
+    Planned,
+    driven_tire,
+    integration,
+    planned,
+    shortest_excitation,
+)
+from tireroad.runs.stages.stage import MUMPS, Computed, Record, Result, Shared
+
+Array = np.ndarray
+
+LIMIT = 0.03  # of forces: error of the linear tire from which on "auto" takes large motions
+BED = 1e9  # N/m3: springs of the tread under the standing tire, 10 MPa over 10 mm
+RUNS, INSTANTS, STEPS = 6, 60, 4000  # at most: runs, instants of each, steps of each
+ENOUGH = 0.05  # of the motion: what the vectors may lack
+SETTINGS = Settings(most=160, turns=2, precision=5e-3)
+_RESPONSE = "response"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Restoring(Shared[RestoringForce]):
+    """The restoring force of the elements about the static state, with the moduli of small motions."""
+
+    name: ClassVar[str] = "restoring"
+    static: Result[StaticState]
+    motions: Result[SmallMotions]
+
+    def make(self) -> RestoringForce:
+        """The force. Collective."""
+        motions, state = self.motions.product, self.static.product
+        motions.operators.body.set_displacement(state.displacement)
+        return RestoringForce(motions.operators, state.inflation)
+
+
+@dataclass(frozen=True)
+class TrainedMotion:
+    """The reduced nonlinear force as it is `stored`, and the `response` of the contact with it
+    (greens.large_motion.large_response)."""
+
+    stored: Nonlinear
+    response: Response
+
+
+@dataclass(frozen=True, kw_only=True)
+class NonlinearStage(Computed[TrainedMotion]):
+    """The training by runs of the loop."""
+
+    name: ClassVar[str] = "nonlinear"
+    static: Result[StaticState]
+    rotating: Result[RollingModes]
+    greens: Result[Responses]
+    setup: Result[ContactSetup]
+    wheel: Result[Wheel]
+    fields: Result[ModalBasis]
+    restoring: Result[RestoringForce]
+
+    def solver(self) -> str:
+        """The solvers' settings, for the log."""
+        return (
+            f"at most {RUNS} runs of {STEPS} steps, {INSTANTS} instants of each, until the vectors lack {ENOUGH:g}; at most "
+            f"{SETTINGS.most} vectors; weights of cells off by at most {SETTINGS.tolerance:g}; {MUMPS}"
+        )
+
+    def idle(self) -> str | None:
+        """Why the motion stays linear where the scene leaves it open."""
+        if self.job.scene.motion.kind != "auto":
+            return None
+        height = expected(self.setup.product)
+        error = ERROR_PER_METRE * height
+        told = (
+            f"the road takes the tire {1e3 * height:.3g} mm up or down, by which forces of a linear one are some "
+            f"{100 * error:.2g} % off"
+        )
+        if error <= LIMIT:
+            return f'motion.kind = "auto" takes a linear tire: {told}'
+        console.say(f'{self.name} motion.kind = "auto" takes large motions: {told}')
+        return None
+
+    def inputs(self) -> dict[str, Any]:
+        """The Green's functions and all that the loop depends on."""
+        return {
+            "greens": self.greens.key,
+            **stages_setup.loop_inputs(self.job, self.setup.product),
+            "training": [RUNS, INSTANTS, STEPS, ENOUGH, BED, repr(SETTINGS)],
+        }
+
+    def compute(self, record: Record) -> TrainedMotion:
+        """Train. Collective."""
+        with (
+            console.ProgressBar(self.name, unit="roads and runs") as bar,
+            threadpool_limits(1, "blas"),
+        ):
+
+            def told(line: str) -> None:
+                console.log(f"  {line}")
+                bar.advance()
+
+            linear = linear_motion(self)
+            with record.timing("standing on the road"):
+                trainer = self._stood(linear.restoring, told)
+            return self._run(record, linear, trainer, told)
+
+    def _stood(self, restoring: RestoringForce, told: Callable[[str], None]) -> Trainer:
+        """The training of the standing tire on the road under its footprint. Collective."""
+        roads = TrainingRoads.of(self.setup.product).smooth()
+        lattice, (length, width) = restoring.body.lattice, roads.reach
+        width = min(width, float(np.abs(lattice.points(lattice.face)[:, 1]).max()))
+        given = lattice, self.static.product, BED
+        points = contact_points(*given, half_length=length, half_width=width)
+        trainer = Trainer(restoring, points, SETTINGS, told)
+        for rise in roads.rises():
+            trainer.visit(rise)
+        trainer.follow(roads.ways(), roads.under)
+        return trainer
+
+    def _run(
+        self, record: Record, linear: LargeMotion, trainer: Trainer, told: Callable[[str], None]
+    ) -> TrainedMotion:
+        """The training by runs of the loop, begun with the states of the standing tire. Collective."""
+        with console.quiet():
+            shortest = shortest_excitation(self.job.scene, self.setup.product)
+            plan = planned(self.job, Record(), linear.response, shortest)
+        setup, seen, runs = (
+            self._settled(linear.response, plan.step),
+            [trainer.states],
+            trainer.record,
+        )
+        best: tuple[float, Training, LargeMotion] | None = None
+        for number in range(1, RUNS + 1):
+            with record.timing("vectors and cells"):
+                states, answers = (np.hstack(part) for part in zip(*seen, strict=True))
+                training = trained_on(linear.restoring, states, answers, SETTINGS, runs)
+            with record.timing("response to the force"):
+                motion = linear.trained(training.force, training.vectors)
+            with record.timing("time loops"):
+                kept = replace(plan, response=motion.response.resolved(plan.step))
+                instants, stopped = self._rolled(motion, setup, kept)
+            with record.timing("forces of the elements"):
+                left = motion.left_out(instants, plan.step)
+            lacked = float(left.shares.max())
+            told(
+                f"run {number} with {training.vectors.shape[1]} vectors and {len(training.force.cells)} cells: "
+                f"{100 * lacked:.3g} % of the motion outside at most, {100 * np.sqrt(np.mean(left.shares**2)):.2g} % in the mean "
+                f"square; {stopped or 'whole'}"
+            )
+            runs.append(Trained(f"run {number}", len(instants), lacked, 0.0, stopped or "whole"))
+            if not stopped and (best is None or lacked < best[0]):
+                best = lacked, training, motion
+            if lacked <= ENOUGH and not stopped:
+                break
+            some = left.shares > ENOUGH / 2
+            seen.append((left.motion[:, some], left.answer[:, some]))
+        if best is None:
+            raise ConvergenceError(
+                f"large motions: no run of the training went through ({runs[-1].how}); take a smaller time.step, a lower road, "
+                'or motion.kind = "linear"'
+            )
+        lacked, training, motion = best
+        _describe(record, training, lacked)
+        return TrainedMotion(stored(training, motion.restoring), motion.response)
+
+    def _settled(self, response: Response, step: float) -> ContactSetup:
+        """The setup in which each run begins: settled on the tread, and rolling steadily where it does."""
+        contact, force = self.job.scene.contact, self.static.product.normal_force
+        setup = self.setup.product.equilibrated(response, force, contact)[0]
+        try:
+            return rolling_steadily(contact, setup, response, step)
+        except ConvergenceError:  # the loop itself says so
+            return replace(setup, free=False)
+
+    def _rolled(
+        self, motion: LargeMotion, setup: ContactSetup, plan: Planned
+    ) -> tuple[Instants, str]:
+        """Instants of a run of the loop, and where it stopped; "" if nowhere. Collective."""
+        with console.quiet():
+            chosen: Integration = integration(self.job, plan, LARGE.scheme)
+        assert isinstance(chosen.tire, Recursion), "damped forces are integrated by a recursion"
+        tire = motion.tire(chosen.tire, chosen.scheme)
+        driven = driven_tire(self.job, chosen, setup.patch, tire)
+        loop = make_loop(self.job.scene.contact, setup, driven or tire or chosen.tire, plan.step)
+        steps, instants = min(plan.steps, STEPS), Instants(chosen.tire)
+        try:
+            for block in loop.roll(
+                setup.drive, plan.step, steps, at_once=max(steps // INSTANTS, 1)
+            ):
+                instants.add(float(block.time[-1]))
+        except ConvergenceError as error:
+            if not len(instants):
+                raise
+            return instants, f"to t = {instants.kept[-1][0]:.4g} s: {error}"
+        return instants, ""
+
+    def write(self, file: Any, product: TrainedMotion) -> None:
+        """The stored force, and the response as a group."""
+        store.write_fields(file, product.stored)
+        fill_response(file, _RESPONSE, product.response, 0)
+
+    def read(self, file: Any) -> TrainedMotion:
+        """The same, read back."""
+        held = Nonlinear(**store.read_fields(file, Nonlinear))
+        return TrainedMotion(held, read_response(file[_RESPONSE]))
+
+
+def linear_motion(stage: Any) -> LargeMotion:
+    """The motion of a stage's linear tire, with what its large motions need. Collective."""
+    rolling, fields = stage.rotating.product, stage.fields.product
+    if fields is not rolling.basis:
+        rolling = replace(rolling, basis=fields)
+    response = stage.greens.product.contact
+    points = stages_setup.probes(stage.job, stage.static.product, stage.setup.product).outputs
+    restoring = stage.restoring.product
+    return LargeMotion(
+        restoring=restoring,
+        force=None,
+        vectors=np.zeros((len(restoring.at_rest), 0)),
+        response=response,
+        points=points,
+        loaded=response.residual.shape[1],
+        wheel=stage.wheel.product,
+        rolling=rolling,
+    )
+
+
+def _describe(record: Record, training: Training, lacked: float) -> None:
+    """Record what was trained, what of the last run is outside, and the roads that were not climbed to their height."""
+    runs = [one for one in training.record if one.road.startswith("run ")]
+    roads = training.record[: len(training.record) - len(runs)]
+    record.headline |= {
+        "roads under the standing tire": (len(roads), "-"),
+        "runs of the loop": (len(runs), "-"),
+        "states": (training.states, "-"),
+        "vectors": (training.vectors.shape[1], "-"),
+        "cells of the mesh": (len(training.force.cells), "-"),
+        "largest motion of a state left out": (100 * training.left, "%"),
+        "largest motion of the run outside": (100 * lacked, "%"),
+    }
+    record.indicators["error of the weighted cells"] = (100 * training.error, "%")
+    short = [one for one in roads if one.how.startswith("to ")]
+    if short:
+        record.notes.append(
+            f"{len(short)} of {len(roads)} roads of the training were not climbed to their height (the first, {short[0].road}, "
+            f"{short[0].how.split(':')[0]}): on flanks so steep points jump without inertia"
+        )
+    for one in runs:
+        if one.how != "whole":
+            record.notes.append(f"{one.road} of the training went {one.how}")
