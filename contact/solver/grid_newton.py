@@ -244,8 +244,10 @@ class _Step:
         for turn in range(TURNS):
             self.turns += 1
             self._evaluate()
-            if self._balanced(normal, plane) and not self._beyond():
-                return True
+            if self._balanced(normal, plane):
+                if not self._beyond():
+                    return True
+                continue  # with the points of a larger box
             if turn >= PATIENT and self._off > max(FALLS * before, self._limit):
                 self._caution = max(CAUTION * self._caution, LEAST_CAUTION)
             before = self._off

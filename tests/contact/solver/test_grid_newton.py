@@ -96,6 +96,19 @@ def test_all_of_the_tire_and_its_neighbourhood_find_the_same(monkeypatch) -> Non
     )
 
 
+def test_the_box_grows_where_points_beyond_it_touch(monkeypatch) -> None:
+    """A box as tight as the contact grows within a step; the forces are those of a wide one."""
+    wide = rolled(problem_of(), 0, STEPS)
+    monkeypatch.setattr(grid_newton, "_AROUND", 0)
+    beyond, grown = grid_newton._Step._beyond, []
+    monkeypatch.setattr(
+        grid_newton._Step, "_beyond", lambda step: grown.append(beyond(step)) or grown[-1]
+    )
+    found = rolled(problem_of(), 0, STEPS)
+    assert any(grown)
+    assert np.abs(found - wide).max() < 5e-3 * wide.max()
+
+
 def test_a_step_without_a_solution_of_both_is_split(monkeypatch) -> None:
     """Normal forces then are in balance with the horizontal ones of the step before, and these with the normal ones."""
     problem = problem_of()
