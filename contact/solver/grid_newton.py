@@ -28,7 +28,7 @@ PATIENT = 12  # Newton steps, before fewer points are to be found slipping where
 FALLS, CAUTION, LEAST_CAUTION = 0.7, 0.1, 1e-4
 LIFT_PATIENCE = 10  # Newton steps, before a point without a bound that comes and goes is lifted by its own bristle
 READINGS = 12  # Newton steps in which the road is read, at most: on a steep flank a point may go to and fro
-_AROUND = 3  # rows and columns of points beyond those that touch, which take part too
+_AROUND = 3  # rows and columns of points beyond those that touch, which take part too; the edge of a brush needs one
 
 # Heights (c,) m and slopes (c, 2) of the road under points at places (2, c) m beside their own.
 Reading = Callable[[Array], tuple[Array, Array]]
@@ -393,7 +393,7 @@ class _Step:
             self.force[1:, at[~bears]] = 0.0
 
     def _beyond(self) -> bool:
-        """Set the gaps of all points; whether some beyond the box would touch, which then has grown."""
+        """Set the gaps of all points; whether some touch beyond the box or at its edge, which then has grown."""
         solver = self._solver
         gap = self._open + self._tire - self._height + solver.whole_tread(self.force)
         scale = np.abs(gap).max()
@@ -401,7 +401,7 @@ class _Step:
         outside[solver.index] = False
         self.penetration = penetration(gap)
         self.gap = np.where(self.force[0] > 0.0, 0.0, gap)
-        return solver.take_box(outside)
+        return solver.take_box(outside | (self.force[0] > 0.0))
 
 
 def _onto_discs(force: Array, bound: Array) -> None:

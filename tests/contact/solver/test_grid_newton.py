@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from tireroad.contact.loop import ContactProblem, Drive
+from tireroad.contact.loop import MEETING, ContactProblem, Drive
 from tireroad.contact.solver import grid_newton
 from tireroad.contact.solver.projected_cg import ProjectedCG, SpreadCompliance
-from tireroad.contact.solver.stick_slip import BrushFriction
+from tireroad.contact.solver.stick_slip import TOLERANCE, BrushFriction
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.kernel import GridPlaces, KernelTread
 from tireroad.contact.tread.layer import LayerInfluence, LayerShear
@@ -30,8 +30,8 @@ def slope(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return 2e-4 * np.stack([90 * one + 310 * two, 40 * one - 170 * two], axis=-1)
 
 
-def problem_of(friction: float = FRICTION) -> ContactProblem:
-    """A bonded layer on nodes twice as far apart as the points."""
+def problem_of(places_to: float = MEETING, sliding_to: float = TOLERANCE) -> ContactProblem:
+    """A bonded layer on nodes twice as far apart as the points; tolerances of places and of stick and slip."""
     both = [
         np.maximum(1 - np.abs(np.arange(c)[:, None] / 2 - np.arange(n)), 0.0)
         for c, n in zip(COUNTS, NODES, strict=True)
@@ -47,11 +47,12 @@ def problem_of(friction: float = FRICTION) -> ContactProblem:
     p = len(at)
     solver = ProjectedCG(SpreadCompliance(same_step[:p, :p], weights, normal))
     brush = Brush(
-        BrushLaw(np.inf, friction, (0.05, 0.02)), patch.points[:, 0], patch.line, SPEED, STEP
+        BrushLaw(np.inf, FRICTION, (0.05, 0.02)), patch.points[:, 0], patch.line, SPEED, STEP
     )
     brush.begin(patch.force > 0)
     shear = KernelShear(places, LayerShear(5e6, 0.45, 0.008))
-    return ContactProblem(patch, same_step, solver, BrushFriction(brush, same_step, weights, shear))
+    coupling = BrushFriction(brush, same_step, weights, shear, tolerance=sliding_to)
+    return ContactProblem(patch, same_step, solver, coupling, tolerance=places_to)
 
 
 def rolled(problem: ContactProblem, first: int, last: int) -> np.ndarray:
@@ -97,16 +98,22 @@ def test_all_of_the_tire_and_its_neighbourhood_find_the_same(monkeypatch) -> Non
 
 
 def test_the_box_grows_where_points_beyond_it_touch(monkeypatch) -> None:
-    """A box as tight as the contact grows within a step; the forces are those of a wide one."""
-    wide = rolled(problem_of(), 0, STEPS)
-    monkeypatch.setattr(grid_newton, "_AROUND", 0)
-    beyond, grown = grid_newton._Step._beyond, []
+    """From a box that is too small forces are found as from one of all points."""
+    monkeypatch.setattr(grid_newton, "GAP_TOLERANCE", 1e-11)
+    monkeypatch.setattr(grid_newton, "READINGS", 40)
+    beyond, grown, found = grid_newton._Step._beyond, [], []
     monkeypatch.setattr(
         grid_newton._Step, "_beyond", lambda step: grown.append(beyond(step)) or grown[-1]
     )
-    found = rolled(problem_of(), 0, STEPS)
+    for box in ((0, COUNTS[0], 0, COUNTS[1]), (10, 15, 7, 10)):
+        problem = problem_of(1e-9, 1e-9)
+        solver = problem._at_once
+        assert solver is not None
+        solver.force, solver.before = np.zeros((2, 3, len(problem.patch.points)))
+        solver._set_box(box)
+        found.append(rolled(problem, 0, 3))
     assert any(grown)
-    assert np.abs(found - wide).max() < 5e-3 * wide.max()
+    assert np.abs(found[1] - found[0]).max() < 1e-6 * found[0].max()
 
 
 def test_a_step_without_a_solution_of_both_is_split(monkeypatch) -> None:
