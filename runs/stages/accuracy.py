@@ -51,7 +51,6 @@ from tireroad.runs.process import console
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.scene.estimate import estimate
 from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.scene.tables.tire import TireTable
 from tireroad.runs.stages.cavity import AirColumn
 from tireroad.runs.stages.contact_file import ContactHistory
 from tireroad.runs.stages.greens import GreensStage, Responses
@@ -91,7 +90,7 @@ def backed(job: Job, static: StaticState, setup: ContactSetup, response: Respons
         raise InputError(
             "the compliance of the wall between nodes is known only for a grid of points on a plane road without bristles"
         )
-    wall = over_rectangles(_outer(job.scene.tire, job.tire.section))
+    wall = over_rectangles(_outer(job.scene, job.tire.section))
     known = on_nodes(patch, static.area, wall)
     count = len(patch.index)
     residual = response.residual.copy()
@@ -101,11 +100,12 @@ def backed(job: Job, static: StaticState, setup: ContactSetup, response: Respons
     return Backing(spec, replace(setup, patch=patch), replace(response, residual=residual))
 
 
-def _outer(tire: TireTable, ring: Ring) -> Influence:
-    """Influence of the crown's compound: a half-space if it is the whole wall, else a layer."""
-    section = ring.section
+def _outer(scene: Scene, ring: Ring) -> Influence:
+    """Influence of the crown's compound, as warm as the tire: a half-space if it is the whole wall, else a layer."""
+    tire, section = scene.tire, ring.section
     cell = section.outer[len(section.outer) // 2, 0]
-    material = tire.shape.in_layers(tire)[section.regions[section.region[cell]]]
+    region = section.regions[section.region[cell]]
+    material = tire.shape.in_layers(tire)[region].at(scene.temperature)
     modulus = material.dynamic * material.law.youngs
     middle = section.nodes[section.cells].mean(axis=1)
     low, high = np.sort(section.nodes[section.cells[cell], 1])[[0, -1]]
