@@ -119,6 +119,7 @@ typedef struct {
     const double *direction, *share;      /* (2, a), (a,) of what slips: the projection's derivative is b/|t| (I - n n^T) */
     const uint8_t *kept;                  /* (2, a): whether the normal force, and that in the plane, is not to change */
     double friction, caution;
+    int reach;                            /* cells up to which the tread's kernels are read */
     int reads;                            /* whether the road is read where the points move to */
     double *nodal, *nodes, *value;        /* workspace: (3p,) each */
     int *which;
@@ -1127,12 +1128,12 @@ static int both(void *of, const double *given, double *out) {
     double *uz = s->field, *ux = uz + cells(c), *uy = ux + cells(c);
     s->products++;
     memset(s->field, 0, 3 * cells(c) * sizeof(double));
-    spread(c, c->near, a, s->index, f, 0, pressed, 1, uz, 0);
-    spread(c, c->near, a, s->index, x, y, c->kernel, 3, ux, uy);
+    spread(c, s->reach, a, s->index, f, 0, pressed, 1, uz, 0);
+    spread(c, s->reach, a, s->index, x, y, c->kernel, 3, ux, uy);
     if (c->coupled) {
         for (int k = 0; k < a; k++) s->force[k] = -f[k];
-        spread(c, c->near, a, s->index, x, y, c->kernel + 3, 2, uz, 0);
-        spread(c, c->near, a, s->index, s->force, 0, c->kernel + 3, 2, ux, uy);
+        spread(c, s->reach, a, s->index, x, y, c->kernel + 3, 2, uz, 0);
+        spread(c, s->reach, a, s->index, s->force, 0, c->kernel + 3, 2, ux, uy);
     }
     memset(s->nodal, 0, size * sizeof(double));
     for (int k = 0; k < a; k++) {

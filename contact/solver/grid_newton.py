@@ -24,6 +24,9 @@ GAP_TOLERANCE = 1e-5
 INNER = 0.1  # residual reduction in a Newton step
 NEAR = 4.0  # spacings of nodes up to which a Newton step has the tire's compliance between them,
 MOST = 0.5  # unless what is left out is more than this share of it: then all of it
+# Where what is out of balance has grown from its least by more than this factor, the near parts of the compliance do not do: the
+# whole of it is taken in this step and those that follow.
+GROWN, WHOLLY = 10.0, 200
 PATIENT = 12  # Newton steps, before fewer points are to be found slipping where the residual does not fall
 FALLS, CAUTION, LEAST_CAUTION = 0.7, 0.1, 1e-4
 LIFT_PATIENCE = 10  # Newton steps, before a point without a bound that comes and goes is lifted by its own bristle
@@ -45,7 +48,8 @@ class GridNewton:
     P the projection on the disc of radius mu f and a the compliances of single points (Alart and Curnier, Comput. Methods
     Appl. Mech. Eng. 92 (1991) 353). The road is read anew in each Newton step, where the points have moved to.
     Residuals are exact; the linear problem of a step is solved to a tenth by GMRES with C up to some cells and A between nodes
-    near each other (all of A where it is not local: of a tire that follows its forces at once). The points of a box around those
+    near each other (all of A where it is not local, as of a tire that follows its forces at once; all of both where these
+    parts do not converge). The points of a box around those
     that touch take part; the gaps of all others are found afterwards.
 
     Where no solution of both is found in 40 steps, normal forces take the horizontal ones of the step before, and
@@ -75,6 +79,7 @@ class GridNewton:
         self.in_plane = in_plane(same_step, weights, p)
         self._box, self.index, self._inside = (0, 0, 0, 0), np.arange(0), self._whole
         self.before, self.force, self.slope = at_rest.copy(), at_rest.copy(), np.zeros((c, 2))
+        self.wholly = 0  # steps to come with the whole compliance in Newton steps
         self._compile(p)
 
     def _compile(self, p: int) -> None:
@@ -97,11 +102,13 @@ class GridNewton:
             "compliance": _FFI.gc(plane, _C.plane_end), "which": COMPILED.ints(np.empty(3 * p, np.int32)),
             "pressed": self._grid.pressed(COMPILED), "friction": self.friction.coefficient or 0.0,
         }  # fmt: skip
-        if self._near is None:
-            self._kernel["tire"] = COMPILED.doubles(self._tire.columns)
-        else:
+        everywhere = {"tire": COMPILED.doubles(self._tire.columns)}
+        self._whole_step = everywhere | {"reach": max(grid["nx"], grid["ny"])}
+        self._near_step = everywhere | {"reach": grid["near"]}
+        if self._near is not None:
             near = CompressedRows(self._near)
-            self._kernel |= {"n_begin": near.begin, "n_column": near.column, "n_value": near.value}
+            parts = {"n_begin": near.begin, "n_column": near.column, "n_value": near.value}
+            self._near_step = parts | {"reach": grid["near"]}
         self._held = up, down, grid
 
     def solve(
@@ -119,6 +126,7 @@ class GridNewton:
             raise self.friction.unsolved()
         step.within_bounds()
         self.before, self.force, self.slope = self.force, step.force, step.slope
+        self.wholly = max(self.wholly - 1, 0)
         self.friction.advance(step.force, step.bases, lags)
         return step
 
@@ -137,9 +145,10 @@ class GridNewton:
 
     def linear(
         self, at: Index, slope: Array, own: Array, beside: Array, spring: Array, direction: Array, share: Array,
-        kept: Array, caution: float, reads: bool, right: Array,
+        kept: Array, caution: float, reads: bool, whole: bool, right: Array,
     ) -> Array:  # fmt: skip
-        """The step (3, a) N of a Newton step between the points `at` (a,), to a tenth of `right` (contact.c, at_once)."""
+        """The step (3, a) N of a Newton step between the points `at` (a,), to a tenth of `right` (contact.c, at_once); with
+        the `whole` compliance, or what is near."""
         right, step = np.ascontiguousarray(right), np.zeros(right.shape)
         doubles = {
             "slope": slope,
@@ -151,7 +160,8 @@ class GridNewton:
         }
         held = {name: np.ascontiguousarray(values) for name, values in doubles.items()}
         index = at.astype(np.int32)
-        problem = _FFI.new("at_once *", self._kernel | {name: COMPILED.doubles(values) for name, values in held.items()} | {
+        compliance = self._whole_step if whole else self._near_step
+        problem = _FFI.new("at_once *", self._kernel | compliance | {name: COMPILED.doubles(values) for name, values in held.items()} | {
             "count": len(at), "index": COMPILED.ints(index), "kept": COMPILED.flags(np.ascontiguousarray(kept)), "caution": caution, "reads": reads,
         })  # fmt: skip
         _C.at_once_step(problem, COMPILED.doubles(right), INNER, COMPILED.doubles(step))
@@ -188,12 +198,13 @@ class GridNewton:
             "forces": np.stack([self.force, self.before]),
             "slope": self.slope,
             "box": np.array(self._box),
+            "wholly": np.array(self.wholly),
         }
 
     def set_state(self, state: dict[str, Array]) -> None:
         """Continue from `state`."""
         self.force, self.before = state["forces"].copy()
-        self.slope = state["slope"].copy()
+        self.slope, self.wholly = state["slope"].copy(), int(state["wholly"])
         top, bottom, left, right = state["box"].astype(int).tolist()
         if bottom:
             self._set_box((top, bottom, left, right))
@@ -240,7 +251,7 @@ class _Step:
     def settle(self, normal: bool = True, plane: bool = True) -> bool:
         """Newton steps until the forces `normal` to the road and in its `plane` are in balance, while the others stay. Whether
         40 were enough."""
-        before = np.inf
+        before, least, best = np.inf, np.inf, self.force
         for turn in range(TURNS):
             self.turns += 1
             self._evaluate()
@@ -248,6 +259,11 @@ class _Step:
                 if not self._beyond():
                     return True
                 continue  # with the points of a larger box
+            if self._rest > GROWN * least and not self._solver.wholly:
+                self._solver.wholly, self.force = WHOLLY, best.copy()
+                continue
+            if self._rest < least:
+                least, best = self._rest, self.force.copy()
             if turn >= PATIENT and self._off > max(FALLS * before, self._limit):
                 self._caution = max(CAUTION * self._caution, LEAST_CAUTION)
             before = self._off
@@ -333,6 +349,10 @@ class _Step:
         )
         self._first = self._first or self._off
         self._limit = self._brush.limit(self._first, most)
+        # Of both, over what they may be.
+        self._rest = max(
+            self.residual / GAP_TOLERANCE * normal, self._off / max(self._limit, 1e-300) * plane
+        )
         settled = not normal or self.residual <= GAP_TOLERANCE
         return settled and (not plane or self._off <= self._limit) and not self._reads
 
@@ -384,6 +404,7 @@ class _Step:
             kept,
             self._caution,
             self._reads,
+            self._solver.wholly > 0,
             right,
         )
         self.force[:, at] += step

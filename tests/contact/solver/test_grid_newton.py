@@ -97,21 +97,44 @@ def test_all_of_the_tire_and_its_neighbourhood_find_the_same(monkeypatch) -> Non
     )
 
 
-def test_the_box_grows_where_points_beyond_it_touch(monkeypatch) -> None:
-    """From a box that is too small forces are found as from one of all points."""
+@pytest.fixture
+def tight(monkeypatch) -> pytest.MonkeyPatch:
+    """Tolerances at which what is found depends on nothing but the problem."""
     monkeypatch.setattr(grid_newton, "GAP_TOLERANCE", 1e-11)
     monkeypatch.setattr(grid_newton, "READINGS", 40)
+    return monkeypatch
+
+
+def test_parts_that_do_not_converge_give_way_to_the_whole(tight) -> None:
+    """A tread without its neighbours is no approximation; the loop finds so by itself."""
+    expected = rolled(problem_of(1e-9, 1e-9), 0, STEPS)
+    few = problem_of(1e-9, 1e-9)
+    solver = few._at_once
+    assert solver is not None
+    solver._near_step = solver._near_step | {"reach": 0}
+    tight.setattr(grid_newton, "GROWN", 1.2)
+    found = rolled(few, 0, STEPS)
+    assert solver.wholly > 0
+    assert few.lagging == 0
+    assert np.abs(found - expected).max() < 1e-6 * expected.max()
+
+
+def test_the_box_grows_where_points_beyond_it_touch(tight) -> None:
+    """From a box that is too small forces are found as from one of all points."""
     beyond, grown, found = grid_newton._Step._beyond, [], []
-    monkeypatch.setattr(
+    tight.setattr(
         grid_newton._Step, "_beyond", lambda step: grown.append(beyond(step)) or grown[-1]
     )
-    for box in ((0, COUNTS[0], 0, COUNTS[1]), (10, 15, 7, 10)):
+    rows, columns = np.divmod(np.arange(COUNTS[0] * COUNTS[1]), COUNTS[1])
+    within = (rows >= 9) & (rows < 16) & (columns >= 6) & (columns < 11)
+    for box in ((0, COUNTS[0], 0, COUNTS[1]), (9, 16, 6, 11)):
         problem = problem_of(1e-9, 1e-9)
         solver = problem._at_once
         assert solver is not None
-        solver.force, solver.before = np.zeros((2, 3, len(problem.patch.points)))
+        solver.force[:, ~within] = 0.0
         solver._set_box(box)
         found.append(rolled(problem, 0, 3))
+        assert problem.lagging == 0
     assert any(grown)
     assert np.abs(found[1] - found[0]).max() < 1e-6 * found[0].max()
 
