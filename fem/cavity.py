@@ -33,9 +33,9 @@ from scipy import linalg, sparse
 from tireroad.fem import compat, kinematics
 from tireroad.fem.collective import summed
 from tireroad.fem.errors import InputError
-from tireroad.fem.gas_law import ATMOSPHERE
 from tireroad.fem.matrices.operators import Unknowns
 from tireroad.fem.tire.body import Body
+from tireroad.fem.tire.material import ATMOSPHERE
 from tireroad.fem.tire.mesh import INNER
 
 GAS_CONSTANT = 287.0  # J/(kg K), of dry air

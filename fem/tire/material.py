@@ -17,7 +17,7 @@ REFERENCE (time-temperature superposition), with the shift of Williams, Landel a
     log10 a_T = C(T) - C(T_ref),   C(T) = -17.44 (T - T_g) / (51.6 + T - T_g).
 
 The static state is loaded at the rate of LOADING and follows the same law. That rubber gets stiffer in proportion
-to its absolute temperature (14 % from 20 to 60 degrees C) is left out.
+to its absolute temperature (14 % from 20 to 60 degrees C) is left out. The air that inflates the tire follows the gas law (`warmed`).
 """
 
 from __future__ import annotations
@@ -38,6 +38,8 @@ if TYPE_CHECKING:
 DYNAMIC_FREQUENCY = (
     100.0  # Hz, at which `dynamic` and `loss_factor` hold, in the middle of 10 Hz to 1 kHz
 )
+ATMOSPHERE = 101325.0  # Pa; inflation is measured above it
+KELVIN = 273.15  # K at 0 degrees C
 REFERENCE = 20.0  # degrees C, at which compounds are given
 LOADING = 0.1  # Hz, of a load that comes in seconds
 GLASS = (
@@ -357,3 +359,16 @@ def own_moduli(
         for c, g, part in zip(kinds, growth, stored, strict=True)
     )
     return own - squares, np.divide(lost, own, out=np.zeros(len(own)), where=own > 0)
+
+
+def warmed(inflation: float, before: float, temperature: float) -> float:
+    """Inflation (Pa above the atmosphere) at a `temperature` of a tire inflated at another, degrees C, of the same volume.
+
+        p + p_0 = (p_before + p_0) T / T_before
+
+    A tire without inflation is open and stays without; none gets emptier than that.
+    """
+    if not inflation:
+        return inflation
+    ratio = (temperature + KELVIN) / (before + KELVIN)
+    return max(ratio * (inflation + ATMOSPHERE) - ATMOSPHERE, 0.0)

@@ -9,8 +9,8 @@ import h5py
 import numpy as np
 
 from tireroad.fem.cavity import Duct
-from tireroad.fem.gas_law import KELVIN
 from tireroad.fem.model import SmallMotions
+from tireroad.fem.tire.material import KELVIN
 from tireroad.modal.basis import Air, ModalBasis
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put

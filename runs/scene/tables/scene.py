@@ -12,9 +12,8 @@ from tireroad.contact.choices import USABLE
 from tireroad.contact.roads.road import ROADS, RoadKind
 from tireroad.contact.roads.under_tire import Motion, Placement
 from tireroad.fem.errors import InputError
-from tireroad.fem.gas_law import warmed
 from tireroad.fem.parameters import Key, Limits, OnlyFor, described, finite, parameter, text
-from tireroad.fem.tire.material import COLDEST, REFERENCE
+from tireroad.fem.tire.material import COLDEST, REFERENCE, warmed
 from tireroad.fem.wheel import DIRECTIONS, SHAPE_TOLERANCE, Axle
 from tireroad.greens.residuals import RESIDUALS, names
 from tireroad.runs.scene.outputs import OUTPUTS, Output

@@ -5,7 +5,6 @@ import pytest
 from scipy import integrate
 
 from tireroad.fem.errors import InputError
-from tireroad.fem.gas_law import warmed
 from tireroad.fem.tire.material import (
     LOADING,
     compound,
@@ -13,6 +12,7 @@ from tireroad.fem.tire.material import (
     power_law,
     prony,
     shore_a,
+    warmed,
     wlf,
 )
 
