@@ -21,7 +21,7 @@ from tireroad.contact.solver.active_set import COMPILED
 from tireroad.contact.solver.conditions import Array, ContactSolver, Mask
 from tireroad.contact.solver.grid_newton import GridNewton
 from tireroad.contact.solver.projected_cg import ProjectedCG
-from tireroad.contact.solver.stick_slip import BrushFriction, CompressedRows, in_plane
+from tireroad.contact.solver.stick_slip import BrushFriction, CompressedRows
 from tireroad.contact.tread.memory import TreadMemory
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.greens.recursion import LoadedColumns, ahead_of_mean
@@ -443,7 +443,7 @@ class ContactProblem:
                 np.zeros(c),
             )
         if self.components == 3:
-            self._in_plane = in_plane(same_step, weights, p)
+            self._in_plane = _in_plane(same_step, weights, p)
         doubles = {
             "gap0": np.ascontiguousarray(patch.gap), "at_rest": np.ascontiguousarray(patch.force), "q": self._q,
             "free": self._free, "vertical": self.vertical, "horizontal": self.horizontal, "change": self.at_points,
@@ -612,6 +612,13 @@ class ContactProblem:
         if self.components == 3:
             self._solution[:], self._before[:] = state["met"]
             self.solutions, self.unsettled = (int(count) for count in state["meetings"])
+
+
+def _in_plane(same_step: Array, weights: sparse.csr_matrix, p: int) -> Array:
+    """Compliance (c,) m/N in the plane of each point of the tire under its own force, the mean of both directions."""
+    blocks = (same_step[d * p : (d + 1) * p, d * p : (d + 1) * p] for d in (1, 2))
+    x, y = (np.asarray(weights.multiply(weights @ block).sum(axis=1)).ravel() for block in blocks)
+    return 0.5 * (x + y)
 
 
 class Mixed:

@@ -189,8 +189,8 @@ def _cache_options(cache: argparse.ArgumentParser) -> None:
     )
 
 
-def _bench_options(bench: argparse.ArgumentParser) -> None:
-    bench.add_argument("names", nargs="*", metavar="NAME", help="all by default")
+def _bench_options(bench: argparse.ArgumentParser, names: str = "all by default") -> None:
+    bench.add_argument("names", nargs="*", metavar="NAME", help=names)
     bench.add_argument(
         "--out", type=Path, metavar="FILE.json", help="results, with a page beside them"
     )
@@ -211,14 +211,9 @@ def _reproduce_options(reproduce: argparse.ArgumentParser) -> None:
 
 
 def _validate_options(validate: argparse.ArgumentParser) -> None:
-    validate.add_argument(
-        "names",
-        nargs="*",
-        metavar="NAME",
-        help="all by default; or a SCENE.toml of your own, which is run against full finite elements in time",
-    )
-    validate.add_argument(
-        "--out", type=Path, metavar="FILE.json", help="results, with a page beside them"
+    _bench_options(
+        validate,
+        "all by default; or a SCENE.toml of your own, which is run against full finite elements in time",
     )
     validate.add_argument(
         "--large", action="store_true", help="on meshes of full size: hours, not minutes"

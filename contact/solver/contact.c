@@ -124,7 +124,6 @@ typedef struct {
     double *nodal, *nodes, *value;        /* workspace: (3p,) each */
     int *which;
     double *force, *field;                /* workspace: (a,), three fields on the grid */
-    long products;
 } at_once;
 
 int at_once_step(at_once *s, const double *right, double tolerance, double *step);
@@ -1126,7 +1125,6 @@ static int both(void *of, const double *given, double *out) {
     const double *f = given, *x = given + a, *y = given + 2 * a, *n = s->direction;
     const double *const pressed[] = {s->pressed, s->pressed};
     double *uz = s->field, *ux = uz + cells(c), *uy = ux + cells(c);
-    s->products++;
     memset(s->field, 0, 3 * cells(c) * sizeof(double));
     spread(c, s->reach, a, s->index, f, 0, pressed, 1, uz, 0);
     spread(c, s->reach, a, s->index, x, y, c->kernel, 3, ux, uy);

@@ -12,7 +12,7 @@ from tireroad.contact.patch import Patch
 from tireroad.contact.solver.active_set import COMPILED
 from tireroad.contact.solver.conditions import Array, Index, Mask, check_residual, penetration
 from tireroad.contact.solver.projected_cg import ProjectedCG
-from tireroad.contact.solver.stick_slip import TURNS, BrushFriction, CompressedRows, in_plane
+from tireroad.contact.solver.stick_slip import TURNS, BrushFriction, CompressedRows
 from tireroad.contact.tread.kernel import Box
 from tireroad.contact.tread.shear import GridTread, KernelShear
 from tireroad.greens.recursion import LoadedColumns
@@ -76,7 +76,6 @@ class GridNewton:
         self._constant = np.concatenate([self._whole(at_rest)[:1], self._whole(pressed)[1:]])
         self._tire = LoadedColumns(same_step)
         self._near = _near(same_step, _positions(weights, patch.points[:, :2]))
-        self.in_plane = in_plane(same_step, weights, p)
         self._box, self.index, self._inside = (0, 0, 0, 0), np.arange(0), self._whole
         self.before, self.force, self.slope = at_rest.copy(), at_rest.copy(), np.zeros((c, 2))
         self.wholly = 0  # steps to come with the whole compliance in Newton steps

@@ -182,13 +182,6 @@ def stick_slip(
     return force.T.copy()
 
 
-def in_plane(same_step: Array, weights: sparse.csr_matrix, p: int) -> Array:
-    """Compliance (c,) m/N in the plane of each point of the tire under its own force, the mean of both directions."""
-    blocks = (same_step[d * p : (d + 1) * p, d * p : (d + 1) * p] for d in (1, 2))
-    x, y = (np.asarray(weights.multiply(weights @ block).sum(axis=1)).ravel() for block in blocks)
-    return 0.5 * (x + y)
-
-
 class BrushFriction:
     """The brush on a tire with same-step response `tire` (3p, 3p) m/N in z, x, y of the nodes.
 
