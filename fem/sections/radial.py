@@ -86,6 +86,7 @@ BELT_2 = 0.9  # its width over that of belt 1, which ends at the edge of the cro
 GROOVES, MOST_GROOVES = 4, 8  # around the tread
 GROOVED = "tread"  # the compound that they cut
 GROOVE = 0.07  # width of each over that of the crown: 9.3 mm for 205/60 R15
+TREAD_DEPTH = 8.0  # mm, of the tread and its grooves at the crown
 LEAST_HEIGHT = 0.057  # m of a section; less leaves no sidewall above the flange
 
 
@@ -261,6 +262,18 @@ def land(grooves: int) -> float:
     return 1 - GROOVE * grooves
 
 
+def grooves_of(text: str, grooves: int) -> list[tuple[float, float, float]]:
+    """Middle y, width and depth (m) of the circumferential grooves of a size, between ribs of equal width.
+
+    Raises InputError for an invalid size.
+    """
+    half = _flat(size(text))
+    width = 2 * half * GROOVE
+    rib = (2 * half - grooves * width) / (grooves + 1)
+    first = -half + rib + width / 2
+    return [(first + k * (rib + width), width, 1e-3 * TREAD_DEPTH) for k in range(grooves)]
+
+
 def rubber(name: str) -> dict[str, float]:
     """Values by name of a compound."""
     names = ("youngs_modulus", "poisson_ratio", "density", "dynamic", "loss_factor", "exponent")
@@ -293,7 +306,7 @@ def _layers(at: _Stations) -> tuple[Layer, ...]:
         return Layer(name, compound, tuple(zip(places, np.multiply(1e-3, values), strict=True)))
 
     return (
-        layer("tread", "tread", 8.0, 8.0, 8.0, 7.0, 1.7, 2.0, 2.8, 3.0),
+        layer("tread", "tread", *3 * (TREAD_DEPTH,), 7.0, 1.7, 2.0, 2.8, 3.0),
         layer("belt skim", "skim", 1.3, 1.3, 1.8, 1.8, 0.6, 1.4, 1.8, 2.0),
         layer("belt base", "skim", 1.5, 1.6, 3.0, 4.0, 1.0, 3.0, 5.5, 9.0),
         layer("carcass", "ply", 2.0, 2.0, 2.0, 2.0, 1.7, 1.6, 1.9, 2.0),

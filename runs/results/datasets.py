@@ -314,6 +314,8 @@ DATASETS: Mapping[str, tuple[Dataset, ...]] = {
             ("third_octave/level_a", "k, b", "dB(A) re 20 uPa", "the same, A-weighted"),
             ("third_octave/level_error", "k, b", "dB", "its estimated error; NaN where unknown"),
             ("third_octave/element_error", "k, b", "dB", "the part of it that the boundary elements have"),
+            ("third_octave/vibration_level", "k, b", "dB re 20 uPa", "level of the tire's vibrations alone"),
+            ("third_octave/air_level", "k, b", "dB re 20 uPa", "level of the air squeezed out of the footprint alone; NaN without it"),
             ("third_octave/intensity_level_a", "i, b", "dB(A) re 1 pW/m2", "A-weighted intensity level of each probe, outward; NaN where the intensity is inward"),
             ("intensity", "i, f", "W/m2", "outward active intensity at the intensity probes (attribute `names`), Hann window"),
             ("intensity_index", "i, b", "dB", "pressure-intensity index of the probes in third octaves"),

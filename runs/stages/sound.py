@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -28,6 +28,7 @@ from tireroad.greens.tire_sound import (
 from tireroad.modal.corner import BODY, SEEN
 from tireroad.runs.files.store import dataset, put, read_fields, write_fields
 from tireroad.runs.scene.tables.sound import SoundTable
+from tireroad.runs.stages.footprint_air import LeavingAir
 from tireroad.runs.stages.spectra import Spectra
 from tireroad.runs.stages.stage import Computed, Record, Result
 from tireroad.runs.stages.vibration import HANN, POWER, decibels
@@ -119,7 +120,10 @@ class RadiationStage(Computed[Paths]):
     """Once for a tire, load and speed: the same on every road."""
 
     name: ClassVar[str] = "radiation"
-    reads: ClassVar[tuple[str, ...]] = ("sound", "heard_up_to")
+    reads: ClassVar[tuple[str, ...]] = (
+        *(f"sound.{item.name}" for item in fields(SoundTable) if item.name != "air"),
+        "heard_up_to",
+    )
     static: Result[StaticState]
 
     @property
@@ -215,12 +219,14 @@ def sounding(
 
 @dataclass(frozen=True, kw_only=True)
 class SoundPressure:
-    """Sound pressure of the vibrations of a run at k microphones, up to the limit of the model.
+    """Sound pressure of a run at k microphones, up to the limit of the model.
 
     `names` and `places` (k, 3) m; `frequency` (f,) Hz, `pressure` (k, f) Pa: complex amplitudes
     for e^{+iwt}, from a Hann window; `centre` (b,) Hz with the third-octave `level` (k, b) dB re
     20 uPa, A-weighted `weighted` (k, b), its `error` (k, b) dB, NaN where that of the vibration is
-    unknown, and `of_elements` (k, b) dB, what of it is of the boundary elements; the sound power
+    unknown, or where most of the sound is that of air squeezed out of the footprint, and `of_elements` (k, b) dB, what of it is of
+    the boundary elements; `of_vibration` and `of_air` (k, b) dB re 20 uPa: levels of the tire's vibrations alone, and of that air
+    alone, NaN without it; the sound power
     `power` (b,) dB re 1 pW and the `efficiency` (b,) of radiation; `total`, `total_weighted` (k,) and
     `total_power`, its A-weighted value second, (2,): of all lines; `total_error`,
     `total_weighted_error` (k,) dB, NaN where bands of unknown error hold more than a tenth of it;
@@ -243,6 +249,8 @@ class SoundPressure:
     weighted: np.ndarray = dataset("dB(A) re 20 uPa", "third_octave/level_a")
     error: np.ndarray = dataset("dB", "third_octave/level_error")
     of_elements: np.ndarray = dataset("dB", "third_octave/element_error")
+    of_vibration: np.ndarray = dataset("dB re 20 uPa", "third_octave/vibration_level")
+    of_air: np.ndarray = dataset("dB re 20 uPa", "third_octave/air_level")
     power: np.ndarray = dataset("dB re 1 pW")
     efficiency: np.ndarray = dataset("-")
     total: np.ndarray = dataset("dB re 20 uPa", "total/level")
@@ -271,6 +279,7 @@ class SoundStage(WholeTire[SoundPressure]):
 
     name: ClassVar[str] = "sound"
     radiation: Result[Paths]
+    reads: ClassVar[tuple[str, ...]] = (*WholeTire.reads, "sound.air")
     lines: Result[Lines | None]
     spectra: Result[Spectra] | None = None
 
@@ -289,24 +298,56 @@ class SoundStage(WholeTire[SoundPressure]):
             )
         basis = Basis.of(self.rotating.product)
         shape, rigid = basis.face(len(state.points)), wheel_motion(basis)
+        lines = replace(
+            lines,
+            frequency=lines.frequency[below],
+            amplitude=lines.amplitude[below],
+            spectrum=lines.spectrum[below],
+        )
         with record.timing("elements"):
-            tire = sounding(state, table, paths.size)
-            volumes = tire.volumes(shape, rigid)
-            rough = sounding(state, table, paths.size, COARSER).volumes(shape, rigid)
-        heard = Heard(
+            tire, rough = (sounding(state, table, paths.size, by) for by in (1.0, COARSER))
+            volumes, coarse = (one.volumes(shape, rigid) for one in (tire, rough))
+        vibration = Heard(
             paths=paths,
             tire=tire,
-            frequency=lines.frequency[below],
-            volume=volumes @ lines.amplitude[below].T,
-            rough=rough @ lines.amplitude[below].T,
+            frequency=lines.frequency,
+            volume=volumes @ lines.amplitude.T,
+            rough=coarse @ lines.amplitude.T,
         )
+        heard, over_time = vibration, volumes @ lines.spectrum.T
+        if (air := self._air(record, lines)) is not None:
+            with record.timing("air of the footprint"):
+                amplitude, spectrum = air.volumes(tire, state, lines.frequency)
+                rougher, _ = air.volumes(rough, state, lines.frequency)
+            heard = replace(
+                vibration,
+                volume=vibration.volume + amplitude,
+                rough=vibration.rough + rougher,
+            )
+            over_time = over_time + spectrum
         with record.timing("pressure"):
-            parts = _sound(heard, self._errors, volumes @ lines.spectrum[below].T, lines.duration)
-            normal = _normal_velocity(tire, shape, lines.amplitude[below], heard.frequency)
-            efficiency = heard.efficiency(normal)
+            parts = _sound(heard, vibration, self._errors, over_time, lines.duration)
+            normal = _normal_velocity(tire, shape, lines.amplitude, lines.frequency)
+            efficiency = vibration.efficiency(normal)
         pressure = SoundPressure(efficiency=efficiency, **parts)
         _describe(record, pressure)
         return pressure
+
+    def _air(self, record: Record, lines: Lines) -> LeavingAir | None:
+        """The air squeezed out of the footprint; None where it is not asked for or not known."""
+        table, setup = self.job.scene.sound, self.setup.product
+        assert table is not None, "the stage runs with [sound] only"
+        if not table.air or self.contact is None or setup is None:
+            return None
+        with record.timing("air of the footprint"):
+            found = LeavingAir.of(self.job, setup, lines, self.radiation.product.near.air)
+        if found is None:
+            record.notes.append(
+                "the air squeezed out of the footprint is not in the sound: that needs contact points on a grid (contact.points) on a plane"
+            )
+            return None
+        record.indicators["mean gap in the footprint"] = (found.height, "m")
+        return found
 
     @cached_property
     def _errors(self) -> tuple[np.ndarray, np.ndarray]:
@@ -426,9 +467,16 @@ def _normal_velocity(
 
 
 def _sound(
-    heard: Heard, of_vibration: tuple[np.ndarray, np.ndarray], volume: np.ndarray, duration: float
+    heard: Heard,
+    vibration: Heard,
+    of_vibration: tuple[np.ndarray, np.ndarray],
+    volume: np.ndarray,
+    duration: float,
 ) -> dict[str, Any]:
-    """The fields of Sound but the efficiency; `volume` (e, f): of the record over time."""
+    """The fields of SoundPressure but the efficiency; `volume` (e, f): of the record over time.
+
+    `vibration`: what of all that is `heard` the tire's face makes.
+    """
     paths, frequency = heard.paths, heard.frequency
     ears = 10 ** (a_weighting(frequency) / 10)
     square = (np.abs(heard.pressure) ** 2 / 2).T
@@ -438,7 +486,13 @@ def _sound(
     _, power = heard.bands(heard.power)
     _, away = heard.bands((np.abs(heard.far) ** 2 / 2).T)
     elements = _of_elements(paths, centre, 10 * np.log10(coarse / band))
+    _, alone = heard.bands((np.abs(vibration.pressure) ** 2 / 2).T)
+    level, air = decibels(alone, PRESSURE**2).T, np.full(alone.T.shape, np.nan)
     error = np.hypot(elements, _of_vibration(centre, *of_vibration))
+    if heard is not vibration:
+        _, rest = heard.bands((np.abs(heard.pressure - vibration.pressure) ** 2 / 2).T)
+        air = decibels(rest, PRESSURE**2).T
+        error = np.where(air > level, np.nan, error)
     every, every_weighted = (part.sum(axis=0) / HANN for part in (square, square * ears[:, None]))
     share, shares = _shares(heard)
     elevation, azimuth = angles()
@@ -454,6 +508,8 @@ def _sound(
         "weighted": decibels(weighted, PRESSURE**2).T,
         "error": error,
         "of_elements": elements,
+        "of_vibration": level,
+        "of_air": air,
         "power": decibels(power, POWER),
         "total": decibels(every, PRESSURE**2),
         "total_weighted": decibels(every_weighted, PRESSURE**2),

@@ -188,16 +188,27 @@ def _lines(basis: Basis, forces: PatchForces, left_out: float, top: float) -> Li
             f"the {top:.4g} Hz to which the modes are an answer; raise time.duration or modal.count"
         )
     moved = replayed(basis, forces, steps)
-    moved -= moved.mean(axis=0)
-    some = [slice(k, k + _AT_ONCE) for k in range(0, moved.shape[1], _AT_ONCE)]
-    faded = signal.windows.tukey(len(steps), 2 * FADE)[:, None]
+    amplitude, spectrum = transformed(moved, forces.step, below)
     return Lines(
         frequency=frequency[below],
-        amplitude=np.hstack([amplitudes(moved[:, part], forces.step)[1][below] for part in some]),
-        spectrum=np.hstack([np.fft.rfft(faded * moved[:, part], axis=0)[below] for part in some])
-        / len(steps),
+        amplitude=amplitude,
+        spectrum=spectrum,
         duration=len(steps) * forces.step,
     )
+
+
+def transformed(
+    values: np.ndarray, step: float, wanted: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Amplitude and spectrum (f, d), as those of `Lines`, of values (n, d) at the `wanted` lines (mask or numbers)."""
+    faded = signal.windows.tukey(len(values), 2 * FADE)[:, None]
+    amplitude, spectrum = [], []
+    for k in range(0, values.shape[1], _AT_ONCE):
+        part = values[:, k : k + _AT_ONCE]
+        part = part - part.mean(axis=0)
+        amplitude.append(amplitudes(part, step)[1][wanted])
+        spectrum.append(np.fft.rfft(faded * part, axis=0)[wanted] / len(values))
+    return np.hstack(amplitude), np.hstack(spectrum)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -27,17 +27,18 @@ from tireroad.runs.results.wave import LISTEN, joined, wave_file
 
 FILE = "sound.h5"
 _CHARTED = 4  # microphones in one chart of bars
-_LIMITS = (
-    "Sound of the tire's vibrations alone: no air pumping, no resonances of grooves, no car; the contact's own local "
-    "flexibility is left out. A rolling tire heard outdoors has those on top, most above 800 Hz."
-)
+_LIMITS = "Sound of the tire's vibrations{air}: no lateral grooves, no car; the contact's own local flexibility is left out."
+_WITH_AIR = ", and of the air that tread and road squeeze out of the footprint, over its edge and through the grooves around the tire"
+_ALONE = " alone, without the air that tread and road squeeze out of the footprint, which is heard most from 800 Hz on"
 
 
 def sound(results: Results) -> Section:
     """Levels at the microphones, sound power, directivity, and which part of the tire is heard."""
     names = [str(name) for name in results.dataset(FILE, "microphones").attrs["names"]]
     frequency = results.array(FILE, "frequency")
-    section = Section("Sound beside the tire", _LIMITS)
+    air = results.optional(FILE, "third_octave/air_level")
+    heard = air is not None and np.isfinite(air).any()
+    section = Section("Sound beside the tire", _LIMITS.format(air=_WITH_AIR if heard else _ALONE))
     band = f"{digits(float(frequency[0]))} to {digits(float(frequency[-1]))} Hz"
     columns = [names]
     for key in ("level", "level_a"):
@@ -62,6 +63,8 @@ def sound(results: Results) -> Section:
         section.notes.append("Too few third-octave bands for charts: lengthen time.duration.")
         return section
     _bands(results, section, names, centre)
+    if heard:
+        _sources(results, section, names[0], centre)
     _power(results, section, centre)
     loudest = int(results.array(FILE, "third_octave/level_a")[0].argmax())
     section.show(
@@ -139,6 +142,31 @@ def _bands(results: Results, section: Section, names: list[str], centre: NDArray
             caption,
             drawn,
         )
+
+
+def _sources(results: Results, section: Section, name: str, centre: NDArray) -> None:
+    """Levels of the vibrations and of the squeezed air at the first microphone."""
+    keys = {"vibrations": "vibration_level", "air of the footprint": "air_level"}
+    level = np.stack(
+        [results.array(FILE, f"third_octave/{key}")[0] for key in keys.values()], axis=1
+    )
+    few, unknown = np.zeros(len(centre), bool), np.full(level.shape, np.nan)
+    label = "sound pressure level in dB re 20 µPa"
+    drawn = live.bars(
+        [f"{c:g}" for c in nominal(centre)],
+        {one: (level[:, k], unknown[:, k]) for k, one in enumerate(keys)},
+        ("third-octave band in Hz", label),
+        CYCLE[: len(keys)],
+        ends=level_range(level),
+        few=few,
+    )
+    section.show(
+        third_octaves(centre, level, None, label, few, list(keys)),
+        f"The same at {name} by source, not weighted: the tire's vibrations alone, and the air squeezed out of the footprint alone. Both move "
+        "together where the tread's own motion squeezes the air, so that levels of both do not add as powers. Where the air is the louder, "
+        "the error of the sum is unknown.",
+        drawn,
+    )
 
 
 def _power(results: Results, section: Section, centre: NDArray) -> None:

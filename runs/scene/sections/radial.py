@@ -177,6 +177,12 @@ class RadialSection(SectionKind):
 
         return land(self.grooves)
 
+    @property
+    def grooves_around(self) -> list[tuple[float, float, float]]:
+        from tireroad.fem.sections.radial import grooves_of
+
+        return grooves_of(self.size, self.grooves)
+
     def tread_over_own(self, tire: TireTable, temperature: float) -> float:
         from tireroad.fem.sections.radial import GROOVED
 

@@ -724,7 +724,9 @@ class Scene:
     time: TimeTable | None = table(TimeTable, "the run in time", optional=True)
     accuracy: AccuracyTable = table(AccuracyTable, "error bars, and the search for settings")
     sound: SoundTable | None = table(
-        SoundTable, "sound pressure at microphones, of the tire's vibrations alone", optional=True
+        SoundTable,
+        "sound pressure at microphones, of the tire's vibrations and of the air squeezed out of its footprint",
+        optional=True,
     )
     output: OutputTable = table(OutputTable, "what is computed and kept")
 

@@ -5,7 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from tireroad.fem.parameters import Key, Limits, choice, described, finite, number, parameter
+from tireroad.fem.parameters import (
+    Key,
+    Limits,
+    choice,
+    described,
+    finite,
+    flag,
+    number,
+    parameter,
+)
 from tireroad.greens.absorbing_road import PorousLayer
 from tireroad.runs.scene.schema import table
 
@@ -77,6 +86,11 @@ class SoundTable:
         "height of the contact over the acoustic plane: a gap that texture and grooves leave",
         least=0,
         most=0.02,
+    )
+    air: bool = flag(
+        True,
+        "with the air that tread and texture squeeze out of the footprint, over its edge and through the grooves around the tire; "
+        "false: the vibrations alone. Of contact points on a grid only",
     )
     road: PorousLayer | None = table(
         PorousLayer, "a road that absorbs: a porous layer; absent: rigid", optional=True

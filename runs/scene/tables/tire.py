@@ -151,6 +151,11 @@ class SectionKind(Parameters):
         """Share of the tread's face that the grooves spread over it leave."""
         return 1.0
 
+    @property
+    def grooves_around(self) -> list[tuple[float, float, float]]:
+        """Middle y, width and depth (m) of these grooves."""
+        return []
+
     def cords(self, tire: TireTable) -> list[Cords]:
         """The cords on the plies of the section."""
         raise NotImplementedError

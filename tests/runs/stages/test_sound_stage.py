@@ -15,7 +15,9 @@ from scipy.interpolate import CubicSpline
 from tires import soft_torus
 
 import tireroad
-from tireroad.contact.results.spectra import a_weighting
+from tireroad.contact.results.spectra import a_weighting, amplitudes
+from tireroad.contact.results.squeezed_air import FootprintCells, squeezed
+from tireroad.contact.tread.kernel import GridPlaces
 from tireroad.greens.outputs import Surface
 from tireroad.greens.tire_sound import directions
 from tireroad.runs.pipeline import run_scene
@@ -51,6 +53,7 @@ estimate = false
 [sound]
 microphones = ["cpx", [3.0, 1.0, 1.0]]
 up_to = 150.0
+air = false
 """
 )
 
@@ -289,3 +292,51 @@ def test_the_vibration_errs_as_the_contact_force_and_the_axle_force() -> None:
     np.testing.assert_allclose(SoundStage._errors.func(stage)[1], [3.0, np.nan])
     found.contact_level_error = None
     assert not len(SoundStage._errors.func(stage)[0])
+
+
+def test_air_of_the_footprint_is_heard_beside_the_vibration(tmp_path: Path) -> None:
+    """The vibration stays as it is; far below resonance the air is p = i w rho Q times the mean of g beside the contact."""
+    results, with_air = run(tmp_path / "without"), run(tmp_path / "with", "sound.air=true")
+    assert np.isnan(results["sound/third_octave/air_level"]).all()
+    vibration = with_air["sound/third_octave/vibration_level"]
+    assert np.allclose(vibration, results["sound/third_octave/level"], atol=1e-9)
+    assert np.array_equal(results["sound/efficiency"], with_air["sound/efficiency"])
+    frequency, rest = (
+        with_air["sound/frequency"],
+        with_air["sound/pressure"] - results["sound/pressure"],
+    )
+    cells = FootprintCells.of(_places(with_air), with_air["contact/static_force"])
+    step = float(with_air["contact/time"][1] - with_air["contact/time"][0])
+    speed = float(with_air.attributes("contact")["road_speed"])
+    ones = np.ones((1, len(cells.cell)))
+    gaps = with_air["contact/gap"]
+    first = len(gaps) - round(1 / (frequency[1] - frequency[0]) / step)
+    air = squeezed(cells, [gaps[first:]], ones, speed, step)
+    late = frequency * air.over
+    lines = np.rint(frequency * step * len(air.rate)).astype(int)
+    flow = amplitudes(air.rate, step)[1][lines, 0] * np.exp(1j * np.pi * late) / np.sinc(late)
+    # The lowest free nodes beside the contact; over a footprint of centimetres g hardly changes at 100 Hz.
+    static = with_air["static/surface/points"] + with_air["static/surface/displacement"]
+    touching = with_air["static/surface/force"] > 0
+    low = static[~touching][:, 2] < static[touching][:, 2].max() + 5e-3
+    weight = with_air["sound/transfer/weight"][:, :, np.flatnonzero(~touching)[low]].mean(axis=2)
+    solved = with_air["sound/transfer/frequency"]
+    near = np.stack([np.interp(frequency, solved, np.abs(one)) for one in weight.T])
+    loud = np.abs(rest[0]) > 0.1 * np.abs(rest[0]).max()
+    assert loud.sum() > 5
+    assert np.abs(rest)[:, loud] == pytest.approx((near * np.abs(flow))[:, loud], rel=0.25)
+
+
+def _places(run: tireroad.RunResults) -> GridPlaces:
+    points = run["contact/points"][:, :2]
+    spacing = [float(np.diff(np.unique(one.round(9))).min()) for one in points.T]
+    row, column = np.rint((points - points.min(axis=0)) / spacing).astype(int).T
+    shape = int(row.max() + 1), int(column.max() + 1)
+    return GridPlaces(shape, (spacing[0], spacing[1]), row * shape[1] + column)
+
+
+def test_contact_points_at_nodes_have_no_air_and_say_so(tmp_path: Path) -> None:
+    found = run(tmp_path / "nodes", "sound.air=true", 'contact.points="nodes"')
+    assert np.isnan(found["sound/third_octave/air_level"]).all()
+    notes = " ".join(found.summary["sound"].get("notes", []))
+    assert "contact.points" in notes

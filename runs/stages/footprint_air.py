@@ -1,0 +1,89 @@
+"""The air that a run squeezes out of the footprint, over frequency."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import h5py
+import numpy as np
+
+from tireroad.contact.results.squeezed_air import FootprintCells, squeezed
+from tireroad.contact.setup import ContactSetup
+from tireroad.fem.static.state import StaticState
+from tireroad.greens.footprint_air import Groove, Outlets, on_elements
+from tireroad.greens.tire_sound import SoundAir, SoundingTire, road_axes
+from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.stages.stage import Job
+from tireroad.runs.stages.whole_tire import Lines, transformed
+
+Array = np.ndarray
+_ROWS = 512  # steps read at a time
+
+
+def grooves(scene: Scene) -> list[Groove]:
+    """The circumferential grooves of the scene's tread: of [pattern], or those of the section itself."""
+    if scene.pattern is None:
+        return [Groove(*one) for one in scene.tire.shape.grooves_around]
+    around = (g for g in scene.pattern.groove if g.direction == "circumferential")
+    return [Groove(g.position, g.width, g.depth) for g in around]
+
+
+@dataclass(frozen=True)
+class LeavingAir:
+    """Volume velocities that leave a footprint at the `places` (o, 2) m of the road, over the lines (f,) of a run.
+
+    `amplitude` and `spectrum` (o, f) m3/s: as those of runs.stages.whole_tire.Lines; `height` (m): mean gap in the footprint.
+    """
+
+    places: Array
+    amplitude: Array
+    spectrum: Array
+    height: float
+
+    @staticmethod
+    def of(job: Job, setup: ContactSetup, lines: Lines, air: SoundAir) -> LeavingAir | None:
+        """From the gaps in contact.h5; None of contact points that are no grid on a plane. Root process only."""
+        patch = setup.patch
+        if patch.places is None or patch.frames is not None:
+            return None
+        with h5py.File(job.path("contact")) as file:
+            cells = FootprintCells.of(patch.places, file["static_force"][:])
+            if not len(cells.cell):
+                return None
+            outlets = Outlets.of(cells.inside, cells.cell, *_grid(setup), grooves(job.scene))
+            step, speed = float(file.attrs["step"]), float(file.attrs["road_speed"])
+            first = len(file["time"]) - round(lines.duration / step)
+            found = squeezed(cells, _gaps(file["gap"], first), outlets.sums, speed, step)
+        numbers = np.rint(lines.frequency * lines.duration).astype(int)
+        # What is known is the mean over a time before each instant.
+        late = lines.frequency * found.over
+        true = np.exp(1j * np.pi * late) / np.sinc(np.minimum(late, 0.5))
+        amplitude, spectrum = (
+            outlets.leaving((part * true[:, None]).T, lines.frequency, found.height, air)
+            for part in transformed(found.rate, step, numbers)
+        )
+        return LeavingAir(outlets.places, amplitude, spectrum, found.height)
+
+    def volumes(self, tire: SoundingTire, state: StaticState, frequency: Array) -> Array:
+        """Displaced volumes (2, e, f) m3 of the tire's elements that sound as this air does: amplitude and spectrum."""
+        axes, height = road_axes(state)
+        face = state.positions @ axes.T + [0.0, 0.0, height]
+        shares = on_elements(tire, face, self.places)
+        rate = 2j * np.pi * frequency
+        return np.stack([shares @ part / rate for part in (self.amplitude, self.spectrum)])
+
+
+def _grid(setup: ContactSetup) -> tuple[Array, Array]:
+    """x and y (m) of the rows and columns of the grid of contact points."""
+    places = setup.patch.places
+    assert places is not None, "contact points on a grid"
+    cell = np.divmod(places.place, places.shape[1])
+    known = zip(places.shape, places.spacing, cell, setup.patch.points.T[:2], strict=True)
+    x, y = (at[0] + apart * (np.arange(count) - number[0]) for count, apart, number, at in known)
+    return x, y
+
+
+def _gaps(dataset: h5py.Dataset, first: int) -> Iterator[Array]:
+    for start in range(first, len(dataset), _ROWS):
+        yield dataset[start : start + _ROWS]
