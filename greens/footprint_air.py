@@ -6,7 +6,9 @@ section A is a line
 
     dp/dx = -i w rho_g / A U,    dU/dx = q - (i w A / K_g + 2 Y) p,
 
-between ends of the impedance of a flanged pipe, (rho c / A) [(ka)^2/2 + 0.8217 i ka], a = (A/pi)^1/2 [Norris and Sheng 1989, low ka].
+between ends that have the inertia of a flanged pipe's, i w rho 0.8217 a / A, a = (A/pi)^1/2 [Norris and Sheng 1989, low ka], and radiate
+against the resistance that the tire over the road gives them, their own and with each other (`radiation_resistance`): on a plane that is
+the flanged pipe's, (rho c / A) (ka)^2/2; between tread and road, at 1 kHz, ten times as much and more.
 rho_g and K_g are those of a tube of the groove's hydraulic radius with viscous and thermal losses at its wall [Zwikker and Kosten 1949].
 The texture on either side is a slit of the mean gap h, closed at its far end a distance b away: of the wave number kappa in it
 
@@ -23,9 +25,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse, special
+from scipy import interpolate, sparse, special
 
-from tireroad.greens.tire_sound import SoundAir, SoundingTire
+from tireroad.greens.tire_sound import FAR, SoundAir, SoundingTire, Transfer, directions
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -108,38 +110,57 @@ def reaching(reach: float, height: float, frequency: Array, air: SoundAir) -> Co
     return found
 
 
-def to_ends(
-    groove: Groove,
-    length: float,
-    stations: Array,
-    frequency: Array,
-    air: SoundAir,
-    beside: Complex | float = 0.0,
-) -> Complex:
-    """Volume velocities (2, f, s) out of the rear and the front end of a groove per unit of them at `stations` (s,) m from the rear.
+@dataclass(frozen=True)
+class Line:
+    """A groove between its rear and its front end, over frequencies.
 
-    `length` m; `beside` (f,) m4 s/kg: 2 Y, admittance of what opens into the groove per metre. Source: the line's
-    equations (module), solved for a volume velocity at one place.
+    `shorted` (2, f, s): volume velocities out of the ends per unit at the stations, without pressure at the ends; `admittance` (2, 2,
+    f) m4 s/kg: by which pressures at the ends reduce them.
     """
-    omega, area = 2 * np.pi * frequency, groove.area
-    medium = Medium.in_tube(groove.hydraulic_radius, frequency, air)
-    along = 1j * omega * medium.density / area
-    across = 1j * omega * area / medium.modulus + beside
-    rate, impedance = np.sqrt(along * across), np.sqrt(along / across)
-    radius = np.sqrt(area / np.pi)
-    ka = omega / air.speed * radius
-    end = air.impedance / area * (ka**2 / 2 + 1j * FLANGED * ka)
-    share = (end / impedance)[:, None]
 
-    def side(distance: Array) -> tuple[Complex, Complex]:
-        """Input impedance at a place so far from an end, and the volume velocity at the end over that there."""
-        at = rate[:, None] * distance
-        through = np.cosh(at) + share * np.sinh(at)
-        return impedance[:, None] * (share * np.cosh(at) + np.sinh(at)) / through, 1 / through
+    shorted: Complex
+    admittance: Complex
 
-    (rear, out_rear), (front, out_front) = side(stations), side(length - stations)
-    both = rear + front
-    return np.stack([front / both * out_rear, rear / both * out_front])
+    @staticmethod
+    def of(
+        groove: Groove,
+        length: float,
+        stations: Array,
+        frequency: Array,
+        air: SoundAir,
+        beside: Complex | float = 0.0,
+    ) -> Line:
+        """Of a `length` m with `stations` (s,) m from the rear; `beside` (f,) m4 s/kg/m: 2 Y, what opens into the groove."""
+        omega, area = 2 * np.pi * frequency, groove.area
+        medium = Medium.in_tube(groove.hydraulic_radius, frequency, air)
+        along = 1j * omega * medium.density / area
+        across = 1j * omega * area / medium.modulus + beside
+        rate, impedance = np.sqrt(along * across), np.sqrt(along / across)
+        whole = np.sinh(rate * length)
+        sides = length - stations, stations
+        shorted = np.stack([np.sinh(rate[:, None] * one) / whole[:, None] for one in sides])
+        own, other = 1 / (impedance * np.tanh(rate * length)), -1 / (impedance * whole)
+        return Line(shorted, np.array([[own, other], [other, own]]))
+
+
+def inertia(groove: Groove, frequency: Array, air: SoundAir) -> Complex:
+    """Impedance (f,) Pa s/m3 of the air that moves at a flanged end: i w rho 0.8217 a / A."""
+    radius = np.sqrt(groove.area / np.pi)
+    return 2j * np.pi * frequency * air.density * FLANGED * radius / groove.area
+
+
+def radiation_resistance(far: Transfer, shares: sparse.csr_matrix, lines: Array) -> Array:
+    """Resistance (o, o, l) Pa s/m3 that sources (shares (e, o) of the elements) radiate against, each's own and with each other.
+
+    R_ij = (w rho)^2 / (rho c) int Re(g_i g_j*) r^2 dOmega, from the Green's functions `far` to `directions`, of which quotients by
+    w^2 are interpolated at lines (l,) Hz. Of a source on a plane rho w^2 / (2 pi c), which is a flanged pipe's.
+    """
+    weight = directions()[1] * FAR**2
+    solved = np.stack([np.asarray(shares.T @ one.T) for one in far.ahead])  # (f, o, d)
+    found = np.einsum("fid,fjd,d->fij", solved, solved.conj(), weight).real
+    at_lines = interpolate.CubicSpline(far.frequency, found)(lines)
+    scale = (2 * np.pi * lines * far.air.density) ** 2 / far.air.impedance
+    return np.asarray(np.moveaxis(at_lines * scale[:, None, None], 0, -1))
 
 
 @dataclass(frozen=True)
@@ -222,21 +243,44 @@ class Outlets:
         middle = np.repeat([g.y for g in self.grooves], 2)
         return np.vstack([self.edge, np.stack([self.ends.ravel(), middle], axis=1)])
 
-    def leaving(self, rate: Complex, frequency: Array, height: float, air: SoundAir) -> Complex:
-        """Volume velocities (e + 2 g, f) m3/s at the `places`, of those squeezed (o, f) m3/s, with a mean gap of `height` m."""
+    def leaving(
+        self, rate: Complex, frequency: Array, height: float, air: SoundAir, resistance: Array
+    ) -> Complex:
+        """Volume velocities (e + 2 g, f) m3/s at the `places`, of those squeezed (o, f) m3/s, with a mean gap of `height` m.
+
+        `resistance` (e + 2 g, e + 2 g, f): `radiation_resistance` of the places. The ends U of the grooves meet the pressures of all
+        places: U = U_0 - Y p, p = Z U + R Q, Z of the ends' inertia and R.
+        """
         first = len(self.edge)
-        out = [rate[:first] * reaching(self.reach, height, frequency, air)]
-        for groove, end, station, reach in zip(
-            self.grooves, self.ends, self.stations, self.reaches, strict=True
+        over = rate[:first] * reaching(self.reach, height, frequency, air)
+        ends = 2 * len(self.grooves)
+        admittance = np.zeros((ends, ends, len(frequency)), complex)
+        impedance = resistance[first:, first:].astype(complex)
+        shorted = np.zeros((ends, len(frequency)), complex)
+        begun = first
+        for k, (groove, end, station, reach) in enumerate(
+            zip(self.grooves, self.ends, self.stations, self.reaches, strict=True)
         ):
-            own = rate[first : first + len(station)]
-            first += len(station)
+            both = slice(2 * k, 2 * k + 2)
+            own = rate[begun : begun + len(station)]
+            begun += len(station)
             part = reaching(reach, height, frequency, air)
             slit = Medium.in_slit(max(height, _THIN), frequency, air).modulus
             beside = 2 * 2j * np.pi * frequency * height * reach / slit * part
             given = groove, end[1] - end[0], station - end[0], frequency, air, beside
-            out.append(np.einsum("bfs,sf->bf", to_ends(*given), own * part))
-        return np.vstack(out)
+            line = Line.of(*given)
+            shorted[both] = np.einsum("bfs,sf->bf", line.shorted, own * part)
+            admittance[both, both] = line.admittance
+            impedance[range(2 * k, 2 * k + 2), range(2 * k, 2 * k + 2)] += inertia(
+                groove, frequency, air
+            )
+        if not ends:
+            return over
+        outside = np.einsum("ijf,jf->if", resistance[first:, :first], over)
+        shorted -= np.einsum("ijf,jf->if", admittance, outside)
+        held, met = np.moveaxis(admittance, -1, 0), np.moveaxis(impedance, -1, 0)
+        out = np.linalg.solve(np.eye(ends) + held @ met, shorted.T[..., None])[..., 0].T
+        return np.vstack([over, out])
 
 
 def _ends(inside: Mask, place: Array) -> tuple[Array, Array]:

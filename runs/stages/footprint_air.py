@@ -11,8 +11,8 @@ import numpy as np
 from tireroad.contact.results.squeezed_air import FootprintCells, squeezed
 from tireroad.contact.setup import ContactSetup
 from tireroad.fem.static.state import StaticState
-from tireroad.greens.footprint_air import Groove, Outlets, on_elements
-from tireroad.greens.tire_sound import SoundAir, SoundingTire, road_axes
+from tireroad.greens.footprint_air import Groove, Outlets, on_elements, radiation_resistance
+from tireroad.greens.tire_sound import SoundingTire, Transfer, road_axes
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.stages.stage import Job
 from tireroad.runs.stages.whole_tire import Lines, transformed
@@ -42,8 +42,18 @@ class LeavingAir:
     height: float
 
     @staticmethod
-    def of(job: Job, setup: ContactSetup, lines: Lines, air: SoundAir) -> LeavingAir | None:
-        """From the gaps in contact.h5; None of contact points that are no grid on a plane. Root process only."""
+    def of(
+        job: Job,
+        setup: ContactSetup,
+        lines: Lines,
+        tire: SoundingTire,
+        state: StaticState,
+        far: Transfer,
+    ) -> LeavingAir | None:
+        """From the gaps in contact.h5, in front of a `tire` with Green's functions to places `far` away.
+
+        None of contact points that are no grid on a plane. Root process only.
+        """
         patch = setup.patch
         if patch.places is None or patch.frames is not None:
             return None
@@ -59,19 +69,27 @@ class LeavingAir:
         # What is known is the mean over a time before each instant.
         late = lines.frequency * found.over
         true = np.exp(1j * np.pi * late) / np.sinc(np.minimum(late, 0.5))
+        shares = on_elements(tire, _face(state), outlets.places)
+        resistance = radiation_resistance(far, shares, lines.frequency)
+        given = lines.frequency, found.height, far.air, resistance
         amplitude, spectrum = (
-            outlets.leaving((part * true[:, None]).T, lines.frequency, found.height, air)
+            outlets.leaving((part * true[:, None]).T, *given)
             for part in transformed(found.rate, step, numbers)
         )
         return LeavingAir(outlets.places, amplitude, spectrum, found.height)
 
     def volumes(self, tire: SoundingTire, state: StaticState, frequency: Array) -> Array:
         """Displaced volumes (2, e, f) m3 of the tire's elements that sound as this air does: amplitude and spectrum."""
-        axes, height = road_axes(state)
-        face = state.positions @ axes.T + [0.0, 0.0, height]
-        shares = on_elements(tire, face, self.places)
+        shares = on_elements(tire, _face(state), self.places)
         rate = 2j * np.pi * frequency
         return np.stack([shares @ part / rate for part in (self.amplitude, self.spectrum)])
+
+
+def _face(state: StaticState) -> Array:
+    """Nodes (s, 3) m of the outer face in the road's axes, over the road."""
+    axes, height = road_axes(state)
+    place: Array = state.positions @ axes.T + [0.0, 0.0, height]
+    return place
 
 
 def _grid(setup: ContactSetup) -> tuple[Array, Array]:

@@ -315,7 +315,7 @@ class SoundStage(WholeTire[SoundPressure]):
             rough=coarse @ lines.amplitude.T,
         )
         heard, over_time = vibration, volumes @ lines.spectrum.T
-        if (air := self._air(record, lines)) is not None:
+        if (air := self._air(record, lines, tire)) is not None:
             with record.timing("air of the footprint"):
                 amplitude, spectrum = air.volumes(tire, state, lines.frequency)
                 rougher, _ = air.volumes(rough, state, lines.frequency)
@@ -333,14 +333,15 @@ class SoundStage(WholeTire[SoundPressure]):
         _describe(record, pressure)
         return pressure
 
-    def _air(self, record: Record, lines: Lines) -> LeavingAir | None:
+    def _air(self, record: Record, lines: Lines, tire: SoundingTire) -> LeavingAir | None:
         """The air squeezed out of the footprint; None where it is not asked for or not known."""
         table, setup = self.job.scene.sound, self.setup.product
         assert table is not None, "the stage runs with [sound] only"
         if not table.air or self.contact is None or setup is None:
             return None
         with record.timing("air of the footprint"):
-            found = LeavingAir.of(self.job, setup, lines, self.radiation.product.near.air)
+            given = tire, self.static.product, self.radiation.product.far
+            found = LeavingAir.of(self.job, setup, lines, *given)
         if found is None:
             record.notes.append(
                 "the air squeezed out of the footprint is not in the sound: that needs contact points on a grid (contact.points) on a plane"

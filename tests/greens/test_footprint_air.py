@@ -2,13 +2,41 @@
 
 import numpy as np
 import pytest
+from scipy import sparse
 
-from tireroad.greens.footprint_air import FLANGED, Groove, Medium, Outlets, reaching, to_ends
-from tireroad.greens.tire_sound import SoundAir
+from tireroad.greens.footprint_air import (
+    FLANGED,
+    Groove,
+    Line,
+    Medium,
+    Outlets,
+    inertia,
+    radiation_resistance,
+    reaching,
+)
+from tireroad.greens.tire_sound import FAR, SoundAir, Transfer, directions, solved_frequencies
 
 AIR = SoundAir.at(293.15)
 GROOVE = Groove(y=0.0, width=0.009, depth=0.008)
 LENGTH = 0.13
+
+
+def on_plane(frequency, count=1):
+    """Radiation resistance (o, o, f) of sources far apart on a plane, a flanged pipe's: rho w^2 / (2 pi c)."""
+    own = AIR.density * (2 * np.pi * frequency) ** 2 / (2 * np.pi * AIR.speed)
+    return np.eye(count)[:, :, None] * own
+
+
+def to_ends(groove, length, stations, frequency, air, beside=0.0):
+    """Volume velocities (2, f, s) out of the flanged ends of a groove on a plane per unit at the stations."""
+    line = Line.of(groove, length, stations, frequency, air, beside)
+    met = np.moveaxis(
+        on_plane(frequency, 2) + np.eye(2)[:, :, None] * inertia(groove, frequency, air), -1, 0
+    )
+    held = np.moveaxis(line.admittance, -1, 0)
+    return np.moveaxis(
+        np.linalg.solve(np.eye(2) + held @ met, np.moveaxis(line.shorted, 1, 0)), 0, 1
+    )
 
 
 def peak(groove, length, station, frequency=None):
@@ -164,7 +192,8 @@ def test_a_slick_leaves_over_its_edge():
     assert outlets.sums.shape[0] == len(outlets.edge) and not outlets.grooves
     frequency = np.array([50.0, 200.0])
     rate = np.ones((len(outlets.edge), 2), complex)
-    out = outlets.leaving(rate, frequency, 2e-3, AIR)
+    count = len(outlets.places)
+    out = outlets.leaving(rate, frequency, 2e-3, AIR, on_plane(frequency, count))
     assert out == pytest.approx(rate, rel=0.02)
 
 
@@ -172,5 +201,49 @@ def test_all_that_is_squeezed_slowly_leaves():
     x, y, inside, cell = oval()
     outlets = Outlets.of(inside, cell, x, y, [Groove(0.0, 0.02, 0.02)])
     rate = np.ones((len(cell), 1), complex)
-    out = outlets.leaving(outlets.sums @ rate, np.array([30.0]), 2e-3, AIR)
+    frequency = np.array([30.0])
+    given = outlets.sums @ rate, frequency, 2e-3, AIR
+    out = outlets.leaving(*given, on_plane(frequency, len(outlets.places)))
     assert abs(out.sum() - len(cell)) < 0.02 * len(cell)
+
+
+def test_ends_that_radiate_together_hold_each_other_back():
+    """Two equal grooves side by side, close to each other: R of both is twice that of one."""
+    x, y, inside, cell = oval()
+    near = Outlets.of(inside, cell, x, y, [Groove(-0.01, 0.009, 0.008), Groove(0.01, 0.009, 0.008)])
+    frequency = np.linspace(900.0, 1500.0, 601)
+    rate = np.ones((near.sums.shape[0], len(frequency)), complex)
+    rate[: len(near.edge)] = 0
+    count, first = len(near.places), len(near.edge)
+    alone = on_plane(frequency, count)
+    together = alone + 0
+    for end in (0, 1):
+        together[first + end, first + 2 + end] = together[first + 2 + end, first + end] = alone[
+            0, 0
+        ]
+    peaks = [
+        np.abs(near.leaving(rate, frequency, 1e-4, AIR, one)[-1]).max() for one in (alone, together)
+    ]
+    assert 0.5 < peaks[1] / peaks[0] < 0.95
+
+
+def test_the_radiation_resistance_of_sources_on_a_plane():
+    """R = rho w^2 / (2 pi c), with each other that times sin(k d) / (k d) (Morse and Ingard, Theoretical Acoustics)."""
+    places = np.array([[0.0, 0.0, 0.0], [0.12, 0.05, 0.0]])
+    frequency = solved_frequencies(1200.0)
+    way = directions()[0]
+    wave = 2 * np.pi * frequency[:, None, None] / AIR.speed
+    ahead = np.exp(1j * wave * (way @ places.T)) / (2 * np.pi * FAR)
+    far = Transfer(
+        frequency=frequency,
+        ahead=ahead.astype(np.complex64),
+        distance=np.full(len(way), FAR),
+        air=AIR,
+    )
+    lines = np.array([100.0, 433.0, 1111.0])
+    found = radiation_resistance(far, sparse.identity(2, format="csr"), lines)
+    own = on_plane(lines)[0, 0]
+    apart = 2 * lines / AIR.speed * np.linalg.norm(places[1])
+    assert found[0, 0] == pytest.approx(own, rel=1e-4)
+    assert found[0, 1] == pytest.approx(own * np.sinc(apart), rel=2e-3, abs=1e-3 * own.min())
+    assert np.allclose(found, np.swapaxes(found, 0, 1))
