@@ -33,8 +33,8 @@ def listen(
     """Sound pressure of a finished run at other microphones: its folder, or tireroad.load of it. Not collective.
 
     `microphones`: as sound.microphones in a scene, names or places (x, y, z) in m; `temperature` K of the
-    air; `up_to` Hz; `road`: as sound.road, a porous layer or its keys, None rigid. With the air of the footprint unless the scene has
-    sound.air = false. Nothing is written. Raises InputError for a folder without the results of a
+    air; `up_to` Hz; `road`: as sound.road, a porous layer or its keys, None rigid. The air of the footprint as `sound.air` of the scene
+    has it. Nothing is written. Raises InputError for a folder without the results of a
     rolling contact, for places inside the tire or under the road, and values out of range.
     """
     return finished(run, microphones, temperature, up_to, road)[1]["sound"].product
@@ -60,7 +60,7 @@ def finished(
             for item in fields(SoundTable)
             if item.name in given
         },
-        air=scene.sound is None or scene.sound.air,
+        air=scene.sound.air if scene.sound else None,
         road=_layer(road),
     )
     job = Job(replace(scene, sound=table), results.directory, MPI.COMM_SELF)

@@ -27,7 +27,7 @@ from tireroad.greens.tire_sound import (
 )
 from tireroad.modal.corner import BODY, SEEN
 from tireroad.runs.files.store import dataset, put, read_fields, write_fields
-from tireroad.runs.scene.tables.sound import SoundTable
+from tireroad.runs.scene.tables.sound import SQUEEZED, SoundTable
 from tireroad.runs.stages.footprint_air import LeavingAir
 from tireroad.runs.stages.spectra import Spectra
 from tireroad.runs.stages.stage import Computed, Record, Result
@@ -337,7 +337,8 @@ class SoundStage(WholeTire[SoundPressure]):
         """The air squeezed out of the footprint; None where it is not asked for or not known."""
         table, setup = self.job.scene.sound, self.setup.product
         assert table is not None, "the stage runs with [sound] only"
-        if not table.air or self.contact is None or setup is None:
+        wanted = lines.frequency[-1] >= SQUEEZED if table.air is None else table.air
+        if not wanted or self.contact is None or setup is None:
             return None
         with record.timing("air of the footprint"):
             given = tire, self.static.product, self.radiation.product.far

@@ -19,6 +19,9 @@ from tireroad.greens.absorbing_road import PorousLayer
 from tireroad.runs.scene.schema import table
 
 MICROPHONES = ("cpx", "obsi", "pass-by")
+SQUEEZED = (
+    700.0  # Hz: lower end of the first third octave in which the air of the footprint matters
+)
 HEARD = 1130.0  # Hz: the end of the third octave of 1 kHz
 
 
@@ -87,10 +90,11 @@ class SoundTable:
         least=0,
         most=0.02,
     )
-    air: bool = flag(
-        True,
-        "with the air that tread and texture squeeze out of the footprint, over its edge and through the grooves around the tire; "
-        "false: the vibrations alone. Of contact points on a grid only",
+    air: bool | None = flag(
+        None,
+        "with the air that tread and texture squeeze out of the footprint, over its edge and through the grooves around the tire; false: "
+        f"the vibrations alone; absent: true where the sound reaches {SQUEEZED:g} Hz, below which they are 10 dB louder. Of contact points on a "
+        "grid only",
     )
     road: PorousLayer | None = table(
         PorousLayer, "a road that absorbs: a porous layer; absent: rigid", optional=True

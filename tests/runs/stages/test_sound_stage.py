@@ -53,7 +53,6 @@ estimate = false
 [sound]
 microphones = ["cpx", [3.0, 1.0, 1.0]]
 up_to = 150.0
-air = false
 """
 )
 
