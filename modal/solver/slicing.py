@@ -454,8 +454,9 @@ def krylov_schur(
     338 solves, 10.9 s, three quarters of its elapsed time in one symbolic and two numeric factorisations (10.6 s without
     its detection of zeros). A solve with one vector takes as long as reading the factor twice (38 MB), so neither
     a looser tolerance nor another basis or shift helps: 1.8 solves an eigenvalue are needed with any. A single
-    orthogonalisation (eta = 0.1) loses the basis. All modes, medians of pairs (2026-11-29): quickstart.toml 5.0 s,
-    by blocks 3.2 s; torus.toml 4.6 and 3.4 s; passenger.toml 5.0 and 3.7 s.
+    orthogonalisation (eta = 0.1) loses the basis. All modes, medians of two to seven pairs on a busy machine
+    (2026-11-29): quickstart.toml 5.0 s, by blocks 3.2 s (1.35 to 1.65 times); torus.toml 4.6 and 3.4 s;
+    passenger.toml 5.0 and 3.7 s; 500 of a torus of 44,640 unknowns 7.3 and 5.9 s (`bench modes`).
     """
     from slepc4py import SLEPc
 

@@ -126,7 +126,7 @@ class ModalTable:
         "auto",
         ("auto", "slepc", "lanczos"),
         "who finds the modes in slices of equal numbers, of each part that symmetry leaves: block Lanczos, which auto "
-        "takes, or SLEPc's Krylov-Schur with one vector, which finds the same in 1.2 to 1.6 times the CPU time",
+        "takes, or SLEPc's Krylov-Schur with one vector, which finds the same in 1.2 to 1.7 times the CPU time",
     )
 
     @property
