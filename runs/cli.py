@@ -10,7 +10,7 @@ from contextlib import ExitStack, redirect_stderr, redirect_stdout, suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.runs.files.names import STAGES
@@ -55,177 +55,33 @@ loads at deflections, stiffness, footprint (docs/how-to/fit.md), from a TOML fil
 Writes a scene with that tire and prints the figures beside those reached.
 """
 
-Arguments = Callable[[argparse.ArgumentParser], object]
+
+class Argument(NamedTuple):
+    """An argument or option of a command: its `names`, and the `settings` of argparse's add_argument."""
+
+    names: tuple[str, ...]
+    settings: dict[str, Any]
+
+
+def argument(*names: str, **settings: Any) -> Argument:
+    """An argument or option, given as to argparse's add_argument."""
+    return Argument(names, settings)
 
 
 @dataclass(frozen=True)
 class Command:
-    """A command: its line in the list of commands (`text`), and a function that adds its arguments.
+    """A command: its line in the list of commands (`text`), and its arguments in order.
 
     `about` and `usage` replace the help that is otherwise generated from these. `alone`: what runs it, of a
     command of one process; `leaves_nothing`: stopped, it has nothing to go on from.
     """
 
     text: str
-    arguments: Arguments
+    arguments: tuple[Argument, ...]
     about: str = ""
     usage: str | None = None
     alone: Callable[[argparse.Namespace], None] | None = None
     leaves_nothing: bool = False
-
-
-def _run_options(run: argparse.ArgumentParser) -> None:
-    _scene(run)
-    _processes(run)
-    run.add_argument(
-        "--out", type=_folder, metavar="DIR", help="result folder; results/<scene name> by default"
-    )
-    _until(run)
-    run.add_argument("--fresh", action="store_true", help="compute every stage anew")
-
-
-def _resume(resume: argparse.ArgumentParser) -> None:
-    _directory(resume)
-    _processes(resume)
-
-
-def _scene(command: argparse.ArgumentParser) -> None:
-    command.add_argument("scene", type=Path, metavar="SCENE.toml")
-    command.add_argument("--set", action="append", default=[], metavar="a.b=value", help=SET_HELP)
-
-
-def _until(command: argparse.ArgumentParser) -> None:
-    command.add_argument(
-        "--until", choices=STAGES, metavar="STAGE", help=f"last stage: {', '.join(STAGES)}"
-    )
-
-
-def _export_options(command: argparse.ArgumentParser) -> None:
-    _directory(command)
-    command.add_argument(
-        "--uff",
-        action="store_true",
-        help="also frequency responses as Universal File 58: response.uff",
-    )
-    command.add_argument(
-        "--tir",
-        action="store_true",
-        help="also the tire's figures in the form of MF-Tyre/MF-Swift: tire.tir",
-    )
-
-
-def _fit_options(command: argparse.ArgumentParser) -> None:
-    command.add_argument("figures", type=Path, metavar="FIGURES", help=".toml or .tir")
-    command.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="key=value",
-        help="another value than the file's, as inflation=2.4e5. May be repeated",
-    )
-    command.add_argument(
-        "--out", type=_folder, metavar="DIR", help="for scene.toml; results/<FIGURES> by default"
-    )
-
-
-def _check_options(command: argparse.ArgumentParser) -> None:
-    _scene(command)
-    _until(command)
-    command.add_argument(
-        "-n",
-        type=_count,
-        metavar="N",
-        dest="processes",
-        default=1,
-        help="memory of a run on N processes",
-    )
-
-
-def _directory(command: argparse.ArgumentParser) -> None:
-    command.add_argument("directory", type=Path, metavar="DIR")
-
-
-def _processes(command: argparse.ArgumentParser) -> None:
-    command.add_argument(
-        "-n", type=int, metavar="N", dest="processes", help="MPI processes (the launcher's)"
-    )
-
-
-def _file(info: argparse.ArgumentParser) -> None:
-    info.add_argument(
-        "file",
-        type=Path,
-        nargs="?",
-        metavar="FILE",
-        help="none: the installation, with all versions",
-    )
-    info.add_argument("--json", action="store_true", help="machine-readable output")
-
-
-def _sweep_options(sweep: argparse.ArgumentParser) -> None:
-    sweep.add_argument("sweep", type=Path, metavar="SWEEP.toml")
-    sweep.add_argument("--local", type=_count, default=1, metavar="K", help="K members at a time")
-    sweep.add_argument("--slurm", action="store_true", help="write job scripts and submit them")
-    sweep.add_argument("--gather", action="store_true", help="only gather existing results")
-    sweep.add_argument(
-        "--out", type=Path, metavar="DIR", help="results/<name of the sweep> by default"
-    )
-
-
-def _compare_options(compare: argparse.ArgumentParser) -> None:
-    compare.add_argument("directories", type=Path, nargs="+", metavar="DIR")
-    compare.add_argument("--out", type=Path, metavar="DIR", default=Path("results/compare"))
-
-
-def _cache_options(cache: argparse.ArgumentParser) -> None:
-    cache.add_argument(
-        "--clear", action="store_true", help="remove them; result folders keep theirs"
-    )
-    cache.add_argument(
-        "--unused-for",
-        type=_days,
-        metavar="DAYS",
-        help="with --clear: only those unused for so long",
-    )
-
-
-def _bench_options(bench: argparse.ArgumentParser, names: str = "all by default") -> None:
-    bench.add_argument("names", nargs="*", metavar="NAME", help=names)
-    bench.add_argument(
-        "--out", type=Path, metavar="FILE.json", help="results, with a page beside them"
-    )
-
-
-def _reproduce_options(reproduce: argparse.ArgumentParser) -> None:
-    reproduce.add_argument(
-        "names", nargs="*", metavar="NAME", help="figure-4.2, table-B.1, ...; all by default"
-    )
-    _processes(reproduce)
-    reproduce.add_argument(
-        "--out",
-        type=_folder,
-        metavar="DIR",
-        default=Path("results/reproduce"),
-        help="results/reproduce by default",
-    )
-
-
-def _validate_options(validate: argparse.ArgumentParser) -> None:
-    _bench_options(
-        validate,
-        "all by default; or a SCENE.toml of your own, which is run against full finite elements in time",
-    )
-    validate.add_argument(
-        "--large", action="store_true", help="on meshes of full size: hours, not minutes"
-    )
-
-
-def _test(test: argparse.ArgumentParser) -> None:
-    test.add_argument("arguments", nargs="*", metavar="PYTEST ARGUMENTS")
-
-
-def _script(python: argparse.ArgumentParser) -> None:
-    python.add_argument("script", nargs="*", metavar="SCRIPT …", help="as of python3")
 
 
 def _count(text: str) -> int:
@@ -255,7 +111,8 @@ def parser() -> argparse.ArgumentParser:
     for name, command in COMMANDS.items():
         about = command.about or command.text
         one = _parser(commands.add_parser, name, about, help=command.text, usage=command.usage)
-        command.arguments(one)
+        for names, settings in command.arguments:
+            one.add_argument(*names, **settings)
     return top
 
 
@@ -526,78 +383,204 @@ def _sweep(args: argparse.Namespace) -> None:
     sweep(args.sweep, args.out, at_once=args.local, batch=args.slurm, only_gather=args.gather)
 
 
+SCENE = argument("scene", type=Path, metavar="SCENE.toml")
+SET = argument("--set", action="append", default=[], metavar="a.b=value", help=SET_HELP)
+DIRECTORY = argument("directory", type=Path, metavar="DIR")
+PROCESSES = argument(
+    "-n", type=int, metavar="N", dest="processes", help="MPI processes (the launcher's)"
+)
+UNTIL = argument(
+    "--until", choices=STAGES, metavar="STAGE", help=f"last stage: {', '.join(STAGES)}"
+)
+TABLE = argument("--out", type=Path, metavar="FILE.json", help="results, with a page beside them")
+
 COMMANDS = {
     "run": Command(
         "run a scene and write its report",
-        _run_options,
+        (
+            SCENE,
+            SET,
+            PROCESSES,
+            argument(
+                "--out",
+                type=_folder,
+                metavar="DIR",
+                help="result folder; results/<scene name> by default",
+            ),
+            UNTIL,
+            argument("--fresh", action="store_true", help="compute every stage anew"),
+        ),
         RUN,
         f"{PROGRAM} run SCENE.toml [options] [-- PETSc options]",
     ),
-    "resume": Command("continue from the last checkpoint of a result folder", _resume),
+    "resume": Command(
+        "continue from the last checkpoint of a result folder", (DIRECTORY, PROCESSES)
+    ),
     "check": Command(
         "validate a scene, printed with all defaults, its stages and its memory; or a road file alone",
-        _check_options,
+        (
+            SCENE,
+            SET,
+            UNTIL,
+            argument(
+                "-n",
+                type=_count,
+                metavar="N",
+                dest="processes",
+                default=1,
+                help="memory of a run on N processes",
+            ),
+        ),
         alone=_check,
         leaves_nothing=True,
     ),
     "report": Command(
-        "write report.html of a result folder again", _directory, alone=_report, leaves_nothing=True
+        "write report.html of a result folder again",
+        (DIRECTORY,),
+        alone=_report,
+        leaves_nothing=True,
     ),
     "fit": Command(
         "the built-in tire's free parameters from a tire's figures (.toml or .tir)",
-        _fit_options,
+        (
+            argument("figures", type=Path, metavar="FIGURES", help=".toml or .tir"),
+            argument(
+                "--set",
+                action="append",
+                default=[],
+                metavar="key=value",
+                help="another value than the file's, as inflation=2.4e5. May be repeated",
+            ),
+            argument(
+                "--out",
+                type=_folder,
+                metavar="DIR",
+                help="for scene.toml; results/<FIGURES> by default",
+            ),
+        ),
         FIT,
         alone=_fit,
     ),
     "export": Command(
         "XDMF for ParaView and CSV for spreadsheets from a result folder",
-        _export_options,
+        (
+            DIRECTORY,
+            argument(
+                "--uff",
+                action="store_true",
+                help="also frequency responses as Universal File 58: response.uff",
+            ),
+            argument(
+                "--tir",
+                action="store_true",
+                help="also the tire's figures in the form of MF-Tyre/MF-Swift: tire.tir",
+            ),
+        ),
         alone=_export,
         leaves_nothing=True,
     ),
     "sweep": Command(
-        "run a family of scenes that share stages, in one table", _sweep_options, alone=_sweep
+        "run a family of scenes that share stages, in one table",
+        (
+            argument("sweep", type=Path, metavar="SWEEP.toml"),
+            argument("--local", type=_count, default=1, metavar="K", help="K members at a time"),
+            argument("--slurm", action="store_true", help="write job scripts and submit them"),
+            argument("--gather", action="store_true", help="only gather existing results"),
+            argument(
+                "--out", type=Path, metavar="DIR", help="results/<name of the sweep> by default"
+            ),
+        ),
+        alone=_sweep,
     ),
     "compare": Command(
         "compare two to twelve runs in one page and one table",
-        _compare_options,
+        (
+            argument("directories", type=Path, nargs="+", metavar="DIR"),
+            argument("--out", type=Path, metavar="DIR", default=Path("results/compare")),
+        ),
         alone=_compare,
         leaves_nothing=True,
     ),
     "info": Command(
         "list the contents of a result file: datasets, shapes, units, provenance; without one the"
         " versions and places of everything that is installed",
-        _file,
+        (
+            argument(
+                "file",
+                type=Path,
+                nargs="?",
+                metavar="FILE",
+                help="none: the installation, with all versions",
+            ),
+            argument("--json", action="store_true", help="machine-readable output"),
+        ),
         alone=_info,
         leaves_nothing=True,
     ),
     "python": Command(
-        "run a script, or a prompt, with the python and the path of this program", _script
+        "run a script, or a prompt, with the python and the path of this program",
+        (argument("script", nargs="*", metavar="SCRIPT …", help="as of python3"),),
     ),
     "cache": Command(
         "list or clear the finished stages that runs share (TIREROAD_CACHE or the user's cache)",
-        _cache_options,
+        (
+            argument(
+                "--clear", action="store_true", help="remove them; result folders keep theirs"
+            ),
+            argument(
+                "--unused-for",
+                type=_days,
+                metavar="DAYS",
+                help="with --clear: only those unused for so long",
+            ),
+        ),
         alone=_cache,
         leaves_nothing=True,
     ),
     "bench": Command(
         "measure run time against error, scaling and lower bounds on this machine",
-        _bench_options,
+        (argument("names", nargs="*", metavar="NAME", help="all by default"), TABLE),
         alone=_bench,
     ),
     "reproduce": Command(
         "recompute the thesis's figures and tables, with what agrees and what does not",
-        _reproduce_options,
+        (
+            argument(
+                "names",
+                nargs="*",
+                metavar="NAME",
+                help="figure-4.2, table-B.1, ...; all by default",
+            ),
+            PROCESSES,
+            argument(
+                "--out",
+                type=_folder,
+                metavar="DIR",
+                default=Path("results/reproduce"),
+                help="results/reproduce by default",
+            ),
+        ),
         REPRODUCE,
     ),
     "validate": Command(
         "compare with full finite elements and closed forms, and test extreme input",
-        _validate_options,
+        (
+            argument(
+                "names",
+                nargs="*",
+                metavar="NAME",
+                help="all by default; or a SCENE.toml of your own, which is run against full finite elements in time",
+            ),
+            TABLE,
+            argument(
+                "--large", action="store_true", help="on meshes of full size: hours, not minutes"
+            ),
+        ),
         alone=_validate,
     ),
     "test": Command(
         "the test suite, serial and on 2 and 3 processes (--all: the long ones too, --fast: the quick ones)",
-        _test,
+        (argument("arguments", nargs="*", metavar="PYTEST ARGUMENTS"),),
     ),
 }
 

@@ -142,8 +142,8 @@ class SectionMesh:
         cells = self.cells if order == self.order else self._numbered(order)
         count = cells.max() + 1
         owner, local = _first_use(cells, count)
-        xi, eta = (part[local] for part in grid_points(edge))
-        return self.at(owner, xi, eta), cells
+        xi, eta = grid_points(edge)
+        return self.at(owner, xi[local], eta[local]), cells
 
     def of_order(self, order: int) -> SectionMesh:
         """The same section with elements of another order; raising the order keeps the shape."""
@@ -440,12 +440,14 @@ def product_mesh(
         return place(_between(wall, k, xi), _between(arc, j, eta))
 
     cells = _cells(layers, along, order)
+    owner, local = _first_use(cells, cells.max() + 1)
+    xi, eta = grid_points(equispaced(order))
     k, j = (part.ravel() for part in np.meshgrid(range(layers), range(along), indexing="ij"))
     depth, angle = (wall[k] + wall[k + 1]) / 2, (arc[j] + arc[j + 1]) / 2
     across, length = np.arange(layers), np.arange(along)
     return SectionMesh(
         order=order,
-        nodes=_nodes(cells, order, position),
+        nodes=position(owner, xi[local], eta[local]),
         cells=cells,
         region=_regions(depth, angle, patches),
         regions=(main, *(patch.name for patch in patches)),
@@ -468,17 +470,6 @@ def _cells(layers: int, along: int, order: int) -> np.ndarray:
     k, j = np.divmod(np.arange(layers * along)[:, None], along)
     step_k, step_j = np.divmod(np.arange((order + 1) ** 2), order + 1)
     return (order * k + step_k) * (order * along + 1) + order * j + step_j
-
-
-def _nodes(
-    cells: np.ndarray,
-    order: int,
-    position: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray],
-) -> np.ndarray:
-    _, first = np.unique(cells, return_index=True)
-    owner, local = np.divmod(first, cells.shape[1])
-    xi, eta = (part[local] for part in grid_points(equispaced(order)))
-    return position(owner, xi, eta)
 
 
 def _regions(depth: np.ndarray, angle: np.ndarray, patches: Sequence[RegionPatch]) -> np.ndarray:

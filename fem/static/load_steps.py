@@ -364,16 +364,17 @@ class LoadStepper:
         problem = self.equilibrium
         if problem.rolling.speed:
             problem.rolls.value = 0.0
-        show = Show("inflation", pressure, "Pa")
-        self.march(lambda part: self._solve_at(problem.pressure, part * pressure), 1.0, 1.0, show)
+        inflated = partial(self._solve_at, problem.pressure, pressure)
+        self.march(inflated, 1.0, 1.0, Show("inflation", pressure, "Pa"))
         if problem.rolling.speed:
             show = Show("speed", problem.rolling.speed, "rad/s")
-            self.march(lambda part: self._solve_at(problem.rolls, part**2), 1.0, 1.0, show)
+            self.march(lambda part: self._solve_at(problem.rolls, 1.0, part**2), 1.0, 1.0, show)
 
-    def _solve_at(self, constant: fem.Constant, value: float) -> SolveOutcome:
-        """Solve with a constant of the problem at another value, which stays if that converges."""
+    def _solve_at(self, constant: fem.Constant, whole: float, part: float = 1.0) -> SolveOutcome:
+        """Solve with a constant of the problem at a `part` of its `whole` value; it stays there if
+        that converges."""
         before = float(constant.value)
-        constant.value = value
+        constant.value = part * whole
         step = self.equilibrium.solve()
         if not step.converged:
             constant.value = before  # as the displacement is restored

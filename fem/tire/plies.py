@@ -15,7 +15,7 @@ where its face is on no ply. Another angle, modulus or number of plies needs no 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -157,7 +157,7 @@ class Plies:
 
     def work(self, u: Expr, v: Expr) -> ufl.Form | int:
         """Virtual work of the cords' tension, in UFL."""
-        return _sum(self._work(sheet, u, v) for sheet in self.sheets)
+        return sum(self._work(sheet, u, v) for sheet in self.sheets)
 
     def _work(self, sheet: Sheet, u: Expr, v: Expr) -> ufl.Form:
         line, test_line = self._lines(sheet, u, v)
@@ -177,7 +177,7 @@ class Plies:
             density = law.energy(ufl.sqrt(ufl.dot(line, line)), sheet.stiffness, sheet.slack)
             return sheet.face.integral(density, RULE)
 
-        return _sum(stored(sheet) for sheet in self.sheets)
+        return sum(stored(sheet) for sheet in self.sheets)
 
     def stress_prediction(self, u: Expr, before: Expr, du: Expr, v: Expr) -> ufl.Form | int:
         """The cords' part of fem.static.virtual_work.stress_prediction."""
@@ -195,18 +195,13 @@ class Plies:
             )
             return sheet.face.integral(excess * bending, RULE)
 
-        return _sum(correction(sheet) for sheet in self.sheets)
+        return sum(correction(sheet) for sheet in self.sheets)
 
     def inertia(self, integrand: Expr, kind: str = "full") -> ufl.Form | int:
         """int (mass per area) integrand over all plies that have mass, in UFL."""
         if not any(cord.density for cord in self.cords):
             return 0
-        return _sum(sheet.face.integral(sheet.mass * integrand, kind) for sheet in self.sheets)
-
-
-def _sum(forms: Iterable[ufl.Form]) -> ufl.Form | int:
-    """Sum of UFL forms; 0 if there are none."""
-    return sum(forms)
+        return sum(sheet.face.integral(sheet.mass * integrand, kind) for sheet in self.sheets)
 
 
 def _sheets(mesh: Mesh, order: int, cords: Sequence[Cords], laid: Sequence[Laid]) -> list[Sheet]:

@@ -33,7 +33,9 @@ _SOFT = 1e-3  # of the matrix norm: noise of a hundred roundings is 1e-11 of an 
 _DENSE = 200  # unknowns below which LAPACK takes no longer than one factorisation and its overhead
 _MANY = 0.25  # share of all eigenvalues from which on LAPACK takes no longer
 _LARGEST_DENSE = 3000
-_LONGEST = 1.5  # of the wanted eigenvalues: the basis of Krylov-Schur before it restarts
+# Krylov-Schur: the longest basis over the wanted eigenvalues, and the share of it that a restart keeps: 193
+# solves for 107 eigenvalues (half of it, SLEPc's default: 209; 1.25 and 0.5: 202; 1.75 and 0.9: 201).
+_LONGEST, _KEPT = 1.5, 0.7
 AUTO = "lanczos"
 
 # Eigenvalues per slice and matrix: fewest, where teams wait for work, and most. The more, the fewer vectors
@@ -447,10 +449,14 @@ def krylov_schur(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The same as `nearest` by SLEPc's Krylov-Schur with one vector, the `known` deflated.
 
-    The slices, their factor and their inertia are this program's. Radial tire, 10,600 unknowns and 106 eigenvalues
-    of a part, CPU time: 217 solves, 2.2 s; by blocks 1.0 s; by SLEPc's own spectrum slicing 338 solves, 10.9 s, three
-    quarters of its elapsed time in one symbolic and two numeric factorisations (10.6 s without its detection of zeros).
-    All modes of both parts: 6.7 s, by blocks 4.6 s.
+    The slices, their factor and their inertia are this program's. Radial tire, 10,600 unknowns and 107 eigenvalues
+    of a part, CPU time: 193 solves of 7 ms, 1.5 s; by blocks 312 of 1.4 ms, 0.6 s; by SLEPc's own spectrum slicing
+    338 solves, 10.9 s, three quarters of its elapsed time in one symbolic and two numeric factorisations (10.6 s without
+    its detection of zeros). A solve with one vector takes as long as reading the factor twice (38 MB), so neither
+    a looser tolerance nor another basis or shift helps: 1.8 solves an eigenvalue are needed with any. A single
+    orthogonalisation (eta = 0.1) loses the basis. All modes, medians of two to seven pairs on a busy machine
+    (2026-11-29): quickstart.toml 5.0 s, by blocks 3.2 s (1.35 to 1.65 times); torus.toml 4.6 and 3.4 s;
+    passenger.toml 5.0 and 3.7 s; 500 of a torus of 44,640 unknowns 7.3 and 5.9 s (`bench modes`).
     """
     from slepc4py import SLEPc
 
@@ -470,6 +476,7 @@ def krylov_schur(
         solver.setWhichEigenpairs(SLEPc.EPS.Which.LARGEST_MAGNITUDE)
         longest = min(math.ceil(_LONGEST * wanted) + _PROBES, size - known.shape[1])
         solver.setDimensions(min(wanted, longest), longest, PETSc.DECIDE)
+        solver.setKrylovSchurRestart(_KEPT)
         solver.setTolerances(tolerance)
         if known.shape[1]:
             held = [

@@ -82,9 +82,9 @@ def solve(
     The stiffness (n, n) is in N/m, the diagonal mass (own rows) in kg. Symmetries are sought at the
     `sites` of own unknowns, equal segments unless `waves` is False. A split whose modes are not
     modes of A is discarded for the next. The processes work in `teams`, each of which distributes A
-    over its members; by default each process is its own (modal.solver.slicing). `solver`: auto, slepc
-    or lanczos, who finds the eigenpairs of a part. Counts and slices that the `journal` holds are not computed again. Raises ConvergenceError if a mode is missing,
-    inaccurate or unstable. Collective.
+    over its members; by default each process is its own (modal.solver.slicing). `solver`: "auto",
+    "lanczos" or "slepc" finds the eigenpairs of a slice. Counts and slices that the `journal` holds are
+    not computed again. Raises ConvergenceError if a mode is missing, inaccurate or unstable. Collective.
     """
     comm = stiffness.comm.tompi4py()
     size = stiffness.getSize()[0]

@@ -29,12 +29,17 @@ DEFERRED = b"d"
 """Message to the supervisor: the loop has noted the request and will end by itself."""
 
 
-def rank_before_mpi() -> int:
-    """The rank according to the process manager, for commands that never start MPI."""
-    for name in ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"):
+def _number(default: int, *names: str) -> int:
+    """The first of the environment's variables that is a number, else `default`."""
+    for name in names:
         if os.environ.get(name, "").isdigit():
             return int(os.environ[name])
-    return 0
+    return default
+
+
+def rank_before_mpi() -> int:
+    """The rank according to the process manager, for commands that never start MPI."""
+    return _number(0, "OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")
 
 
 def without_mpi(variables: Mapping[str, str]) -> int:
@@ -51,22 +56,15 @@ def without_mpi(variables: Mapping[str, str]) -> int:
 
 def processes_here() -> int:
     """Number of processes according to the process manager if all are on this machine, else 1."""
-    here, whole = (
-        next((int(found) for name in names if (found := os.environ.get(name, "")).isdigit()), 1)
-        for names in (
-            ("OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS"),
-            ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE"),
-        )
-    )
+    here = _number(1, "OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS")
+    whole = _number(1, "OMPI_COMM_WORLD_SIZE", "PMI_SIZE")
     return whole if here == whole else 1
 
 
 def in_parallel() -> bool:
     """Whether the process manager has started more than one process."""
-    for name in ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS"):
-        if os.environ.get(name, "").isdigit():
-            return int(os.environ[name]) > 1
-    return "PMIX_RANK" in os.environ
+    unknown = 2 if "PMIX_RANK" in os.environ else 1
+    return _number(unknown, "OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS") > 1
 
 
 def handed_over(status: int, for_all: bool = True) -> int:

@@ -22,9 +22,8 @@ from tireroad.runs.scene.tables.scene import (
     ModalTable,
     RoadTable,
     Scene,
-    filled,
-    rubbed,
 )
+from tireroad.runs.scene.tables.tire import CavityTable
 
 Say = Callable[[str], object]
 TIRE, MODES = frozenset({"tire"}), frozenset({"tire", "modal"})
@@ -58,6 +57,21 @@ class Given:
     def keys(self, table: str) -> dict[str, Any]:
         """The keys of a table that the scene gives."""
         return keys if isinstance(keys := self.raw.get(table), dict) else {}
+
+
+def air(scene: Scene, given: Given) -> Scene:
+    """Air in the cavity by default, for every section but the torus of the thesis."""
+    tire = scene.tire
+    if not tire.shape.air or tire.cavity is not None:
+        return scene
+    return replace(scene, tire=replace(tire, cavity=CavityTable()))
+
+
+def friction(scene: Scene, given: Given) -> Scene:
+    """The friction of a dry road where the tread shears, unless the static state has its own."""
+    if scene.contact is None or scene.static.friction is not None:
+        return scene
+    return replace(scene, contact=scene.contact.by_default())
 
 
 def by_band(scene: Scene, given: Given) -> Scene:
@@ -254,8 +268,8 @@ class Choice(NamedTuple):
 
 
 CHOICES = (
-    Choice(lambda scene, given: filled(scene)),  # air in the cavity
-    Choice(lambda scene, given: rubbed(scene)),  # friction where the tread shears
+    Choice(air),
+    Choice(friction),
     Choice(by_band),
     Choice(mesh),
     Choice(damping, TIRE),

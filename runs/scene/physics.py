@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING
 
 from mpi4py import MPI
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 def make_tire(comm: MPI.Comm, tire: TireTable, temperature: float = REFERENCE):
     """The tire without loads at a temperature, degrees C; its finite elements are made on first use."""
     section = tire.ring()
-    return TireModel(section, lambda: make_body(comm, tire, section, temperature))
+    return TireModel(section, partial(make_body, comm, tire, section, temperature))
 
 
 def road_shape(scene: Scene) -> RoadShape:

@@ -173,12 +173,14 @@ class TorusSection(SectionKind):
         _note(place, problems, source)
 
     def ring(self, tire: TireTable) -> Ring:
-        return self._torus(tire).ring(self._patches(tire), self._plies(tire))
+        torus, patches, plies = self._drawn(tire)
+        return torus.ring(patches, plies)
 
     def free_unknowns(self, tire: TireTable) -> int:
-        lines = self._torus(tire).lines(self._patches(tire), self._plies(tire))
-        wall, arc = (len(line) - 1 for line in lines)
-        return 3 * tire.segments * tire.order * (tire.order * wall + 1) * (tire.order * arc - 1)
+        torus, patches, plies = self._drawn(tire)
+        wall, arc = torus.lines(patches, plies)
+        layers, along = tire.order * (len(wall) - 1) + 1, tire.order * (len(arc) - 1) - 1
+        return 3 * tire.segments * tire.order * layers * along
 
     def meshes(self, tire: TireTable) -> tuple[tuple[int, int], ...]:
         return FINER
@@ -208,8 +210,9 @@ class TorusSection(SectionKind):
     def cords(self, tire: TireTable) -> list[Cords]:
         return [cords_of(line) for line in tire.cords]
 
-    def _torus(self, tire: TireTable) -> Torus:
-        return Torus(
+    def _drawn(self, tire: TireTable) -> tuple[Torus, list[RegionPatch], list[PlyLine]]:
+        """The torus, and the parts of its section with a compound or cords of their own."""
+        torus = Torus(
             outer_radius=self.outer_radius,
             minor_radius=self.minor_radius,
             thickness=self.thickness,
@@ -221,16 +224,11 @@ class TorusSection(SectionKind):
             grading=self.grading,
             footprint_size=tire.footprint_size,
         )
-
-    def _patches(self, tire: TireTable) -> list[RegionPatch]:
-        return [patch(i, region) for i, region in enumerate(tire.region)]
-
-    def _plies(self, tire: TireTable) -> list[PlyLine]:
-        places = ((line.name, *_place(line)) for line in tire.cords)
-        return [
-            PlyLine(name, tuple(np.radians(arc)), 1 - depth / self.thickness)
-            for name, depth, arc in places
-        ]
+        plies = []
+        for line in tire.cords:
+            depth, arc = _place(line)
+            plies.append(PlyLine(line.name, tuple(np.radians(arc)), 1 - depth / self.thickness))
+        return torus, [patch(i, region) for i, region in enumerate(tire.region)], plies
 
 
 def _note(

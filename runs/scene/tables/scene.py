@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -33,7 +33,7 @@ from tireroad.runs.scene.schema import (
 )
 from tireroad.runs.scene.tables.contact import ContactTable, PatternTable, TimeTable
 from tireroad.runs.scene.tables.sound import HEARD, SoundTable
-from tireroad.runs.scene.tables.tire import CavityTable, TireTable
+from tireroad.runs.scene.tables.tire import TireTable
 
 Where = Callable[[tuple[str, ...], str], InputError]
 Springs = tuple[float, ...] | tuple[tuple[float, ...], ...]
@@ -125,8 +125,8 @@ class ModalTable:
     solver: str = choice(
         "auto",
         ("auto", "slepc", "lanczos"),
-        "who finds the modes in slices of equal numbers, of each part that symmetry leaves: SLEPc's Krylov-Schur with "
-        "one vector, or block Lanczos, which auto takes",
+        "who finds the modes in slices of equal numbers, of each part that symmetry leaves: block Lanczos, which auto "
+        "takes, or SLEPc's Krylov-Schur with one vector, which finds the same in 1.2 to 1.7 times the CPU time",
     )
 
     @property
@@ -830,21 +830,6 @@ def check_motion(scene: Scene, raw: dict[str, Any], error: Where) -> Iterator[In
         return
     for path, reason in confined(scene):
         yield error(path, reason)
-
-
-def filled(scene: Scene) -> Scene:
-    """The scene with air included by default, for every section but the torus of the thesis."""
-    tire = scene.tire
-    if not tire.shape.air or tire.cavity is not None:
-        return scene
-    return replace(scene, tire=replace(tire, cavity=CavityTable()))
-
-
-def rubbed(scene: Scene) -> Scene:
-    """The scene with the friction of a dry road by default, unless the static state has its own."""
-    if scene.contact is None or scene.static.friction is not None:
-        return scene
-    return replace(scene, contact=scene.contact.by_default())
 
 
 def rolls_freely(scene: Scene) -> bool:
