@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from tireroad.contact.results.spectra import deviation, low_part, third_octaves
+from tireroad.contact.results.spectra import FEWEST, deviation, low_part, third_octaves
 
 _NAMES = ("mean", "deviation", "level", "history")
 # Of an error of any phase, what counts in a level and in a deviation: 0.7 in the mean square where a band has one phase, less with
@@ -63,7 +63,7 @@ class Measured:
     """Quantities of a force for comparison.
 
     `mean`, `deviation` (3,) N within the valid band of the model; `level` (b, 3) dB of the bands at
-    `centre` (b,) Hz; `lines` (f, 3) N: Fourier coefficients of the variable part in that band, `spacing` Hz apart from 0
+    `centre` (b,) Hz, NaN of those for which the record is too short; `lines` (f, 3) N: Fourier coefficients of the variable part in that band, `spacing` Hz apart from 0
     on (contact.results.spectra.low_part); histories are compared up to `up_to` Hz.
     """
 
@@ -80,6 +80,12 @@ class Measured:
         frequency = self.spacing * np.arange(len(self.lines))
         return self.lines[(frequency >= low) & (frequency <= high * (1 + 1e-9))]
 
+    def around(self, centre: float, decades: float = 0.1) -> tuple[float, float]:
+        """Limits (Hz) of so many `decades` around a frequency, a third octave by default, with three lines at least."""
+        low, high = centre * 10 ** (-decades / 2), centre * 10 ** (decades / 2)
+        least = FEWEST / 2 * self.spacing
+        return min(low, centre - least), max(high, centre + least)
+
 
 @dataclass(frozen=True)
 class Bars:
@@ -95,12 +101,23 @@ class Bars:
     history: np.ndarray
 
 
-def measured(force: np.ndarray, step: float, limit: float, up_to: float = np.inf) -> Measured:
+def measured(
+    force: np.ndarray,
+    step: float,
+    limit: float,
+    up_to: float = np.inf,
+    bands: np.ndarray | None = None,
+) -> Measured:
     """The quantities of a force (n, 3) N in steps of `step` s.
 
-    Deviation and bands below `limit` Hz; the history up to `up_to` Hz, if that is lower.
+    Deviation and bands below `limit` Hz; the history up to `up_to` Hz, if that is lower. `bands` (b,) Hz: the centres asked
+    for, by default those that the record resolves.
     """
     centre, level = third_octaves(force, step, limit)
+    if bands is not None:
+        own, found = np.nonzero(np.isclose(bands[:, None], centre))
+        resolved, level, centre = level, np.full((len(bands), 3), np.nan), bands
+        level[own] = resolved[found]
     mean, duration = force.mean(axis=0), len(force) * step
     lines = low_part(force - mean, duration, limit)
     off = deviation(force, step, limit)
@@ -108,12 +125,19 @@ def measured(force: np.ndarray, step: float, limit: float, up_to: float = np.inf
 
 
 def bars(run: Measured, companion: Measured, share: float) -> Bars:
-    """The error of the run: the `share` of its difference to the companion, without sign."""
+    """The error of the run: the `share` of its difference to the companion, without sign.
+
+    That of a band for which the record is too short comes from the three lines nearest to it, of which a part counts
+    (`similar`).
+    """
     level = np.full(run.level.shape, np.nan)
     for k, centre in enumerate(run.centre):
         same = np.flatnonzero(np.isclose(companion.centre, centre))
-        if len(same):
-            level[k] = share * np.abs(companion.level[same[0]] - run.level[k])
+        if not len(same):
+            continue
+        level[k] = share * np.abs(companion.level[same[0]] - run.level[k])
+        if np.isnan(level[k]).all():
+            level[k] = _in_level(share * _apart(run, companion, *run.around(centre)))
     return Bars(
         share * np.abs(companion.mean - run.mean),
         share * np.abs(companion.deviation - run.deviation),
@@ -133,16 +157,20 @@ def similar(run: Measured, companion: Measured, within: float) -> Bars:
     whole = _apart(run, companion, 0.0, within * run.spacing * (len(run.lines) - 1))
     level = np.full(run.level.shape, np.nan)
     for k, centre in enumerate(run.centre):
-        here = _apart(run, companion, *(centre * 10 ** np.array([-0.05, 0.05])))
-        there = _apart(run, companion, *(within * centre * 10 ** np.array([-0.1, 0.1])))
-        both = np.where(np.isfinite(there), np.sqrt(here * there), here)
-        level[k] = 20 * np.log10(1 + _IN_LEVEL * both)
+        here = _apart(run, companion, *run.around(centre))
+        there = _apart(run, companion, *run.around(within * centre, 0.2))
+        level[k] = _in_level(np.sqrt(here * there))
     return Bars(
         np.abs(companion.mean - run.mean),
         _IN_DEVIATION * whole * run.deviation,
         level,
         _apart(run, companion, 0.0, within * run.up_to),
     )
+
+
+def _in_level(apart: np.ndarray) -> np.ndarray:
+    """Error (...) dB of a level whose lines are so far apart, relative."""
+    return 20 * np.log10(1 + _IN_LEVEL * apart)
 
 
 def _apart(run: Measured, companion: Measured, low: float, high: float) -> np.ndarray:

@@ -27,7 +27,7 @@ from tireroad.contact.results.error_bars import (
     similar,
     total,
 )
-from tireroad.contact.results.spectra import Limit, limits, lowest, pitch
+from tireroad.contact.results.spectra import Limit, limits, lowest, pitch, wide_enough
 from tireroad.contact.rolling import bristles
 from tireroad.contact.setup import ContactSetup, on_shape
 from tireroad.contact.tread.between_nodes import (
@@ -353,6 +353,9 @@ def _made(
 
 
 SHARE = 0.5  # of the run's own cost: budget of all companion runs together
+# Of the run's loop: no more of them. On two processes one repeats loops while the other computes the run's own, then both: they
+# end half a loop's time after it.
+LOOPS = 1.75
 _FEWEST, _PERIODS = 64, 2  # least steps after the run-in, and periods of `up_to`, to repeat
 # Cost of five companion runs in time loops per repeated step, by the spacing of that of the points.
 _LOOPS = {2.0: 3.5, 0.5: 6.0}
@@ -387,7 +390,8 @@ class Budget:
 
     @property
     def _whole(self) -> float:
-        return SHARE * (self.before + self.loop * self.steps)
+        loop = self.loop * self.steps
+        return min(SHARE * (self.before + loop), LOOPS * loop)
 
     def most_touching(self, least: int) -> float:
         """Touching points that the companion of the points may have, repeating `least` steps.
@@ -527,21 +531,27 @@ class Companion(NamedTuple):
     share: float = 1.0
     within: float = 1.0
 
-    def bars(self, own: ContactForces, since: float, limit: float, up_to: float) -> dict[str, Bars]:
-        """Error bars of a run with its `own` forces after `since` s; see contact.results.error_bars.measured."""
-        off = figures(self.forces, since, limit, up_to)
-        run = figures(self.beside or own, since, limit, up_to)
+    def bars(self, own: ContactForces, since: float, *limits: Any) -> dict[str, Bars]:
+        """Error bars of a run with its `own` forces after `since` s; `limits` as in `figures`."""
+        off = figures(self.forces, since, *limits)
+        run = figures(self.beside or own, since, *limits)
         if self.within < 1.0:
             return {name: similar(run[name], off[name], self.within) for name in run}
         return {name: bars(run[name], off[name], self.share) for name in run}
 
 
-def figures(forces: ContactForces, since: float, limit: float, up_to: float) -> dict[str, Measured]:
+def figures(
+    forces: ContactForces,
+    since: float,
+    limit: float,
+    up_to: float,
+    bands: np.ndarray | None = None,
+) -> dict[str, Measured]:
     """The quantities of both forces after `since` s, by name; see contact.results.error_bars.measured."""
     first = round(since / forces.step)
     both = {"contact_force": forces.contact, "axle_force": forces.axle}
     return {
-        name: measured(values[first:], forces.step, limit, up_to)
+        name: measured(values[first:], forces.step, limit, up_to, bands)
         for name, values in both.items()
         if values is not None
     }
@@ -687,14 +697,15 @@ class AccuracyStage(Computed[Accuracy]):
         axle = None if history.axle_force is None else history.axle_force[:steps]
         own = ContactForces(history.total_force[:steps], axle, history.step)
         since = start * history.step
-        exact = figures(own, since, limit, up_to)
+        bands = wide_enough(1 / (len(history.time) * history.step - since), limit)
+        exact = figures(own, since, limit, up_to, bands)
         found: dict[str, dict[str, Bars]] = {name: {} for name in exact}
         absent: dict[str, str] = {}
         for cause, told in self._companions(given, record).items():
             if isinstance(told, Exception):
                 absent[cause] = str(told)
                 continue
-            parts = [one.bars(own, since, limit, up_to) for one in told]
+            parts = [one.bars(own, since, limit, up_to, bands) for one in told]
             for name in exact:
                 found[name][cause] = total(dict(enumerate(part[name] for part in parts)))
         product = Accuracy(
@@ -750,6 +761,10 @@ class AccuracyStage(Computed[Accuracy]):
         for part, seconds in comm.allgather(known):
             found |= part
             record.cost |= seconds
+        if isinstance(steps := found.get("step"), list):
+            given.__dict__["longer"] = steps[
+                0
+            ].forces  # nearly every other loop is compared with it
         coarse = _attempted(record, "coarser mesh", lambda: given.on_coarser_mesh)
         if isinstance(coarse, ConvergenceError | InputError):
             found["mesh"] = coarse

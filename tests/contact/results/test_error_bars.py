@@ -138,9 +138,16 @@ def test_errors_of_any_phase_are_seldom_understated():
     assert np.mean(under) < 0.1
 
 
-def test_a_short_record_tells_of_a_band_by_itself():
-    """At 0.7 of the lowest band's centre there is no line."""
-    step, count = 1e-3, 64
-    own, companion = (truncated(top, 3.0, step, count) for top in (400.0, 283.0))
-    found = similar(measured(own, step, 320.0), measured(companion, step, 320.0), np.sqrt(0.5))
-    assert np.isfinite(found.level).all() and len(found.level)
+@pytest.mark.parametrize("count", [64, 256])
+def test_a_short_record_tells_of_bands_by_the_lines_next_to_them(count):
+    """Of an error in phase that grows as f^3, half counts: of all bands of a longer record, whether this one has levels or not."""
+    step, bands = 1e-3, 1000 * 10 ** (np.arange(-10, -5) / 10)
+    own, other = (truncated(top, 3.0, step, count) for top in (400.0, 283.0))
+    run, companion = (measured(force, step, 320.0, bands=bands) for force in (own, other))
+    assert (run.centre == bands).all() and np.isnan(run.level[0]).all() == (count == 64)
+    true = 20 * np.log10(1 + 0.05 * (bands / 400.0) ** 3)
+    found = bars(run, companion, 1 / (2**1.5 - 1)).level[:, 2]
+    alone = np.isnan(run.level[:, 2])
+    assert (found[alone] / true[alone] < 1.0).all() and (found[alone] / true[alone] > 0.3).all()
+    assert found[~alone] == pytest.approx(true[~alone], rel=0.25)
+    assert np.isfinite(similar(run, companion, np.sqrt(0.5)).level).all()

@@ -11,6 +11,7 @@ from mpi4py import MPI
 from tires import soft_torus
 
 from tireroad.contact.results.error_bars import CAUSES, bars, measured
+from tireroad.contact.results.spectra import wide_enough
 from tireroad.contact.tread.kernel import KernelTread
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.disk import Refused
@@ -220,6 +221,16 @@ def test_bars_are_in_the_summary_and_beside_the_bands(whole):
     with h5py.File(folder / "spectra.h5") as file:
         shape = file["third_octave/level"].shape
         assert file["third_octave/level_error"].shape == shape
+
+
+@pytest.mark.long
+def test_bands_have_error_bars_that_companions_are_too_short_for(run):
+    folder, done = run("longer", "spectra", "time.duration=0.2", "road.run_in=0.01")
+    accuracy = done.done["accuracy"].product
+    with h5py.File(folder / "spectra.h5") as file:
+        assert np.isfinite(file["third_octave/level_error"][:]).all()
+        centre = file["third_octave/centre"][:]
+    assert accuracy.window < 0.1 and len(centre) > len(wide_enough(1 / accuracy.window, 200.0))
 
 
 @pytest.mark.long
