@@ -335,6 +335,26 @@ class Projection:
             cut["corner"] = self.corner.first(count)
         return replace(self, **cut)
 
+    def on(self, turn: np.ndarray, modes: int) -> Projection:
+        """The projection on orthonormal combinations `turn` (m, m') of the coordinates, whose first are `modes` of them.
+
+        The stiffness of the finite elements must be diagonal on them, as it is on all that follows (extended).
+        """
+        whole: dict[str, Any] = {}
+        for item in fields(self):
+            values = getattr(self, item.name)
+            if isinstance(values, np.ndarray) and values.shape == 2 * self.squares.shape:
+                whole[item.name] = turn.T @ values @ turn
+        for name in ("squares", "band_rise"):
+            if (diagonal := getattr(self, name)) is not None:
+                whole[name] = np.einsum("ij,i,ij->j", turn, diagonal, turn)
+        if self.air is not None:
+            whole["air"] = replace(self.air, coupling=self.air.coupling @ turn)
+        if self.corner is not None:
+            whole["corner"] = self.corner.on(turn)
+        shapes = turn.shape[1] - modes
+        return replace(self, momentum=self.momentum @ turn, shapes=shapes, **whole)
+
     def among(self, wanted: np.ndarray) -> Projection:
         """The projection on the coordinates where `wanted` (m,) is true, without air and corner."""
         small: dict[str, Any] = {

@@ -76,6 +76,11 @@ class Corner:
         cut = {name: getattr(self, name)[:count] for name in _PER_MODE + FELT["doppler"]}
         return replace(self, **cut)
 
+    def on(self, turn: np.ndarray) -> Corner:
+        """The corner with combinations `turn` (m, m') of the modes in their place."""
+        turned = {name: turn.T @ getattr(self, name) for name in _PER_MODE + FELT["doppler"]}
+        return replace(self, **turned)
+
     def momentum(self, air: np.ndarray | None) -> np.ndarray:
         """P (7, m + a) kg^1/2 of the modes and of the air, whose own momentum is `air` (3, a)."""
         rows = self.mass.T

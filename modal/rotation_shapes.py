@@ -72,6 +72,24 @@ def with_rotation_shapes(
     return extended(modes, columns, operators) if columns.shape[1] else modes
 
 
+def among_others(projection: Projection, count: int, turning: Turning) -> Array:
+    """Rotation shapes (m - count, k) of the first `count` modes, in the other coordinates of a `projection` that has
+    enough of them: without finite elements.
+
+    None for a standing wheel, and for a free rim. Not collective.
+    """
+    rest = projection.squares[count:, None]
+    if not turning.speed or not (projection.squares > 0).all():
+        return np.zeros((len(rest), 0))
+    speed = up_to(turning.speed)
+    middle = np.sqrt(max(float(projection.squares[count - 1]), speed**2)) / 2
+    coriolis, carrying, _ = projection.rotating(turning.inertia)
+    forces = np.hstack([2 * speed * coriolis, speed**2 / middle * carrying])
+    forces = forces[count:, np.r_[:count, projection.own : projection.own + count]]
+    turn, sizes, _ = np.linalg.svd(forces / np.sqrt(rest), full_matrices=False)
+    return turn[:, sizes**2 > turning.shape_tolerance] / np.sqrt(rest)
+
+
 class _Found:
     """K-orthonormal directions (n, k), M-orthogonal to the modes, and X along them. Collective."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mpi4py import MPI
@@ -34,7 +34,7 @@ from tireroad.runs.scene.plan import meets_road, skipped
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.rules import check_road, keep, made
 from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.stages.accuracy import STATIC_TO_GREENS, AccuracyStage
+from tireroad.runs.stages.accuracy import STATIC_TO_GREENS, AccuracyStage, begin_ahead
 from tireroad.runs.stages.contact import ContactStage
 from tireroad.runs.stages.failures import failure_recorded
 from tireroad.runs.stages.greens import Responses
@@ -170,6 +170,8 @@ def run_scene(
     forget_peak()  # of an earlier member of a sweep in the same process
     summary, needed, on_disk = _begun(job, until)
     reasons = skipped(job.scene, until)
+    if AccuracyStage.name not in reasons:
+        job = replace(job, beside_loop=begin_ahead)
     if petsc_options:
         console.say(f"PETSc options: {' '.join(petsc_options)}")
     done: dict[str, Result] = {}

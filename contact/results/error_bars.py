@@ -10,6 +10,10 @@ its spectrum, with phase. Errors of several causes add as squares.
 The error due to the points depends on where the edge of the contact falls between them, which
 differs from grid to grid. The errors of the two runs are therefore nearly independent, their mean
 squares add, and the share of the root mean square is 1 / (1 + q^2r)^(1/2) (`random_share`).
+
+A model with modes to f_m is off at f as one with modes to q f_m is at q f. The companion of fewer modes is therefore judged in
+the band that its own modes cover, up to q times the run's, and its error there is the run's in its whole band (`similar`). Line by
+line, since levels and deviations differ by the part in phase alone, which is as likely to vanish.
 """
 
 from __future__ import annotations
@@ -20,9 +24,13 @@ from typing import Any
 
 import numpy as np
 
-from tireroad.contact.results.spectra import deviation, low_part, third_octaves
+from tireroad.contact.results.spectra import FEWEST, deviation, low_part, third_octaves
 
 _NAMES = ("mean", "deviation", "level", "history")
+# Of an error of any phase, what counts in a level and in a deviation: 0.7 in the mean square where a band has one phase, less with
+# several. Understated by more than two are then a tenth of the levels and deviations (docs/verification/error-bars.md).
+_IN_LEVEL, _IN_DEVIATION = 0.5, 0.35
+
 CAUSES = ("step", "points", "modes", "mesh")
 
 
@@ -55,15 +63,28 @@ class Measured:
     """Quantities of a force for comparison.
 
     `mean`, `deviation` (3,) N within the valid band of the model; `level` (b, 3) dB of the bands at
-    `centre` (b,) Hz; `low` (f, 3) N: Fourier coefficients of the variable part up to a frequency
-    (contact.results.spectra.low_part).
+    `centre` (b,) Hz, NaN of those for which the record is too short; `lines` (f, 3) N: Fourier coefficients of the variable part in that band, `spacing` Hz apart from 0
+    on (contact.results.spectra.low_part); histories are compared up to `up_to` Hz.
     """
 
     mean: np.ndarray
     deviation: np.ndarray
     centre: np.ndarray
     level: np.ndarray
-    low: np.ndarray
+    lines: np.ndarray
+    spacing: float = 1.0
+    up_to: float = np.inf
+
+    def between(self, low: float, high: float) -> np.ndarray:
+        """The lines (f', 3) N from `low` to `high` Hz."""
+        frequency = self.spacing * np.arange(len(self.lines))
+        return self.lines[(frequency >= low) & (frequency <= high * (1 + 1e-9))]
+
+    def around(self, centre: float, decades: float = 0.1) -> tuple[float, float]:
+        """Limits (Hz) of so many `decades` around a frequency, a third octave by default, with three lines at least."""
+        low, high = centre * 10 ** (-decades / 2), centre * 10 ** (decades / 2)
+        least = FEWEST / 2 * self.spacing
+        return min(low, centre - least), max(high, centre + least)
 
 
 @dataclass(frozen=True)
@@ -80,37 +101,84 @@ class Bars:
     history: np.ndarray
 
 
-def measured(force: np.ndarray, step: float, limit: float, up_to: float = np.inf) -> Measured:
+def measured(
+    force: np.ndarray,
+    step: float,
+    limit: float,
+    up_to: float = np.inf,
+    bands: np.ndarray | None = None,
+) -> Measured:
     """The quantities of a force (n, 3) N in steps of `step` s.
 
-    Deviation and bands below `limit` Hz; the history up to `up_to` Hz, if that is lower.
+    Deviation and bands below `limit` Hz; the history up to `up_to` Hz, if that is lower. `bands` (b,) Hz: the centres asked
+    for, by default those that the record resolves.
     """
     centre, level = third_octaves(force, step, limit)
-    mean = force.mean(axis=0)
-    low = low_part(force - mean, len(force) * step, min(limit, up_to))
-    return Measured(mean, deviation(force, step, limit), centre, level, low)
+    if bands is not None:
+        own, found = np.nonzero(np.isclose(bands[:, None], centre))
+        resolved, level, centre = level, np.full((len(bands), 3), np.nan), bands
+        level[own] = resolved[found]
+    mean, duration = force.mean(axis=0), len(force) * step
+    lines = low_part(force - mean, duration, limit)
+    off = deviation(force, step, limit)
+    return Measured(mean, off, centre, level, lines, 1 / duration, min(limit, up_to))
 
 
 def bars(run: Measured, companion: Measured, share: float) -> Bars:
-    """The error of the run: the `share` of its difference to the companion, without sign."""
+    """The error of the run: the `share` of its difference to the companion, without sign.
+
+    That of a band for which the record is too short comes from the three lines nearest to it, of which a part counts
+    (`similar`).
+    """
     level = np.full(run.level.shape, np.nan)
     for k, centre in enumerate(run.centre):
         same = np.flatnonzero(np.isclose(companion.centre, centre))
-        if len(same):
-            level[k] = share * np.abs(companion.level[same[0]] - run.level[k])
+        if not len(same):
+            continue
+        level[k] = share * np.abs(companion.level[same[0]] - run.level[k])
+        if np.isnan(level[k]).all():
+            level[k] = _in_level(share * _apart(run, companion, *run.around(centre)))
     return Bars(
         share * np.abs(companion.mean - run.mean),
         share * np.abs(companion.deviation - run.deviation),
         level,
-        share * _apart(run.low, companion.low),
+        share * _apart(run, companion, 0.0, run.up_to),
     )
 
 
-def _apart(run: np.ndarray, companion: np.ndarray) -> np.ndarray:
-    """Relative L2 distance (3,) of two spectra (f, 3) on the same lines."""
-    count = min(len(run), len(companion))
-    size = np.linalg.norm(run, axis=0)
-    off = np.linalg.norm(companion[:count] - run[:count], axis=0)
+def similar(run: Measured, companion: Measured, within: float) -> Bars:
+    """The error of the run, by similarity that of a companion at frequencies `within` (< 1) times its own.
+
+    Relative differences e in the band of the companion, up to `within` times that of the run, are those of the run in its whole
+    band. A third octave at f takes the geometric mean of e at `within` f and at f, of which one is smaller and one larger than
+    the run's: with an order of 3 and `within` 0.7 their mean is 1.09 times that. Of an error with any phase in each line, a part
+    counts in a level or a deviation.
+    """
+    whole = _apart(run, companion, 0.0, within * run.spacing * (len(run.lines) - 1))
+    level = np.full(run.level.shape, np.nan)
+    for k, centre in enumerate(run.centre):
+        here = _apart(run, companion, *run.around(centre))
+        there = _apart(run, companion, *run.around(within * centre, 0.2))
+        level[k] = _in_level(np.sqrt(here * there))
+    return Bars(
+        np.abs(companion.mean - run.mean),
+        _IN_DEVIATION * whole * run.deviation,
+        level,
+        _apart(run, companion, 0.0, within * run.up_to),
+    )
+
+
+def _in_level(apart: np.ndarray) -> np.ndarray:
+    """Error (...) dB of a level whose lines are so far apart, relative."""
+    return 20 * np.log10(1 + _IN_LEVEL * apart)
+
+
+def _apart(run: Measured, companion: Measured, low: float, high: float) -> np.ndarray:
+    """Relative L2 distance (3,) of two spectra from `low` to `high` Hz, NaN where there is nothing."""
+    own, other = run.between(low, high), companion.between(low, high)
+    count = min(len(own), len(other))
+    size = np.linalg.norm(own, axis=0)
+    off = np.linalg.norm(other[:count] - own[:count], axis=0)
     return np.divide(off, size, out=np.full(size.shape, np.nan), where=size > 0)
 
 

@@ -30,6 +30,8 @@ T = TypeVar("T")
 TOGETHER = 3.0
 """Seconds that a failing process waits for the others to fail as well before it ends them all."""
 
+_ENDED = 7  # tag of the root's notice
+
 KEPT = "completed stages are kept; run the same command or `resume` to continue"
 
 
@@ -47,6 +49,32 @@ def start_petsc(options: list[str]) -> None:
 def on_root(comm: Any, function: Callable[[], T]) -> T:
     """Like fem.parallel.on_root; a removed result folder is raised on all processes. Collective."""
     return parallel.on_root(comm, function, (InputError, ConvergenceError, Removed))
+
+
+def on_root_beside(
+    comm: Any, function: Callable[[], T], meanwhile: Callable[[Callable[[], bool]], None]
+) -> T:
+    """Like on_root, while every other process calls `meanwhile(ended)`, by itself.
+
+    `ended()` tells whether the root has finished: what was not begun by then can be left to all. Collective.
+    """
+    notices: list[Any] = []
+
+    def announced() -> T:
+        try:
+            return function()
+        finally:
+            notices.extend(comm.isend(None, rank, _ENDED) for rank in range(1, comm.size))
+
+    if comm.rank:
+        meanwhile(lambda: comm.iprobe(source=0, tag=_ENDED))
+    try:
+        return on_root(comm, announced)
+    finally:
+        if comm.rank:
+            comm.recv(source=0, tag=_ENDED)
+        for notice in notices:
+            notice.wait()
 
 
 @dataclass

@@ -419,7 +419,9 @@ def marks_told(drawn: Sequence[BandMarks]) -> str:
     """Explanation of the marks that a chart has."""
     told = ""
     if any(np.isfinite(one.error).any() for one in drawn):
-        told += " Bars: estimated numerical error."
+        told += " Bars: estimated numerical error, unknown where there is none."
+    elif any(np.isfinite(one.level).any() for one in drawn):
+        told += " Their numerical error is unknown."
     if any(np.isfinite(one.chance).any() for one in drawn):
         told += " Boxes: chance of the stretch of road, 95 %, by the number of lines."
     return told

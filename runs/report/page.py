@@ -91,8 +91,8 @@ def _standing(results: Results, given: Given) -> list[Fact]:
     found: list[Fact] = []
     if load and results.optional("static.h5", "contact/force") is not None:
         error = given("static", "estimated error of the load")
-        about = f" ± {quantity(float(f'{error:.2g}'), '%')}" if error else ""
-        found.append(("load at rest", quantity(load, "N") + about))
+        known = f" ± {quantity(float(f'{error:.2g}'), '%')}" if error else ", error unknown"
+        found.append(("load at rest", quantity(load, "N") + known))
         found.append(("deflection", quantity(sunk, "m")))
     if length and width:
         found.append(("footprint at rest", f"{digits(1e3 * length)} × {digits(1e3 * width)} mm"))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -24,9 +24,10 @@ from tireroad.contact.results.error_bars import (
     orders,
     random_share,
     share,
+    similar,
     total,
 )
-from tireroad.contact.results.spectra import Limit, limits, lowest, pitch
+from tireroad.contact.results.spectra import Limit, limits, lowest, pitch, wide_enough
 from tireroad.contact.rolling import bristles
 from tireroad.contact.setup import ContactSetup, on_shape
 from tireroad.contact.tread.between_nodes import (
@@ -41,6 +42,7 @@ from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.sections.mesh2d import Ring
 from tireroad.fem.static.load_error import carried_over
 from tireroad.fem.static.state import StaticState
+from tireroad.greens.fewer_modes import of_fewer_modes
 from tireroad.greens.recursion import sharers
 from tireroad.greens.response import Response
 from tireroad.modal.rolling import RollingModes
@@ -57,7 +59,7 @@ from tireroad.runs.stages.greens import GreensStage, Responses
 from tireroad.runs.stages.modes import Fields, ModesStage, Motions
 from tireroad.runs.stages.rolling import ContactForces, first_step, forces, recursive
 from tireroad.runs.stages.rotating import FullMatrices, RotatingStage
-from tireroad.runs.stages.setup import Setup, points_of, tread_surface
+from tireroad.runs.stages.setup import Probes, Setup, points_of, probes, tread_surface
 from tireroad.runs.stages.stage import Computed, Job, PipelinePart, Record, Result
 from tireroad.runs.stages.static import StaticStage
 from tireroad.runs.stages.training import TrainedMotion
@@ -127,6 +129,7 @@ class Given:
     Its `job`, static state, patch and road (`setup`, not settled), response and rolling modes; the
     first `steps` of `step` s of its loop, integrated by `scheme`. `most`: touching points that a companion may
     have (contact.grid_patch.ratio). `comm`: the processes that repeat a loop together, by default those of the job.
+    `attached`: the modes with their attachment modes, if any (runs.stages.greens.Responses).
     """
 
     job: Job
@@ -140,6 +143,7 @@ class Given:
     most: float = MOST
     comm: MPI.Comm | None = None
     large: bool = False
+    attached: RollingModes | None = None
 
     @property
     def points_ratio(self) -> float:
@@ -150,6 +154,11 @@ class Given:
     def equilibrated(self) -> ContactSetup:
         """The setup with its patch in the static state."""
         return equilibrated(self.job, self.setup, self.response, self.static.product.normal_force)
+
+    @property
+    def probes(self) -> Probes:
+        """The points between which the response is."""
+        return probes(self.job, self.static.product, self.setup)
 
     @cached_property
     def on_coarser_mesh(self) -> tuple[ContactSetup, Response]:
@@ -200,8 +209,22 @@ class Given:
 
     def alone(self) -> Given:
         """The same for this process by itself, with what all processes have found."""
-        known = (name for name in ("equilibrated", "on_coarser_mesh") if name in self.__dict__)
+        names = ("equilibrated", "on_coarser_mesh", "longer", "own", "base")
+        known = (name for name in names if name in self.__dict__)
         return self._keeping(*known, comm=MPI.COMM_SELF)
+
+    def same_loop(self, other: Given) -> bool:
+        """Whether both repeat as many steps of the same size by the same scheme."""
+        return all(
+            getattr(self, name) == getattr(other, name) for name in ("step", "steps", "scheme")
+        )
+
+    def keeping_what(self, other: Given) -> Given:
+        """The same with what another has found for the same loop."""
+        names = ("equilibrated", "longer", "own", "base")
+        made = replace(self)
+        made.__dict__.update({name: vars(other)[name] for name in names if name in vars(other)})
+        return made
 
     def _keeping(self, *names: str, **changes: Any) -> Given:
         """The same with `changes`, and the cached properties `names` as here."""
@@ -330,6 +353,9 @@ def _made(
 
 
 SHARE = 0.5  # of the run's own cost: budget of all companion runs together
+# Of the run's loop: no more of them. On two processes one repeats loops while the other computes the run's own, then both: they
+# end half a loop's time after it.
+LOOPS = 1.75
 _FEWEST, _PERIODS = 64, 2  # least steps after the run-in, and periods of `up_to`, to repeat
 # Cost of five companion runs in time loops per repeated step, by the spacing of that of the points.
 _LOOPS = {2.0: 3.5, 0.5: 6.0}
@@ -364,7 +390,8 @@ class Budget:
 
     @property
     def _whole(self) -> float:
-        return SHARE * (self.before + self.loop * self.steps)
+        loop = self.loop * self.steps
+        return min(SHARE * (self.before + loop), LOOPS * loop)
 
     def most_touching(self, least: int) -> float:
         """Touching points that the companion of the points may have, repeating `least` steps.
@@ -418,11 +445,19 @@ def other_points(given: Given) -> ContactForces:
 
 
 def fewer_modes(given: Given) -> ContactForces:
-    """States up to `FEWER` of the highest mode; those from there to the highest are static.
+    """Modes up to `FEWER` of the highest, with what joins modes joining these. Collective.
 
-    States above the highest mode are kept: they belong to the shapes that joined the modes, without
-    which the band below would shift. Collective.
+    With attachment modes a response of the same kind (greens.fewer_modes): states that are made static lose their inertia, of
+    which attachment modes are there to keep it. Without, the states from there to the highest are static; states above
+    the highest mode are kept: they belong to the rotation shapes, without which the band below would shift.
     """
+    attached = given.attached
+    if attached is not None and not attached.full:
+        comm, points = given.comm or given.job.comm, given.probes
+        arguments = attached, attached.basis.shape, points.loads[points.counted], FEWER
+        residual = given.job.scene.greens.residual
+        kept = of_fewer_modes(given.response, *arguments, residual, comm)
+        return given.repeated(given.equilibrated, kept)
     highest = given.rolling.highest
     joined = given.rolling.basis.projection.shapes > 0
     limits = FEWER * highest, highest if joined else np.inf
@@ -466,36 +501,59 @@ COMPANIONS: dict[str, Callable[[Given], ContactForces]] = {
 """By the cause of the error that each estimates (contact.results.error_bars.CAUSES)."""
 
 
-# Which of several processes repeats the loops of a cause: twice as many points take longer than all others.
-_TURN = {"points": 0, "step": 1, "modes": 1, "mesh": 2}
+# Loops of each cause, about: twice as many points take longer than all others.
+_LONGEST_FIRST = {"points": 8.0, "mesh": 2.0, "modes": 1.0, "step": 0.5}
+_AHEAD = (
+    "points",
+    "step",
+    "modes",
+)  # that need no other process: elements of twice the size take all
+
+
+def _dealt(causes: Iterable[str], count: int) -> list[list[str]]:
+    """Causes, the longest first, for each of `count` processes: the next for the one with the least to do."""
+    hands: list[list[str]] = [[] for _ in range(count)]
+    for cause in causes:
+        least = min(hands, key=lambda hand: sum(_LONGEST_FIRST[one] for one in hand))
+        least.append(cause)
+    return hands
 
 
 class Companion(NamedTuple):
     """The `forces` of a companion run and their reference `beside` (None: the run itself).
 
-    `share`: the fraction of their difference that is the error.
+    `share`: the fraction of their difference that is the error. `within`: of the run's band that in which they are compared, where
+    the error is the run's by similarity (contact.results.error_bars).
     """
 
     forces: ContactForces
     beside: ContactForces | None
-    share: float
+    share: float = 1.0
+    within: float = 1.0
 
-    def bars(
-        self, run: Mapping[str, Measured], since: float, limit: float, up_to: float
-    ) -> dict[str, Bars]:
-        """Error bars of a `run` after `since` s; see contact.results.error_bars.measured."""
-        off = _figures(self.forces, since, limit, up_to)
-        other = _figures(self.beside, since, limit, up_to) if self.beside else run
-        return {name: bars(other[name], off[name], self.share) for name in run}
+    def bars(self, own: ContactForces, since: float, *limits: Any) -> dict[str, Bars]:
+        """Error bars of a run with its `own` forces after `since` s; `limits` as in `figures`."""
+        off = figures(self.forces, since, *limits)
+        run = figures(self.beside or own, since, *limits)
+        if self.within < 1.0:
+            return {name: similar(run[name], off[name], self.within) for name in run}
+        return {name: bars(run[name], off[name], self.share) for name in run}
 
 
-def _figures(
-    forces: ContactForces, since: float, limit: float, up_to: float
+def figures(
+    forces: ContactForces,
+    since: float,
+    limit: float,
+    up_to: float,
+    bands: np.ndarray | None = None,
 ) -> dict[str, Measured]:
+    """The quantities of both forces after `since` s, by name; see contact.results.error_bars.measured."""
     first = round(since / forces.step)
     both = {"contact_force": forces.contact, "axle_force": forces.axle}
     return {
-        name: measured(values[first:], forces.step, limit, up_to) for name, values in both.items()
+        name: measured(values[first:], forces.step, limit, up_to, bands)
+        for name, values in both.items()
+        if values is not None
     }
 
 
@@ -507,16 +565,52 @@ def companions(cause: str, given: Given) -> list[Companion]:
     """
     with console.quiet():
         beside = given.own if cause == "step" else given.base
-        found = [Companion(COMPANIONS[cause](given), beside, _share(cause, given))]
+        told = COMPANIONS[cause](given)
+        if cause == "modes":
+            found = [Companion(told, beside, within=FEWER)]
+        else:
+            found = [Companion(told, beside, _share(cause, given))]
         if cause == "mesh":
             with suppress(InputError, ConvergenceError):
-                found.append(Companion(*finer_wall(given), 1.0))
+                found.append(Companion(*finer_wall(given)))
     return found
+
+
+Told = list[Companion] | ConvergenceError | InputError
+"""The companions of a cause, or why it has none."""
+
+
+def _attempted(record: Record, part: str, run: Callable[[], Any]) -> Any:
+    """The value of `run`, timed, or the error with which it gives up."""
+    try:
+        with record.timing(part):
+            return run()
+    except Refused:
+        raise  # a full disk is no property of the run: it must not be kept as one
+    except (ConvergenceError, InputError) as error:
+        return error
+
+
+class Window(NamedTuple):
+    """What companions repeat (`given`), from which step on they are compared, and to which `limit` and `up_to` (Hz)."""
+
+    given: Given
+    start: int
+    limit: float
+    up_to: float
+
+
+class Ahead(NamedTuple):
+    """What a process `found` beside the loop, by cause, of what was `given`, and the seconds it took."""
+
+    given: Given
+    found: dict[str, Told]
+    cost: dict[str, float]
 
 
 def _share(cause: str, given: Given) -> float:
     points = given.points_ratio if cause == "points" else 2.0
-    size = {"step": 2.0, "points": points, "modes": 1 / FEWER, "mesh": 2.0}[cause]
+    size = {"step": 2.0, "points": points, "mesh": 2.0}[cause]
     order = orders(given.job.tire.section.order, given.scheme)[cause]
     return (random_share if cause == "points" else share)(size, order)
 
@@ -592,32 +686,26 @@ class AccuracyStage(Computed[Accuracy]):
     def compute(self, record: Record) -> Accuracy:
         """Run the companions, beside each other where a process holds a loop by itself; a failed one is reported, its cause
         absent. Collective."""
-        history, setup = self.contact.product, self.setup.product
+        history = self.contact.product
         if self._at_rest:
             return self._none("nothing excites the tire: its forces vary by rounding only")
-        start = first_step(setup, self.job.scene.road, history.time)
-        start += start % 2  # even: where a step of the companion with twice the step begins
-        limit = model_limit(setup, self.rotating.product, history.step).frequency
-        up_to = min(limit, self.job.scene.accuracy.up_to)
-        least = start + least_steps(history.step, up_to)
-        budget = Budget.of(self.job.scene, len(history.time))
-        given = self._given(budget.steps, budget.most_touching(least))
-        steps = budget.window(least, given)
-        if steps - start < 2:
+        window = self._window()
+        if window is None:
             return self._none("the run is too short for a companion run with twice the step")
-        given = given.first(steps)
-        runs = {"contact_force": history.total_force, "axle_force": history.axle_force}
-        runs = {name: values[start:steps] for name, values in runs.items() if values is not None}
-        exact = {
-            name: measured(values, history.step, limit, up_to) for name, values in runs.items()
-        }
+        given, start, limit, up_to = window
+        steps = given.steps
+        axle = None if history.axle_force is None else history.axle_force[:steps]
+        own = ContactForces(history.total_force[:steps], axle, history.step)
+        since = start * history.step
+        bands = wide_enough(1 / (len(history.time) * history.step - since), limit)
+        exact = figures(own, since, limit, up_to, bands)
         found: dict[str, dict[str, Bars]] = {name: {} for name in exact}
         absent: dict[str, str] = {}
         for cause, told in self._companions(given, record).items():
             if isinstance(told, Exception):
                 absent[cause] = str(told)
                 continue
-            parts = [one.bars(exact, start * history.step, limit, up_to) for one in told]
+            parts = [one.bars(own, since, limit, up_to, bands) for one in told]
             for name in exact:
                 found[name][cause] = total(dict(enumerate(part[name] for part in parts)))
         product = Accuracy(
@@ -628,7 +716,7 @@ class AccuracyStage(Computed[Accuracy]):
             by_cause=found,
             absent=absent,
         )
-        record.indicators["errors are estimated from"] = (start * history.step, "s")
+        record.indicators["errors are estimated from"] = (since, "s")
         record.indicators["errors are estimated up to"] = (product.window, "s")
         _describe(record, product, exact, limit)
         if self.nonlinear is not None:
@@ -637,34 +725,61 @@ class AccuracyStage(Computed[Accuracy]):
             )
         return product
 
-    def _companions(
-        self, given: Given, record: Record
-    ) -> dict[str, list[Companion] | ConvergenceError | InputError]:
+    def _window(self) -> Window | None:
+        """What companions repeat; None of a run too short for any. The same on every process."""
+        history, setup = self.contact.product, self.setup.product
+        start = first_step(setup, self.job.scene.road, history.time)
+        start += start % 2  # even: where a step of the companion with twice the step begins
+        limit = model_limit(setup, self.rotating.product, history.step).frequency
+        up_to = min(limit, self.job.scene.accuracy.up_to)
+        least = start + least_steps(history.step, up_to)
+        budget = Budget.of(self.job.scene, len(history.time))
+        given = self._given(budget.steps, budget.most_touching(least))
+        steps = budget.window(least, given)
+        return Window(given.first(steps), start, limit, up_to) if steps - start >= 2 else None
+
+    def ahead(self, ended: Callable[[], bool]) -> None:
+        """Repeat loops while the root computes the run's own, until that has `ended`: those that need nothing of other
+        processes. Not collective, and not for the root."""
+        window, comm = None if self._at_rest else self._window(), self.job.comm
+        if window is None:
+            return
+        given, record, found = window.given.alone(), Record(), dict[str, Told]()
+        for cause in _dealt(_AHEAD, comm.size - 1)[comm.rank - 1]:
+            if not ended():
+                found[cause] = _attempted(record, cause, partial(companions, cause, given))
+        self.job.ahead[self.name] = Ahead(given, found, dict(record.cost))
+
+    def _companions(self, given: Given, record: Record) -> dict[str, Told]:
         """The companions of each cause, or why it has none. Collective."""
-        comm = self.job.comm
-
-        def attempted(part: str, run: Callable[[], Any]) -> Any:
-            try:
-                with record.timing(part):
-                    return run()
-            except Refused:
-                raise  # a full disk is no property of the run: it must not be kept as one
-            except (ConvergenceError, InputError) as error:
-                return error
-
-        coarse = attempted("coarser mesh", lambda: given.on_coarser_mesh)
-        lacking = isinstance(coarse, ConvergenceError | InputError)
-        found: dict[str, Any] = {"mesh": coarse} if lacking else {}
+        comm, mine = self.job.comm, self.job.ahead.pop(self.name, None)
+        if mine is not None and mine.given.same_loop(given):
+            given, known = given.keeping_what(mine.given), (mine.found, mine.cost)
+        else:
+            known = {}, {}
+        found: dict[str, Told] = {}
+        for part, seconds in comm.allgather(known):
+            found |= part
+            record.cost |= seconds
+        if isinstance(steps := found.get("step"), list):
+            given.__dict__["longer"] = steps[
+                0
+            ].forces  # nearly every other loop is compared with it
+        coarse = _attempted(record, "coarser mesh", lambda: given.on_coarser_mesh)
+        if isinstance(coarse, ConvergenceError | InputError):
+            found["mesh"] = coarse
         alone = sharers(given.response.resolved(given.step), comm).size < comm.size
-        one = given.alone() if alone else given
-        for cause in CAUSES:
-            mine = not alone or min(_TURN[cause], comm.size - 1) == comm.rank
-            if mine and cause not in found:
-                found[cause] = attempted(cause, partial(companions, cause, one))
-        if alone:
-            for part, seconds in comm.allgather((found, dict(record.cost))):
-                found |= part
-                record.cost |= seconds
+        left = [cause for cause in _LONGEST_FIRST if cause not in found]
+        if not alone:
+            for cause in left:
+                found[cause] = _attempted(record, cause, partial(companions, cause, given))
+            return {cause: found[cause] for cause in CAUSES}
+        one, more = given.alone(), dict[str, Told]()
+        for cause in _dealt(left, comm.size)[comm.rank]:
+            more[cause] = _attempted(record, cause, partial(companions, cause, one))
+        for part, seconds in comm.allgather((more, dict(record.cost))):
+            found |= part
+            record.cost |= seconds
         return {cause: found[cause] for cause in CAUSES}
 
     def end(self, key: str, product: Accuracy) -> None:
@@ -697,6 +812,7 @@ class AccuracyStage(Computed[Accuracy]):
             scheme=recursive(self.contact.product.scheme),
             most=most,
             large=self.nonlinear is not None,
+            attached=self.greens.product.attached,
         )
 
     def write(self, file, product: Accuracy) -> None:
@@ -735,6 +851,16 @@ class AccuracyStage(Computed[Accuracy]):
             by_cause=by_cause,
             absent=absent,
         )
+
+
+def begin_ahead(
+    job: Job,
+    parts: Mapping[str, Result],
+    foreseen: ContactHistory,
+    ended: Callable[[], bool],
+) -> None:
+    """Repeat loops of a run beside its own (AccuracyStage.ahead), whose steps and scheme are `foreseen`. Not collective."""
+    AccuracyStage(job=job, contact=Result("", lambda: foreseen), **parts).ahead(ended)
 
 
 def _describe(

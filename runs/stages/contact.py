@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -34,11 +35,12 @@ from tireroad.fem.static.footprint import Footprint
 from tireroad.fem.static.state import StaticState
 from tireroad.greens.coupling import Wheel
 from tireroad.greens.large_motion import LargeTire
-from tireroad.greens.recursion import Recursion
+from tireroad.greens.recursion import Recursion, sharers
 from tireroad.greens.response import Response
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.process import console
+from tireroad.runs.process.mpi import on_root_beside
 from tireroad.runs.process.signals import Deferred, Stopped
 from tireroad.runs.scene.tables.scene import RoadTable, Scene
 from tireroad.runs.stages import contact_file
@@ -482,8 +484,43 @@ class ContactStage(Stage[ContactHistory]):
 
     def produce(self, key: str, record: Record) -> ContactHistory:
         """Run the time loop and read the history back. Collective."""
-        self._roll(key, record)
+        beside = None if self.nonlinear else self.job.beside_loop
+        if beside is None or self.job.comm.size == 1 or not (plan := self._held_by_one()):
+            self._roll(key, record)
+            return self.stored()
+        console.say(
+            "  the first process computes the loop, which is too small to distribute, the others its error bars"
+        )
+        given = {name: getattr(self, name) for name in ("static", "rotating", "greens", "setup")}
+        for part in given.values():  # reading one is collective
+            _ = part.product
+        alone = replace(self, job=self.job.alone())
+
+        def meanwhile(ended: Callable[[], bool]) -> None:
+            beside(self.job, given, alone._foreseen(plan), ended)
+
+        on_root_beside(self.job.comm, lambda: alone._roll(key, record), meanwhile)
         return self.stored()
+
+    def _held_by_one(self) -> Planned | None:
+        """The planned steps of a loop that each process would compute whole; None of one that they share. Collective."""
+        with console.quiet():
+            shortest = shortest_excitation(self.job.scene, self.setup.product)
+            plan = planned(self.job, Record(), self.greens.product.contact, shortest)
+        return plan if sharers(plan.response, self.job.comm).size < self.job.comm.size else None
+
+    def _foreseen(self, plan: Planned) -> ContactHistory:
+        """Steps and scheme of the loop, before it has any forces. Not collective."""
+        with console.quiet():
+            force = self.static.product.normal_force
+            setup, _ = self.setup.product.equilibrated(
+                self.greens.product.contact, force, self.job.scene.contact
+            )
+            scheme = chosen_scheme(self.job, Record(), setup, plan, None, False).scheme
+        time = plan.step * np.arange(1, plan.steps + 1)
+        return ContactHistory(
+            step=plan.step, scheme=scheme, time=time, total_force=np.zeros((0, 3))
+        )
 
     def _roll(self, key: str, record: Record) -> None:
         """Run the time loop with the scheme that suits the contact; the other one if it chatters.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import h5py
 import numpy as np
@@ -21,7 +21,7 @@ from tireroad.runs.scene.physics import turning_of
 from tireroad.runs.scene.tables.scene import PointForceTable, has_air
 from tireroad.runs.stages import cavity, corner, rotating
 from tireroad.runs.stages.modes import fill_projection, read_projection
-from tireroad.runs.stages.setup import components, points_of, probes
+from tireroad.runs.stages.setup import Probes, components, points_of, probes
 from tireroad.runs.stages.stage import MUMPS, Computed, Record, Result
 
 _UNITS = {
@@ -78,7 +78,7 @@ class Responses:
 
     `contact`: between the points of the patch, with the prescribed forces among its inputs;
     `force`: between the points of the prescribed forces. `attached`: the modes with their attachment
-    modes, whose states these are, without their fields; None without the latter.
+    modes, whose states these are, None without the latter; of their fields only what the probes read.
     """
 
     contact: Response | None = None
@@ -157,7 +157,7 @@ class GreensStage(Computed[Responses]):
             corner.check_blocked(record, rolling, loads, top)
         responses = self._apart(points.name, response)
         if made.attached is not None:
-            responses = replace(responses, **self._of_attached(made.attached))
+            responses = replace(responses, attached=_as_read(made.attached, points))
         self._describe(record, responses)
         return responses
 
@@ -178,12 +178,6 @@ class GreensStage(Computed[Responses]):
         record.indicators |= response.figures
         record.warnings += response.warnings
         return response
-
-    def _of_attached(self, attached: RollingModes) -> dict[str, Any]:
-        """The part that the contact needs of the modes with attachment modes: not their fields, which on
-        fine meshes take gigabytes."""
-        basis = replace(attached.basis, shape=attached.basis.shape[:0])
-        return {"attached": replace(attached, basis=basis)}
 
     def _apart(self, name: str, whole: Response) -> Responses:
         """The contact's response, with prescribed forces as inputs (contact.loop), and theirs."""
@@ -231,6 +225,7 @@ class GreensStage(Computed[Responses]):
         if product.attached is not None:
             group, basis = file.create_group(_ATTACHED), product.attached.basis
             put(group, "frequency", basis.frequency, "Hz")
+            put(group, "reading", basis.shape, "kg^-1/2")
             fill_projection(group, basis.projection)
             rotating.fill(group.create_group("states"), product.attached)
 
@@ -243,13 +238,20 @@ class GreensStage(Computed[Responses]):
         group = file[_ATTACHED]
         frequency, own = group["frequency"][:], len(group["projected/squares"])
         projection = read_projection(group, self.job.axle, own - len(frequency))
-        shape = np.zeros((0, own))
+        shape = group["reading"][:]
         attached = RollingModes(
             basis=ModalBasis(frequency=frequency, shape=shape, projection=projection),
             states=rotating.read(group["states"]),
             turning=turning_of(self.job.scene, self.job.speed),
         )
         return replace(responses, attached=attached)
+
+
+def _as_read(rolling: RollingModes, points: Probes) -> RollingModes:
+    """The modes with what the counted probes read of them in place of their fields, which on fine meshes take gigabytes."""
+    wanted = points.loads[points.counted]
+    shape = wanted[:, : len(rolling.basis.shape)] @ rolling.basis.shape[: wanted.shape[1]]
+    return replace(rolling, basis=replace(rolling.basis, shape=shape))
 
 
 def _share_of_residual(record, where: str, response: Response) -> None:

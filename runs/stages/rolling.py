@@ -177,13 +177,13 @@ def driven_tire(
 
 
 class ContactForces(NamedTuple):
-    """Forces (n, 3) N of the road on the tire (`contact`) and of the tire on the axle (`axle`).
+    """Forces (n, 3) N of the road on the tire (`contact`) and of the tire on the axle (`axle`, None where unknown).
 
     After each of n steps of `step` s.
     """
 
     contact: np.ndarray
-    axle: np.ndarray
+    axle: np.ndarray | None
     step: float
 
 

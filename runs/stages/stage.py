@@ -9,7 +9,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, ExitStack
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields, replace
 from functools import cached_property, reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
@@ -78,7 +78,9 @@ def _shown(value: Any) -> str:
 class Job:
     """The scene, its result folder, and the processes that compute it.
 
-    `fresh`: reuse nothing; `cache`: finished stages shared with other runs, by default none.
+    `fresh`: reuse nothing; `cache`: finished stages shared with other runs, by default none. `processes`: as many as
+    compute the run, by default those of `comm`. `beside_loop`: work for processes that the contact loop leaves idle
+    (runs.stages.contact); `ahead`: what this process found by it, by stage.
     """
 
     scene: Scene
@@ -87,6 +89,13 @@ class Job:
     fresh: bool = False
     cache: Cache = NO_CACHE
     found: dict[str, float] = field(default_factory=dict)
+    processes: int = 0
+    beside_loop: Callable[..., None] | None = None
+    ahead: dict[str, Any] = field(default_factory=dict)
+
+    def alone(self) -> Job:
+        """The same for this process by itself; its files are those of the run on all processes."""
+        return replace(self, comm=MPI.COMM_SELF, processes=self.processes or self.comm.size)
 
     @property
     def speed(self) -> float:
@@ -139,7 +148,9 @@ class Job:
 
     def provenance(self, stage: str, key: str) -> store.Provenance:
         """Provenance of a stage's file; `key` is the hash of the stage's inputs."""
-        return store.Provenance(self.scene.name, dumps(self.scene), stage, key, self.comm.size)
+        return store.Provenance(
+            self.scene.name, dumps(self.scene), stage, key, self.processes or self.comm.size
+        )
 
     def write(self, path: Path, provenance: store.Provenance, fill: Callable[[Any], None]) -> None:
         """Write a file with `fill(file)` on the root process. Collective."""

@@ -123,7 +123,7 @@ function drawBars(given, box, key) {
   };
   const tenths = v => (v < 0 ? "−" : "+") + Math.abs(v).toFixed(1);
   const byChance = n => (lows[n] == null || highs[n] == null ? "" : `, by chance ${tenths(lows[n])} to ${tenths(highs[n])}`);
-  const told = (k, v, n) => (v == null ? "–" : digits(v) + (errors[k][n] == null ? "" : " ± " + digits(errors[k][n])) + byChance(n));
+  const told = (k, v, n) => (v == null ? "–" : digits(v) + (errors[k][n] == null ? ", error unknown" : " ± " + digits(errors[k][n])) + byChance(n));
   const plot = new uPlot({
     width: box.clientWidth, height: given.height,
     scales: { x: { time: false, range: shown }, y: { range: (_, low, high) => [given.floor, Math.max(high, given.top)] } },

@@ -216,7 +216,7 @@ def _show_bands(
         chance=sure,
     )
     picture = figures.third_octaves(centre, level, error, label, few, chance=sure)
-    section.show(picture, _caption(of, error, few, sure), drawn)
+    section.show(picture, _caption(of, level, error, few, sure), drawn)
 
 
 def _in_numbers(
@@ -234,8 +234,10 @@ def _in_numbers(
 
 
 def _bounded(level: float, error: float) -> str:
-    known = level > SILENT and np.isfinite(error)
-    return _texts(np.array([level]))[0] + (f" {about(error)}" if known else "")
+    if level <= SILENT:
+        return _texts(np.array([level]))[0]
+    known = about(error) if np.isfinite(error) else "(error unknown)"
+    return f"{_texts(np.array([level]))[0]} {known}"
 
 
 def few_lines(results: Results, count: int) -> NDArray:
@@ -246,12 +248,18 @@ def few_lines(results: Results, count: int) -> NDArray:
     return np.zeros(count, bool) if held is None else times * held < FEW
 
 
-def _caption(of: str, error: NDArray | None, few: NDArray, sure: NDArray | None) -> str:
+def _caption(
+    of: str, level: NDArray, error: NDArray | None, few: NDArray, sure: NDArray | None
+) -> str:
     caption = f"Third-octave bands of the {of}, rms."
     if sure is not None:
         caption += " Boxes: chance of the stretch of road, 95 %, by the number of lines."
     if error is not None and np.isfinite(error).any():
         caption += " Lines on the bars: estimated numerical error, by mesh, modes, step and points."
+        if np.isnan(error[level > SILENT]).any():
+            caption += " Of bars without a line it is unknown."
+    else:
+        caption += " Their numerical error is unknown."
     if few.any():
         caption += f" Pale: fewer than {FEW} lines in the band, so its level may be off by more than 3 dB by chance."
     return caption

@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from tireroad.contact.results.error_bars import Bars, Measured, bars, measured, random_share, total
+from tireroad.contact.results.error_bars import (
+    Bars,
+    Measured,
+    bars,
+    measured,
+    random_share,
+    similar,
+    total,
+)
 
 
 def at(size: float, rate: float) -> Measured:
@@ -34,7 +42,7 @@ def test_a_band_that_the_companion_lacks_is_unknown():
         companion.deviation,
         companion.centre[1:],
         companion.level[1:],
-        companion.low,
+        companion.lines,
     )
     found = bars(at(1.0, 2.0), companion, 1 / 3)
     assert np.isnan(found.level[0]).all()
@@ -83,3 +91,63 @@ def test_errors_that_fall_anywhere_on_every_grid(ratio):
     )
     share = random_share(ratio, order)
     assert share * np.std(companion - own) == pytest.approx(np.std(own), rel=0.01)
+
+
+def truncated(top: float, order: float, step: float, count: int) -> np.ndarray:
+    """White noise, as far off at each frequency as a model with modes to `top` Hz: 0.05 (f / top)^order."""
+    lines = np.fft.rfftfreq(count, step)
+    phase = np.exp(2j * np.pi * np.random.default_rng(5).random(len(lines)))
+    spectrum = count * phase * (1 + 0.05 * (lines / top) ** order)
+    spectrum[0] = 0.0
+    return np.outer(np.fft.irfft(spectrum, count), [1.0, 1.0, 1.0]) + 10.0
+
+
+@pytest.mark.parametrize(("order", "part"), [(2.0, 0.71), (3.0, 1.09), (4.0, 1.5)])
+def test_truncated_modes_are_told_by_similarity(order, part):
+    """The companion differs by 1 - q^r of its error at q f, which is the run's at f; `part` is 2 sinh(r ln 2 / 4)."""
+    step, count, top, within = 1e-3, 8192, 400.0, np.sqrt(0.5)
+    own, exact = (truncated(highest, order, step, count) for highest in (top, 1e9))
+    companion = truncated(within * top, order, step, count)
+    run, true, other = (measured(force, step, 0.8 * top) for force in (own, exact, companion))
+    found, wanted = similar(run, other, within), bars(run, true, 1.0)
+    assert found.history == pytest.approx((1 - within**order) * wanted.history, rel=0.03)
+    high = run.centre > 60.0
+    assert np.isfinite(found.level).all()
+    # Their error is in phase with them throughout, so that half of it is told.
+    ratio = found.level[high] / (0.5 * part * wanted.level[high])
+    assert (ratio > 0.8).all() and (ratio < 1.5).all()
+
+
+def test_errors_of_any_phase_are_seldom_understated():
+    """Of levels, the signed difference is below half of the true error in three cases of ten."""
+    step, count, top, within, random = 1e-3, 1024, 400.0, np.sqrt(0.5), np.random.default_rng(2)
+    lines = np.fft.rfftfreq(count, step)
+
+    def noise(size: float) -> np.ndarray:
+        turn = np.exp(2j * np.pi * random.random((len(lines), 3)))
+        return size * count * turn
+
+    under = []
+    for _ in range(40):
+        exact, shape = noise(1.0), noise(0.05)
+        shape *= (lines[:, None] / top) ** 3
+        forces = [np.fft.irfft(exact + a * shape, count, axis=0) for a in (0.0, 1.0, within**-3)]
+        true, run, other = (measured(force, step, 0.8 * top) for force in forces)
+        found, wanted = similar(run, other, within), bars(run, true, 1.0)
+        under.append(found.level < 0.5 * wanted.level)
+    assert np.mean(under) < 0.1
+
+
+@pytest.mark.parametrize("count", [64, 256])
+def test_a_short_record_tells_of_bands_by_the_lines_next_to_them(count):
+    """Of an error in phase that grows as f^3, half counts: of all bands of a longer record, whether this one has levels or not."""
+    step, bands = 1e-3, 1000 * 10 ** (np.arange(-10, -5) / 10)
+    own, other = (truncated(top, 3.0, step, count) for top in (400.0, 283.0))
+    run, companion = (measured(force, step, 320.0, bands=bands) for force in (own, other))
+    assert (run.centre == bands).all() and np.isnan(run.level[0]).all() == (count == 64)
+    true = 20 * np.log10(1 + 0.05 * (bands / 400.0) ** 3)
+    found = bars(run, companion, 1 / (2**1.5 - 1)).level[:, 2]
+    alone = np.isnan(run.level[:, 2])
+    assert (found[alone] / true[alone] < 1.0).all() and (found[alone] / true[alone] > 0.3).all()
+    assert found[~alone] == pytest.approx(true[~alone], rel=0.25)
+    assert np.isfinite(similar(run, companion, np.sqrt(0.5)).level).all()

@@ -131,3 +131,35 @@ def test_a_stop_says_what_the_command_goes_on_from(monkeypatch, capsys, command,
     assert cli.main([command, "any.toml"]) == STOPPED
     said = capsys.readouterr().err
     assert said.startswith("stopped by SIGINT: ") and words in said and len(said.splitlines()) == 1
+
+
+@pytest.mark.mpi
+def test_the_others_work_until_the_root_has_ended():
+    comm, asked = MPI.COMM_WORLD, []
+
+    def meanwhile(ended) -> None:
+        began = time.monotonic()
+        asked.append(ended())
+        while not ended() and time.monotonic() - began < 30.0:
+            time.sleep(0.01)
+        asked.append(ended())
+
+    def slow() -> int:
+        time.sleep(0.3)
+        return 7
+
+    assert mpi.on_root_beside(comm, slow, meanwhile) == 7
+    assert asked == ([False, True] if comm.rank else [])
+
+
+@pytest.mark.mpi
+def test_what_fails_on_the_root_fails_on_the_others_that_worked_meanwhile():
+    comm = MPI.COMM_WORLD
+
+    def fails() -> None:
+        raise ConvergenceError("no luck")
+
+    for _ in range(2):  # a notice that was left unread would end the second before it began
+        with pytest.raises(ConvergenceError, match="no luck"):
+            mpi.on_root_beside(comm, fails, lambda ended: None)
+    assert not comm.iprobe(tag=mpi._ENDED)

@@ -11,13 +11,22 @@ from mpi4py import MPI
 from tires import soft_torus
 
 from tireroad.contact.results.error_bars import CAUSES, bars, measured
+from tireroad.contact.results.spectra import wide_enough
 from tireroad.contact.tread.kernel import KernelTread
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.disk import Refused
 from tireroad.runs.pipeline import run_scene
 from tireroad.runs.process import console
 from tireroad.runs.scene.load import load
-from tireroad.runs.stages.accuracy import Given, backed, coarser, coarser_job, companions
+from tireroad.runs.stages.accuracy import (
+    Given,
+    _dealt,
+    backed,
+    coarser,
+    coarser_job,
+    companions,
+)
+from tireroad.runs.stages.rolling import ContactForces
 from tireroad.runs.stages.setup import points_of
 from tireroad.runs.stages.stage import Job
 
@@ -103,7 +112,7 @@ def test_a_companion_is_the_run_it_stands_for(
     other, _ = run(f"{cause}-{friction}", "contact", f"contact.friction={friction}", *sets)
     told = companions(cause, given)
     assert len(told) == (2 if cause == "mesh" else 1)
-    forces, beside, part = told[0]
+    forces, beside, part, _ = told[0]
     assert forces.step == 2e-4 and (beside is None) == (cause == "step")
     # Elements of order 2 make 3; the footprint is a few points wide, so that finer ones tell, whose errors have
     # nothing to do with the run's.
@@ -120,15 +129,37 @@ def test_the_step_is_told_by_the_order_of_the_scheme(whole, scheme):
     limit, step = 200.0, 4e-4
     given = replace(_given(whole), scheme=scheme, step=step, steps=70)
     fine = replace(given, scheme="linear", step=step / 8, steps=8 * 70)
-    own, exact = (
-        measured(found.contact, found.step, limit)
-        for found in (
-            one.repeated(one.equilibrated, one.response, coarser=1) for one in (given, fine)
-        )
-    )
+    own, exact = (one.repeated(one.equilibrated, one.response, coarser=1) for one in (given, fine))
     (told,) = companions("step", given)
-    estimated = told.bars({"contact_force": own}, 0.0, limit, limit)["contact_force"].history[2]
-    assert 0.5 < estimated / bars(own, exact, 1.0).history[2] < 2.0
+    estimated = told.bars(own, 0.0, limit, limit)["contact_force"].history[2]
+    both = (measured(found.contact, found.step, limit) for found in (own, exact))
+    assert 0.5 < estimated / bars(*both, 1.0).history[2] < 2.0
+
+
+@pytest.mark.long
+def test_fewer_modes_have_attachment_modes_of_their_own(run):
+    """Their error is that of a run with so many modes: within a factor of two of that against twice the modes."""
+    rough = 'road={kind="texture",rms=2e-4,roll_off=0.2,cut_off=0.03,run_in=0.05}'
+    sets = "greens.residual=attachment", "contact.youngs_modulus=1e7", rough, "time.duration=0.06"
+    _, whole = run("attached", "contact", *sets)
+    _, finer = run("attached-finer", "contact", *sets, "modal.count=60")
+    history, exact = (one.done["contact"].product for one in (whole, finer))
+    given = replace(_given((None, whole)), steps=600, attached=whole.greens.attached)
+    limit = 0.8 * whole.rolling.highest / (2 * np.pi)
+    (told,) = companions("modes", given)
+    assert told.within == pytest.approx(np.sqrt(0.5))
+    own = ContactForces(history.total_force, history.axle_force, history.step)
+    estimated = told.bars(own, 0.02, limit, limit)["contact_force"].history[2]
+    both = (measured(one.total_force[200:], one.step, limit) for one in (history, exact))
+    assert 0.5 < estimated / bars(*both, 1.0).history[2] < 2.0
+
+
+def test_companions_are_dealt_to_the_process_with_the_least_to_do():
+    causes = ("points", "mesh", "modes", "step")
+    assert _dealt(causes, 1) == [list(causes)]
+    assert _dealt(causes, 2) == [["points"], ["mesh", "modes", "step"]]
+    assert _dealt(causes, 3) == [["points"], ["mesh"], ["modes", "step"]]
+    assert _dealt((), 2) == [[], []]
 
 
 @pytest.mark.long
@@ -190,6 +221,16 @@ def test_bars_are_in_the_summary_and_beside_the_bands(whole):
     with h5py.File(folder / "spectra.h5") as file:
         shape = file["third_octave/level"].shape
         assert file["third_octave/level_error"].shape == shape
+
+
+@pytest.mark.long
+def test_bands_have_error_bars_that_companions_are_too_short_for(run):
+    folder, done = run("longer", "spectra", "time.duration=0.2", "road.run_in=0.01")
+    accuracy = done.done["accuracy"].product
+    with h5py.File(folder / "spectra.h5") as file:
+        assert np.isfinite(file["third_octave/level_error"][:]).all()
+        centre = file["third_octave/centre"][:]
+    assert accuracy.window < 0.1 and len(centre) > len(wide_enough(1 / accuracy.window, 200.0))
 
 
 @pytest.mark.long

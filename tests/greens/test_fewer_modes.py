@@ -1,0 +1,98 @@
+"""The response of fewer modes, from the small matrices of one with more, beside that of the finite elements."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from scipy import sparse
+
+from tireroad.fem.errors import InputError
+from tireroad.fem.matrices import probe
+from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.load_steps import LoadStepper
+from tireroad.fem.tire.body import Body
+from tireroad.fem.tire.material import compound
+from tireroad.fem.wheel import Turning
+from tireroad.greens import coupling
+from tireroad.greens.coupling import Basis, Wheel
+from tireroad.greens.fewer_modes import of_fewer_modes
+from tireroad.modal.basis import ModalBasis, project
+from tireroad.modal.rolling import RollingModes
+from tireroad.modal.rotation_shapes import with_rotation_shapes
+from tireroad.modal.solver import undamped
+from tireroad.runs.validation.cases import thesis_torus
+
+COMM = MPI.COMM_WORLD
+SOFT = {"model": "neo-hookean", "youngs_modulus": 48e6, "poisson_ratio": 0.45, "density": 1200.0}
+DAMPING = (100.0, 0.0)
+
+
+@pytest.fixture(scope="module")
+def tire():
+    """7,200 unknowns, 60 modes, loads at 9 x 5 points of the footprint."""
+    section = thesis_torus(segments=24, elements_arc=9, footprint_size=0.4)
+    body = Body(COMM, section, compound(**SOFT))
+    LoadStepper(Equilibrium(body), lambda progress: None).inflate(2e5)
+    operators = Operators(body, 2e5)
+    modes = undamped.solve(operators.stiffness, operators.mass, 60)
+    spots = [
+        probe.directed(probe.spot(body.lattice, angle, arc), (0, 0, 1.0))
+        for angle in np.linspace(-0.175, 0.175, 9)
+        for arc in np.linspace(-0.32, 0.32, 5)
+    ]
+    return operators, modes, sparse.csr_matrix(np.stack(spots))
+
+
+def attached(tire, count: int, speed: float):
+    """Response of so many modes with rotation shapes and attachment modes, and the modes with these, as the points see them."""
+    operators, modes, probes = tire
+    rotation = operators.rotation() if speed else None
+    turning = Turning(speed=speed, damping=DAMPING)
+    wheel = Wheel(
+        operators=operators, rotation=rotation, speed=speed, damping=DAMPING, inertia="full"
+    )
+    few = modes.first(count)
+    given = operators.carried, COMM
+    few = with_rotation_shapes(few, project(few, rotation, *given), operators, rotation, turning)
+    projection = project(few, rotation, *given)
+    projection = replace(projection, shapes=len(few.squares) - count)
+    shape = operators.trace(few.vectors)
+    basis = Basis(shape=shape, projection=projection, states=wheel.decouple(projection, COMM))
+    response, grown = wheel.respond_attached(basis.at(turning), few, probes, probes)
+    seen = ModalBasis(
+        frequency=grown.projection.frequency,
+        shape=probes @ grown.shape,
+        projection=grown.projection,
+    )
+    return response, RollingModes(basis=seen, states=grown.states, turning=turning)
+
+
+@pytest.mark.long
+@pytest.mark.mpi
+@pytest.mark.parametrize("speed", [0.0, 30.0, 60.0])
+def test_it_is_as_far_off_as_as_few_modes_on_the_finite_elements(tire, speed, monkeypatch):
+    """In the band of the fewer modes the difference to the whole response is that of the finite elements' own, within a
+    tenth; standing, states that are made static are twice as far off there and more."""
+    monkeypatch.setattr(coupling, "FEW", 0)
+    _, modes, probes = tire
+    run, rolling = attached(tire, 60, speed)
+    share = 0.5 * (modes.frequency[41] + modes.frequency[42]) / modes.frequency[59]
+    few, _ = attached(tire, 42, speed)
+    found = of_fewer_modes(run, rolling, rolling.basis.shape, probes, share, "attachment", COMM)
+    frequency = np.linspace(0.0, 0.8 * share * modes.frequency[59], 12)
+    whole = run.receptance(frequency)
+    far, true = (np.linalg.norm(one.receptance(frequency) - whole) for one in (found, few))
+    assert 0.9 < far / true < 1.1
+    limits = 2 * np.pi * modes.frequency[59] * np.array([share, 1.0])
+    static = run.keeping_where(lambda s: (np.abs(s) <= limits[0]) | (np.abs(s) > limits[1]))
+    assert speed or np.linalg.norm(static.receptance(frequency) - whole) > 2 * true
+    np.testing.assert_allclose(found.receptance(np.zeros(1)), whole[:1], rtol=1e-9, atol=1e-18)
+
+
+def test_all_modes_or_none_are_refused(tire):
+    run, rolling = attached(tire, 20, 0.0)
+    for share in (1e-3, 1.5):
+        with pytest.raises(InputError, match="far below"):
+            of_fewer_modes(run, rolling, rolling.basis.shape, tire[2], share, "attachment", COMM)
