@@ -297,6 +297,11 @@ class Losses:
         losses, beyond = self._motion.losses, self._circulation
         return losses.lost + self._relaxed.lost, losses.drive, beyond.work, beyond.lead
 
+    @property
+    def slow(self) -> float:
+        """Energy (J) lost in slow rubber, a part of that lost in the material; of a run whose losses are known."""
+        return self._relaxed.lost
+
     def begin(self, kept: dict[str, np.ndarray]) -> None:
         """Begin at the forces and states that the tire has at t = 0, `kept` in its snapshot."""
         if self._motion is not None:
@@ -375,6 +380,10 @@ def describe_energy(
         _standing(record, rolling, total, left, slight)
     else:
         lost, drive, beyond, springs_lead = losses.found
+        record.indicators["energy lost in slow rubber, part of that in the material"] = (
+            losses.slow,
+            "J",
+        )
         taken = springs_lead - work.lead
         _rolling(record, total, left, lost, drive, beyond, taken, slight)
 
