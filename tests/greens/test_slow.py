@@ -18,9 +18,10 @@ SPOTS = [(a, b) for a in np.radians([-12.0, 0.0, 12.0]) for b in np.radians([-8.
 
 
 @cache
-def tire() -> library.Standing:
-    """A coarse passenger tire, inflated."""
-    model = library.radial("205/60 R15", segments=8, elements_arc=6)
+def tire(shared: bool = False) -> library.Standing:
+    """A coarse passenger tire, inflated, of this process alone or `shared` by all."""
+    comm = MPI.COMM_WORLD if shared else MPI.COMM_SELF
+    model = library.radial("205/60 R15", segments=8, elements_arc=6, comm=comm)
     static = library.press(model, inflation=2.2e5)
     return library.modes(
         model, static, up_to=250.0, turning=Turning(speed=72.0, damping=StrainEnergy())
@@ -28,9 +29,9 @@ def tire() -> library.Standing:
 
 
 @cache
-def response(speed: float, residual: str = "static") -> Response:
+def response(speed: float, residual: str = "static", shared: bool = False) -> Response:
     turning = Turning(speed=speed, damping=StrainEnergy())
-    return library.roll(tire(), turning).at(SPOTS, residual)
+    return library.roll(tire(shared), turning).at(SPOTS, residual)
 
 
 def at_rest(found: Response) -> np.ndarray:
@@ -205,3 +206,15 @@ def test_a_selection_of_states_keeps_what_relaxes():
     )
     some = found.between(slice(3), slice(3))
     assert some.relaxing == found.relaxing
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("speed", [0.0, 72.0])
+def test_the_same_on_any_number_of_processes(speed):
+    """Receptances of a tire shared by all processes, and of this process alone; and each process has the same poles."""
+    alone, shared = response(speed), response(speed, shared=True)
+    frequency = np.array([0.1, 2.0, 30.0])
+    exact, found = (one.receptance(frequency) for one in (alone, shared))
+    assert np.abs(found - exact).max() < 1e-6 * np.abs(exact).max()
+    poles = np.concatenate([shared.eigenvalue, shared.output.ravel()])
+    assert np.array_equal(MPI.COMM_WORLD.bcast(poles), poles)
