@@ -207,7 +207,7 @@ class Wheel:
         return self.damping
 
     @cached_property
-    def _compounds(self) -> list[Compound]:
+    def compounds(self) -> list[Compound]:
         """The compounds of the tire."""
         return self.operators.compounds()
 
@@ -252,9 +252,9 @@ class Wheel:
     ) -> tuple[Response, Basis]:
         """`respond` with attachment modes, and the basis of modes with them whose states it has.
         Collective."""
-        probes = _together(outputs, loads)
+        probes = together(outputs, loads)
         whole, grown = self._attached(basis, modes, probes)
-        return _between(whole, outputs, loads), grown
+        return between(whole, outputs, loads), grown
 
     def _beside(self, hub: Probes) -> Array:
         """Own rows (3, n) of momentum; with A_0 to A_2 of greens.response (12, n) if `hub` is read."""
@@ -381,7 +381,7 @@ class Wheel:
         """The basis of modes with attachment modes, and its fields; `known`: on the first of them,
         whose modes are reused. Of the shapes that join, only dynamic ones stay. Collective."""
         operators, comm = self.operators, self.operators.body.comm
-        compounds = self._compounds if self._apart else ()
+        compounds = self.compounds if self._apart else ()
         same = known and known.first(known.modes)
         projection = project(grown, self.rotation, operators.carried, comm, same, compounds)
         if known is not None:
@@ -429,7 +429,7 @@ class Wheel:
         stiffness = self.operators.stiffness.copy()
         uniform = (0.0, 0.0) if self.beyond is not None else self._uniform
         lost = rotating_damping(self.operators, None, 0.0, uniform)
-        for compound in self._compounds:
+        for compound in self.compounds:
             modulus = compound.kind.modulus(frequency)
             add_part(stiffness, modulus.real - 1, compound.stiffness)
             if self.beyond is not None:
@@ -437,12 +437,12 @@ class Wheel:
         return stiffness, lost
 
 
-def _together(outputs: Probes, loads: Probes) -> Probes:
+def together(outputs: Probes, loads: Probes) -> Probes:
     """Outputs and loads as one set of probes, which a response is symmetric in."""
     return loads if outputs is loads else sparse.vstack([outputs, loads], format="csr")
 
 
-def _between(whole: Response, outputs: Probes, loads: Probes) -> Response:
+def between(whole: Response, outputs: Probes, loads: Probes) -> Response:
     """The response between `outputs` and `loads` of that of both together."""
     r = outputs.shape[0]
     return whole if outputs is loads else whole.between(slice(r), slice(r, None))

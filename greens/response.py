@@ -69,7 +69,8 @@ class Response:
     omitted from static results. In the first `pulse` outputs the residual responds not at once but
     with a pulse 1/step high and one step long, in place of its delta(t) (thesis (C.4)). `left_out`
     (3 or 9, k) kg m/N, where known: the same rows of all motions outside the states, which follow
-    statically; their rates are what the axle force lacks.
+    statically; their rates are what the axle force lacks. The last `relaxing` poles are real and carry no
+    momentum: what slow motions find softer than the modes (greens.slow).
 
         u(t) = Re[C z(t)] + C_b y(t) + G_res f(t),   z' = s z + P f,   y' = T y + P_b f
         g(t) = Re[C e^{st} P] + C_b e^{Tt} P_b  (+ G_res delta(t)),   g(0) = 0 without truncation
@@ -91,6 +92,24 @@ class Response:
     left_out: np.ndarray | None = None
     moments: np.ndarray | None = None
     slope: np.ndarray | None = None
+    relaxing: int = 0
+
+    @property
+    def of_modes(self) -> slice:
+        """The poles of the modes, which are first."""
+        return slice(len(self.eigenvalue) - self.relaxing)
+
+    def without_slow(self) -> Response:
+        """The response of the modes alone, in which slow motions find moduli of the modes' frequencies."""
+        own = self.of_modes
+        return replace(
+            self,
+            eigenvalue=self.eigenvalue[own],
+            output=self.output[:, own],
+            input=self.input[own],
+            momentum=self.momentum[:, own],
+            relaxing=0,
+        )
 
     def impulse(self, times: np.ndarray) -> np.ndarray:
         """Green's functions g (t, r, k), m/(N s), without the residual's delta at t = 0."""
@@ -172,8 +191,8 @@ class Response:
         return poles if of_block.all() else block_made_static(poles, values[count:], of_block)
 
     def slow(self, step: float, limit: float = RESOLVED) -> np.ndarray:
-        """Mask (q,) of the poles that `resolved` keeps."""
-        return np.abs(self.eigenvalue) * step <= limit
+        """Mask (q - relaxing,) of the modes' poles that `resolved` keeps."""
+        return np.abs(self.eigenvalue[self.of_modes]) * step <= limit
 
     def resolved(self, step: float, limit: float = RESOLVED) -> Response:
         """States with |s| step above the limit follow statically: the step does not resolve their
@@ -320,6 +339,7 @@ def poles_made_static(response: Response, keep: np.ndarray) -> Response:
         momentum=response.momentum[:, keep],
         residual=response.residual - gone.real,
         slope=added(response.slope, -slope.real),
+        relaxing=int(np.count_nonzero(keep[response.of_modes.stop :])),
     )
 
 
@@ -396,9 +416,10 @@ def _lost(response: Response, output: np.ndarray, band: float) -> np.ndarray:
 def keep(response: Response, count: int, band: float, counted: slice = slice(None)) -> Response:
     """The response with the `count` states that participate most in the band (Hz) dynamic.
 
-    The others follow statically. A state is a pair of complex eigenvalues or one real eigenvalue;
+    The others follow statically, but for what relaxes. A state is a pair of complex eigenvalues or one real eigenvalue;
     `counted` are the outputs and forces that decide.
     """
-    merit = participation(response.between(counted, counted), band)
+    merit = participation(response.between(counted, counted), band)[response.of_modes]
     foremost = np.argsort(-merit, kind="stable")[:count]
-    return response.keeping(np.isin(np.arange(len(merit)), foremost))
+    relaxing = np.ones(response.relaxing, bool)
+    return response.keeping(np.append(np.isin(np.arange(len(merit)), foremost), relaxing))

@@ -23,9 +23,10 @@ import numpy as np
 from scipy import sparse
 
 from tireroad.fem.errors import ConvergenceError, NearlySingular
-from tireroad.greens.coupling import FASTEST, Basis, Wheel
+from tireroad.greens.coupling import FASTEST, Basis, Wheel, between, together
 from tireroad.greens.residuals import residual_of
 from tireroad.greens.response import Response, keep
+from tireroad.greens.slow import slowed
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.damping import beyond
 from tireroad.modal.rolling import RollingModes, rolling_modes
@@ -137,18 +138,29 @@ def make_response(
     `wheel` returns the full matrices and `fields` the modes on all unknowns; each is called only if
     the residual needs it. InputError for an unknown residual. Collective.
     """
-    kind = residual_of(residual)
+    kind, probes = residual_of(residual), (outputs, loads)
     if not kind.solves:
         return _made(Basis.of(rolling).couple(outputs, loads))
+    relaxes = rolling.basis.projection.parts is not None and not rolling.full
+    if relaxes:  # between all of them, where what relaxes is symmetric
+        probes = (together(outputs, loads),) * 2
     if not kind.joins:
-        arguments = Basis.of(rolling), None, outputs, loads, residual
-        return _made(_singular_named(wheel(), lambda: wheel().respond(*arguments)))
+        basis = Basis.of(rolling)
+        arguments = basis, None, *probes, residual
+        response = _singular_named(wheel(), lambda: wheel().respond(*arguments))
+        if not relaxes:
+            return _made(response)
+        response, figures = _relaxing(wheel(), basis, probes[0], response)
+        return _made(between(response, outputs, loads), figures)
     found = fields()
     if found is not rolling.basis:  # a new solution: its states must be its own too
         rolling = rolling_modes(found, rolling.turning, wheel().operators.body.comm)
     assert found.modes is not None, "the modes on all unknowns"
-    joined = Basis.of(rolling), found.modes, outputs, loads
+    joined, figures = (Basis.of(rolling), found.modes, *probes), Figures()
     response, basis = _singular_named(wheel(), lambda: wheel().respond_attached(*joined))
+    if relaxes:
+        response, figures = _relaxing(wheel(), basis, probes[0], response)
+        response = between(response, outputs, loads)
     attached = _attached(basis, rolling)
     highest = cutoff(rolling)
     limit = FASTEST * max(highest.circular, highest.rate)
@@ -157,7 +169,19 @@ def make_response(
     what = f"residual states faster than {FASTEST:g} times the highest mode, made static"
     slow = np.abs(attached.states.eigenvalue) <= limit
     attached = replace(attached, states=attached.states.among(slow))
-    return replace(_made(kept, {what: (static, "-")}), attached=attached)
+    return replace(_made(kept, {what: (static, "-")} | figures), attached=attached)
+
+
+def _relaxing(
+    wheel: Wheel, basis: Basis, probes: sparse.csr_matrix, response: Response
+) -> tuple[Response, Figures]:
+    """The response with the slow moduli of rubber, and how much of it. Collective."""
+    found = slowed(wheel, basis, probes, response)
+    return found.response, {
+        "states of slow rubber": (found.response.relaxing, "-"),
+        "share of a point's flexibility that slow rubber lacks, at most": (found.left_out, "-"),
+        "share of it that slow rubber would stiffen, at most": (found.stiffer, "-"),
+    }
 
 
 def _attached(basis: Basis, rolling: RollingModes) -> RollingModes:

@@ -152,8 +152,9 @@ class Projection:
     loss factors (modal.damping), None where no compound has one. `squares` are those of the finite elements,
     whose moduli are those of fem.tire.material.DYNAMIC_FREQUENCY; `rise` (m, m) 1/s2 is what moduli at
     their own frequencies add, and `band_rise` (m,) what those in the middle of the band add to each, at half
-    the highest mode's frequency; None where none depends on frequency. The last `shapes` of the m coordinates are
-    static shapes that joined the modes (modal.basis). Further coordinates: a of the `air` after
+    the highest mode's frequency; `parts` (c, m, m) 1/s2: the stiffness of each kind of compounds whose modulus depends
+    on frequency, in the order of the wall's kinds. All three are None where none does. The last `shapes` of the m coordinates
+    are static shapes that joined the modes (modal.basis). Further coordinates: a of the `air` after
     the m, then c of a `corner`; a held wheel has c = 0, but its hub still carries moments.
     """
 
@@ -166,6 +167,7 @@ class Projection:
     losses: np.ndarray | None = None
     rise: np.ndarray | None = None
     band_rise: np.ndarray | None = None
+    parts: np.ndarray | None = None
     shapes: int = 0
     air: Air | None = None
     corner: Corner | None = None
@@ -325,6 +327,8 @@ class Projection:
             "momentum": self.momentum[:, :count],
             "shapes": max(0, count - self.modes),
         }
+        if self.parts is not None:
+            cut["parts"] = np.ascontiguousarray(self.parts[:, :count, :count])
         for item in fields(self):
             values = getattr(self, item.name)
             if item.name not in cut and isinstance(values, np.ndarray):
@@ -360,8 +364,10 @@ class Projection:
         small: dict[str, Any] = {
             name: None if value is None else value[np.ix_(*[wanted] * value.ndim)]
             for name, value in vars(self).items()
-            if name not in ("momentum", "shapes", "air", "corner")
+            if name not in ("momentum", "parts", "shapes", "air", "corner")
         }
+        if self.parts is not None:
+            small["parts"] = self.parts[:, wanted][:, :, wanted]
         shapes = int(np.count_nonzero(wanted[self.modes :]))
         return Projection(momentum=self.momentum[:, wanted], shapes=shapes, **small)
 
@@ -478,19 +484,24 @@ def _of_compounds(
     circular = np.sqrt(np.maximum(np.concatenate([own, (squares + in_band)[m:]]), 0.0))
     frequency = np.append(circular[:m] / (2 * np.pi), np.full(len(squares) - m, middle))
     rise, losses = (np.zeros((len(squares),) * 2) for _ in range(2))
-    nothing, elastic = np.zeros((done, done)), squares > 0
+    nothing, elastic, parts = np.zeros((done, done)), squares > 0, list[Array]()
     for compound in compounds:
         part = projected(comm, modes.vectors, compound.stiffness, 1, nothing)
         part *= np.outer(elastic, elastic)
+        if compound.kind.spectrum != CONSTANT:
+            parts.append(part)
         modulus = compound.kind.spectrum.modulus(frequency)
         loss = compound.kind.loss_factor * compound.kind.spectrum.loss_factor(frequency)
         lost = np.divide(loss * modulus, circular, out=np.zeros(len(modulus)), where=circular > 0)
         rise += part * (np.sqrt(np.outer(modulus, modulus)) - 1)
         losses += part * np.sqrt(np.outer(lost, lost))
     if known is not None:
+        for number, part in enumerate(parts):
+            part[:done, :done] = 0.0 if known.parts is None else known.parts[number]
         rise[:done, :done] = 0.0 if known.rise is None else known.rise
         losses[:done, :done] = 0.0 if known.losses is None else known.losses
-    varies = any(kind.spectrum != CONSTANT for kind in kinds)
     loses = any(kind.loss_factor for kind in kinds)
     projection = replace(projection, losses=losses if loses else None)
-    return replace(projection, rise=rise, band_rise=in_band) if varies else projection
+    if not parts:
+        return projection
+    return replace(projection, rise=rise, band_rise=in_band, parts=np.array(parts))

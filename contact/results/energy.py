@@ -176,6 +176,57 @@ class Circulation:
         self._forces = state["circulation_forces"]
 
 
+class Relaxed:
+    """Energy (J) that slow rubber dissipates and holds (greens.slow).
+
+    A pole -1/tau with output and input l is a spring and a dashpot side by side under the force a = l f: its state z,
+    tau z' + z = a, moves the points by l z, holds z^2 / 2 and
+
+        lost = tau int z'^2 dt.
+
+    Rates are those in the middle of each step, of the mean force that the `scheme` applies during it.
+    """
+
+    def __init__(self, rate: np.ndarray, step: float, scheme: str = "linear") -> None:
+        """`rate` 1/tau (p,) 1/s; `step` s."""
+        self._rate, self._step, self._scheme = rate, step, scheme
+        self.lost = 0.0
+        self._forces, self._state = np.zeros((2, len(rate))), np.zeros(len(rate))
+
+    def begin(self, state: np.ndarray, push: np.ndarray) -> None:
+        """Begin in a state (p,) under pushes (p,) a / tau in place of none."""
+        self._forces, self._state = np.stack([push / self._rate] * 2), state
+
+    def add(self, states: np.ndarray, pushes: np.ndarray) -> None:
+        """Count n steps: states and pushes (n, p) at their ends."""
+        forces = np.concatenate([self._forces, pushes / self._rate])
+        path = np.concatenate([self._state[None], states])
+        acting = (forces[2:] + forces[1:-1]) / 2 + ahead_of_mean(self._scheme, forces)
+        lag = acting - (path[1:] + path[:-1]) / 2
+        # Step by step, so that the sum does not depend on how steps are blocked.
+        for lost in (self._step * (lag**2 @ self._rate)).tolist():
+            self.lost += lost
+        self._forces, self._state = forces[-2:], path[-1]
+
+    @staticmethod
+    def held(state: np.ndarray) -> float:
+        """Energy (J) in a state (p,)."""
+        return float(0.5 * state @ state)
+
+    def state(self) -> dict[str, np.ndarray]:
+        """The state that a checkpoint keeps."""
+        return {
+            "relaxed": np.array([self.lost]),
+            "relaxed_forces": self._forces,
+            "relaxed_state": self._state,
+        }
+
+    def set_state(self, state: dict[str, np.ndarray]) -> None:
+        """Continue from `state`."""
+        (self.lost,) = state["relaxed"].tolist()
+        self._forces, self._state = state["relaxed_forces"], state["relaxed_state"]
+
+
 def stored(coordinates: np.ndarray, rates: np.ndarray, stiffness: np.ndarray) -> float:
     """Energy (J) of modal coordinates (m,) and rates (m,): kinetic, and in `stiffness` (m, m) 1/s2.
 
@@ -193,10 +244,8 @@ def own_states(response: Response, rolling: RollingModes) -> bool:
     """
     if rolling.full:
         return False
-    states = rolling.states
-    return np.array_equal(response.eigenvalue, states.eigenvalue) and len(response.block) == len(
-        states.block
-    )
+    states, own = rolling.states, response.eigenvalue[response.of_modes]
+    return np.array_equal(own, states.eigenvalue) and len(response.block) == len(states.block)
 
 
 def springs(response: Response, force: np.ndarray) -> float:
@@ -254,11 +303,12 @@ class StateMotion:
 
 
 def energy_left(rolling: RollingModes, kept: dict[str, np.ndarray], slow: np.ndarray) -> float:
-    """Energy (J) of the states in a tire's snapshot; `slow` (q,) marks the modes it contains."""
-    states, state = rolling.states, kept["state"]
+    """Energy (J) of the modes in a tire's snapshot; `slow` (q,) marks those it contains, whose states are first."""
+    states, count = rolling.states, np.count_nonzero(slow)
+    state, push = kept["state"][:count], kept["push"][:count]
     right = states.right[:, slow]
     coordinates = (right @ state).real + states.block_right @ kept["block_state"]
-    rates = (right @ (states.eigenvalue[slow] * state + kept["push"])).real
+    rates = (right @ (states.eigenvalue[slow] * state + push)).real
     rates += states.block_right @ (states.block @ kept["block_state"])
     # Damping's contribution to the rolling stiffness stores nothing: it is work of the drive.
     projection = rolling.basis.projection

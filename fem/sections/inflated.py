@@ -373,14 +373,27 @@ class InflatedRing:
                 row += share * answer * np.cos(wave * angles)
         return out
 
-    def flexibility(self, wave: int, weights: np.ndarray, frequency: float | None) -> complex:
-        """w . K_n^-1 w, m rad/N, with the complex moduli of a frequency (Hz), or the static ones if None."""
+    def flexibility(self, wave: int, weights: np.ndarray) -> float:
+        """w . K_n^-1 w, m rad/N, with static moduli."""
         load = self._radial(weights)
-        if frequency is None:
-            stiffness = self._inside(self._tangent(wave, self.pressure))
-        else:
-            stiffness = self._dynamic_stiffness(wave)(frequency)
-        return complex(load @ splu(stiffness.astype(complex)).solve(load))
+        stiffness = self._inside(self._tangent(wave, self.pressure))
+        return float((load @ splu(stiffness.astype(complex)).solve(load)).real)
+
+    def resting(self, wave: int, weights: np.ndarray, speed: float, lowest: float) -> complex:
+        """w . (K_n*(n speed) - speed^2 M C_n)^-1 w, m rad/N, of a wave that rests while the tire turns at a `speed` (rad/s).
+
+        Moduli are those that slow motions meet (fem.tire.material.Kind.slow_modulus), `lowest` the frequency (Hz) of
+        the lowest mode; tension is that of the ring's own speed.
+        """
+        load, passing = self._radial(weights), wave * speed / (2 * np.pi)
+        stiffness = self._inside(self._tangent(wave, self.pressure, dynamic=True)).astype(complex)
+        for kind, share in self._kinds.items():
+            stored = float(kind.slow_modulus(np.array([passing]), lowest)[0])
+            lost = kind.modulus(passing).imag / kind.modulus(passing).real if wave else 0.0
+            part = self._inside(self._of_kind(wave, share))
+            stiffness += (stored * (1 + 1j * lost) - 1) * part
+        stiffness -= speed**2 * self._inside(self._carried(wave))
+        return complex(load @ splu(stiffness.tocsc()).solve(load))
 
     def modes(self, wave: int, weights: np.ndarray, count: int = 150) -> SectionModes:
         """The `count` lowest modes of a wave, and what of them a load of `weights` (n,) across sees."""

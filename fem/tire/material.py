@@ -299,16 +299,27 @@ def compound(
 
 
 class Kind(NamedTuple):
-    """Compounds of one spectrum and one loss factor (at DYNAMIC_FREQUENCY)."""
+    """Compounds of one spectrum, one loss factor (at DYNAMIC_FREQUENCY), and one `static` modulus over that there."""
 
     spectrum: Spectrum
     loss_factor: float
+    static: float = 1.0
 
     def modulus(self, frequency: float) -> complex:
         """Complex modulus over the storage modulus at DYNAMIC_FREQUENCY, at a frequency in Hz."""
         at = np.array([frequency])
         loss = self.loss_factor * self.spectrum.loss_factor(at)[0]
         return complex(self.spectrum.modulus(at)[0] * (1 + 1j * loss))
+
+    def slow_modulus(self, frequency: np.ndarray, lowest: float) -> np.ndarray:
+        """Storage modulus of motions slower than all modes over that at DYNAMIC_FREQUENCY, at frequencies in Hz.
+
+        That of the spectrum, but not below that of the static state, which it has below LOADING. A static modulus above
+        that at the frequency `lowest` of the modes (Hz), which no rubber has, counts as that.
+        """
+        floor = min(self.static, float(self.spectrum.modulus(np.array([lowest]))[0]))
+        above: np.ndarray = np.maximum(self.spectrum.modulus(frequency), floor)
+        return np.where(frequency < LOADING, floor, above)
 
 
 def kinds(compounds: Sequence[tuple[Spectrum, float, float]]) -> dict[Kind, list[float]]:
@@ -323,7 +334,7 @@ def kinds(compounds: Sequence[tuple[Spectrum, float, float]]) -> dict[Kind, list
         constant = spectrum == CONSTANT
         if constant and not loss:
             continue
-        kind = Kind(CONSTANT, 1.0) if constant else Kind(spectrum, loss)
+        kind = Kind(CONSTANT, 1.0) if constant else Kind(spectrum, loss, 1 / dynamic)
         share = found.setdefault(kind, [0.0] * len(compounds))
         share[number] = dynamic * (loss if constant else 1.0)
     return found

@@ -109,6 +109,7 @@ DATASETS: Mapping[str, tuple[Dataset, ...]] = {
             ("projected/losses", "m, m", "1/s", "damping by the losses of the compounds"),
             ("projected/rise", "m, m", "1/s2", "rise of the stiffness by moduli at the modes' own frequencies"),
             ("projected/band_rise", "m", "1/s2", "the same of the moduli in the middle of the band"),
+            ("projected/parts", "g, m, m", "1/s2", "stiffness of each kind of compounds whose modulus depends on frequency"),
             ("cavity/frequency", "a", "Hz", "frequencies of the air with rigid walls, at rest"),
             ("cavity/circular", "a", "rad/s", "the same as circular frequencies"),
             ("cavity/gyroscopic", "a, a", "1/rad", "skew matrix of the air that turns with the wheel"),

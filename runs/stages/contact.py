@@ -19,6 +19,7 @@ from tireroad.contact.patch import Patch
 from tireroad.contact.results.chatter import LIMIT, Chatter, Chosen, warning
 from tireroad.contact.results.energy import (
     Circulation,
+    Relaxed,
     StateMotion,
     Totals,
     Work,
@@ -277,9 +278,12 @@ class Losses:
         self._motion: StateMotion | None = None
         if isinstance(tire, Recursion) and StateMotion.known(rolling, response):
             self._motion = StateMotion(rolling, response.slow(chosen.step), chosen.step)
-            left_out = response.resolved(chosen.step).residual
-            left_out = left_out[: left_out.shape[1]]
+            kept = response.resolved(chosen.step)
+            left_out = kept.residual[: kept.residual.shape[1]]
             self._circulation = Circulation(left_out * (not response.pulse), chosen.scheme)
+            self._modes = kept.of_modes.stop
+            rate = -kept.eigenvalue[self._modes :].real
+            self._relaxed = Relaxed(rate, chosen.step, chosen.scheme)
             self._tire = tire
             tire.keep_samples()
 
@@ -293,35 +297,44 @@ class Losses:
         if self._motion is None:
             return None
         losses, beyond = self._motion.losses, self._circulation
-        return losses.lost, losses.drive, beyond.work, beyond.lead
+        return losses.lost + self._relaxed.lost, losses.drive, beyond.work, beyond.lead
 
-    def begin(self) -> None:
-        """Begin at the forces that the tire has at t = 0."""
+    @property
+    def slow(self) -> float:
+        """Energy (J) lost in slow rubber, a part of that lost in the material; of a run whose losses are known."""
+        return self._relaxed.lost
+
+    def begin(self, kept: dict[str, np.ndarray]) -> None:
+        """Begin at the forces and states that the tire has at t = 0, `kept` in its snapshot."""
         if self._motion is not None:
             self._circulation.begin(self._tire.force)
+            state, push = (kept[name][self._modes :].real for name in ("state", "push"))
+            self._relaxed.begin(state, push)
 
     def flush(self) -> None:
         """Account for the steps since the last call. Collective."""
         if self._motion is None or not (samples := self._tire.samples()):
             return
-        states, pushes, every, block = map(list, zip(*samples, strict=True))
-        forces, tire = np.array(every), self._tire
-        self._motion.add(
-            tire.everywhere(states), tire.everywhere(pushes), tire.block_everywhere(block)
-        )
+        states, pushes, acting, block = map(list, zip(*samples, strict=True))
+        forces, tire = np.array(acting), self._tire
+        every, pushed = tire.everywhere(states), tire.everywhere(pushes)
+        count = self._modes
+        self._motion.add(every[:, :count], pushed[:, :count], tire.block_everywhere(block))
+        self._relaxed.add(every[:, count:].real, pushed[:, count:].real)
         self._circulation.add(forces)
 
     def state(self) -> dict[str, np.ndarray]:
         """State for a checkpoint."""
         if self._motion is None:
             return {}
-        return self._motion.losses.state() | self._circulation.state()
+        return self._motion.losses.state() | self._circulation.state() | self._relaxed.state()
 
     def set_state(self, state: dict[str, np.ndarray]) -> None:
         """Continue from a `state`."""
         if self._motion is not None:
             self._motion.losses.set_state(state)
             self._circulation.set_state(state)
+            self._relaxed.set_state(state)
 
 
 def negligible(pressed: float) -> float:
@@ -355,6 +368,7 @@ def describe_energy(
     record.indicators |= {
         "energy left in the modes": (energies[0], "J"),
         "energy left in the residual flexibility": (energies[1], "J"),
+        "energy left in slow rubber": (energies[2], "J"),
     }
     if work.nonlinear is not None:
         record.indicators["energy left in the nonlinear force"] = (work.nonlinear, "J")
@@ -368,6 +382,10 @@ def describe_energy(
         _standing(record, rolling, total, left, slight)
     else:
         lost, drive, beyond, springs_lead = losses.found
+        record.indicators["energy lost in slow rubber, part of that in the material"] = (
+            losses.slow,
+            "J",
+        )
         taken = springs_lead - work.lead
         _rolling(record, total, left, lost, drive, beyond, taken, slight)
 
@@ -377,13 +395,15 @@ def energies_in(
     response: Response,
     kept: dict[str, np.ndarray],
     step: float,
-) -> tuple[float, float] | None:
-    """Energy (J) in the modes and in the residual flexibility by a tire's snapshot; None where they are not known."""
+) -> tuple[float, float, float] | None:
+    """Energy (J) in modes, residual flexibility and slow rubber by a tire's snapshot; None where they are not known."""
     own = own_states(response, rolling) and len(kept["block_state"]) == len(rolling.states.block)
     if not own:
         return None
+    resolved = response.resolved(step)
     left = energy_left(rolling, kept, response.slow(step))
-    return left, springs(response.resolved(step), kept["push_force"])
+    relaxed = Relaxed.held(kept["state"][resolved.of_modes.stop :].real)
+    return left, springs(resolved, kept["push_force"]), relaxed
 
 
 def _standing(
@@ -651,8 +671,8 @@ class ContactStage(Stage[ContactHistory]):
         if loop.begun is None:
             return
         change, moved = loop.begun
-        losses.begin()
         kept = loop.tire.snapshot()
+        losses.begin(kept)
         energies = energies_in(self._states, response, kept, step)
         totals.work.begin(change[: len(moved)], moved, sum(energies or (0.0,)))
 

@@ -54,6 +54,7 @@ def fill_response(file: h5py.File, name: str, response: Response, points: int) -
         if (value := getattr(response, key)) is not None:
             put(file, f"{name}/{key}", value, unit)
     file[name].attrs["rigid_states"] = response.rigid
+    file[name].attrs["slow_states"] = response.relaxing
     file[name].attrs["pulse"] = response.pulse
 
 
@@ -63,6 +64,7 @@ def read_response(group: h5py.Group) -> Response:
         **{key: group[key][:] for key in _UNITS},
         pulse=int(group.attrs["pulse"]),
         rigid=int(group.attrs["rigid_states"]),
+        relaxing=int(group.attrs["slow_states"]),
         **{key: group[key][:] for key in _KNOWN if key in group},
     )
 

@@ -46,6 +46,7 @@ _UNITS = {
     "losses": "1/s",
     "rise": "1/s2",
     "band_rise": "1/s2",
+    "parts": "1/s2",
 }
 NAME = "fields"
 LARGEST = 300e6  # bytes: each process holds all of them while they are written or read

@@ -25,7 +25,7 @@ HALF = 0.010, np.radians(2.0)  # half of the patch across, m, and around, rad
 def run() -> list[Table]:
     """Levels of both, and a plate like the belt."""
     ring = InflatedRing(radial(SIZE), ALONG, 2, PRESSURE)
-    chain = _Chain()
+    chain = Chain(UP_TO)
     tables = []
     for name, y in PLACES.items():
         exact = ring.receptance(ring.patch(y, HALF[0]), HALF[1], FREQUENCY, ANGLES)
@@ -39,29 +39,33 @@ def level(receptance: np.ndarray, frequency: np.ndarray) -> np.ndarray:
     return 20 * np.log10(np.abs((2j * np.pi * frequency * receptance.T).T))
 
 
-class _Chain:
-    """The modes of three-dimensional elements with attachment modes, as a run has them."""
+class Chain:
+    """The modes of three-dimensional elements up to a frequency (Hz), as a run has them, of a tire that can turn at a speed."""
 
-    def __init__(self) -> None:
+    def __init__(self, up_to: float, speed: float = 0.0) -> None:
         tire = library.radial(SIZE, segments=AROUND, elements_arc=ALONG, footprint_size=1.0)
         static = library.press(tire, inflation=PRESSURE)
-        standing = library.modes(tire, static, up_to=UP_TO)
-        self._rolling = library.roll(standing, Turning(damping=StrainEnergy()))
-        self._lattice, self._points = standing.motions.lattice, static.positions
+        turning = Turning(speed=speed, damping=StrainEnergy()) if speed else None
+        self.standing = library.modes(tire, static, up_to=up_to, turning=turning)
+        self._lattice, self._points = self.standing.motions.lattice, static.positions
+
+    def rolling(self, speed: float = 0.0) -> library.RollingTire:
+        """The tire at a speed, rad/s."""
+        return library.roll(self.standing, Turning(speed=speed, damping=StrainEnergy()))
 
     def receptance(self, y: float) -> np.ndarray:
         """H (f, a) m/N between the patch at y and those at the angles."""
-        probes = sparse.csr_matrix([self._patch(y, angle) for angle in ANGLES])
-        response = self._rolling.respond(probes, probes[:1], "attachment")
+        probes = sparse.csr_matrix([self.patch(y, angle, HALF) for angle in ANGLES])
+        response = self.rolling().respond(probes, probes[:1], "attachment")
         return response.receptance(FREQUENCY)[:, :, 0]
 
-    def _patch(self, y: float, angle: float) -> np.ndarray:
-        """Weights (3 s,) of the radial motion of a patch."""
+    def patch(self, y: float, angle: float, half: tuple[float, float]) -> np.ndarray:
+        """Weights (3 s,) of the radial motion of a patch, `half` of it across, m, and around, rad."""
         lattice = self._lattice
         points = self._points.reshape(*lattice.face_shape, 3)
         out, row = np.zeros_like(points), points[0, :, 1]
-        around = spot(lattice, angle, 0.0, (HALF[1], 0.0)).reshape(lattice.face_shape).sum(axis=1)
-        weight = np.outer(around, mean_over(row, y, HALF[0]))
+        around = spot(lattice, angle, 0.0, (half[1], 0.0)).reshape(lattice.face_shape).sum(axis=1)
+        weight = np.outer(around, mean_over(row, y, half[0]))
         out[..., 0] = weight * np.sin(lattice.ring)[:, None]
         out[..., 2] = -weight * np.cos(lattice.ring)[:, None]
         return out.ravel()

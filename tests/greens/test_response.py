@@ -114,7 +114,11 @@ def test_only_a_turning_tire_is_told_of_the_critical_speed(monkeypatch, speed, n
         raise NearlySingular("the matrix is singular")
 
     monkeypatch.setattr(responses.Basis, "of", lambda rolling: None)
-    wheel, rolling = SimpleNamespace(speed=speed, respond=respond), SimpleNamespace()
+    one_modulus = SimpleNamespace(projection=SimpleNamespace(parts=None))
+    wheel, rolling = (
+        SimpleNamespace(speed=speed, respond=respond),
+        SimpleNamespace(basis=one_modulus),
+    )
     with pytest.raises(ConvergenceError, match="the matrix is singular") as told:
         responses.make_response(lambda: wheel, rolling, None, None, "static", lambda: None)
     assert ("critical speed" in str(told.value)) == names_it

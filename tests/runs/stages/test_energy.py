@@ -77,17 +77,44 @@ locked = ["y", "rx", "ry", "rz"]
 
 
 ATTACHED = '[greens]\nresidual = "attachment"\n'
+SLOW = """
+[[tire.region]]
+dynamic = 1.5
+loss_factor = 0.2
+exponent = 0.15
+"""
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "more",
-    ["", AIR, CORNER, AIR + CORNER, ATTACHED, ATTACHED + AIR],
-    ids=["alone", "air", "corner", "air and corner", "attachment", "attachment and air"],
+    [
+        "",
+        AIR,
+        CORNER,
+        AIR + CORNER,
+        ATTACHED,
+        ATTACHED + AIR,
+        SLOW,
+        AIR + CORNER + SLOW,
+        ATTACHED + SLOW,
+    ],
+    ids=[
+        "alone",
+        "air",
+        "corner",
+        "air and corner",
+        "attachment",
+        "attachment and air",
+        "slow rubber",
+        "air, corner and slow rubber",
+        "attachment and slow rubber",
+    ],
 )
 def test_a_rolling_tire_loses_what_contact_and_drive_put_in(run, more: str) -> None:
-    """Also with air, whose own losses count, on a corner, with those of its dampers, and with attachment modes."""
-    parts = {"air": AIR, "corner": CORNER, "attached": ATTACHED}
+    """Also with air, whose own losses count, on a corner, with those of its dampers, and with attachment modes, and rubber
+    whose modulus depends on frequency."""
+    parts = {"air": AIR, "corner": CORNER, "attached": ATTACHED, "slow": SLOW}
     name = "rolling" + "".join(f"-{part}" for part, text in parts.items() if text in more)
     found, warnings = run(name, "[damping]\nmass = 400.0\n[rotation]\nspeed = 50.0\n" + more)
     lost, drive = (
@@ -96,13 +123,20 @@ def test_a_rolling_tire_loses_what_contact_and_drive_put_in(run, more: str) -> N
     )
     work, off = found["work of contact on the tire"], found["energy that does not add up"]
     left = found["energy left in the modes"] + found["energy left in the residual flexibility"]
+    left += found["energy left in slow rubber"]
+    assert (found["energy left in slow rubber"] > 0.0) == (SLOW in more)
     left -= found.get("energy in both as the run begins", 0.0)
     beyond = found["energy lost in the modes left out, less their drive"]
     assert work + drive - left - lost - beyond == pytest.approx(off, abs=1e-12)
     assert lost > 0.1 * abs(work)
     assert abs(off) < 0.002 * lost
     # Without that term it would not add up; attachment modes leave little of it.
-    assert abs(off) < (0.3 if ATTACHED in more else 0.2) * abs(beyond)
+    term = (
+        found["energy lost in slow rubber, part of that in the material"]
+        if SLOW in more
+        else beyond
+    )
+    assert abs(off) < (0.3 if ATTACHED in more else 0.2) * abs(term)
     assert not any("add up" in text for text in warnings)
 
 
