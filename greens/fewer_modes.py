@@ -5,7 +5,7 @@ The first modes stay as they are. What joins modes, rotation shapes (modal.rotat
 
     T = [1 0; 0 W],   X~ = T^T X T  for every projected matrix X,   W^T Lambda_r W diagonal,  W^T W = 1.
 
-The run's static response stays that of the finite elements. The new states differ from those of as few modes on the finite
+The run's static response stays that of the finite elements, and what relaxes (greens.slow) as it is. The new states differ from those of as few modes on the finite
 elements by what static shapes lack outside the run's coordinates.
 """
 
@@ -60,12 +60,15 @@ def of_fewer_modes(
     small = old.on(turn, count)
     basis = ModalBasis(frequency=small.frequency, shape=readings @ turn, projection=small)
     rolls = RollingModes(basis=basis, states=decouple(small, turning, comm), turning=turning)
-    made = _coupled(response, rolls, probes)
+    own, slow = response.without_slow(), slice(response.of_modes.stop, None)
+    made = _coupled(own, rolls, probes)
     if kind.joins:
         highest = cutoff(rolls)
         limit = FASTEST * max(highest.circular, highest.rate)
         made = made.keeping_where(lambda s: np.abs(s) <= limit)
-    return _completed(made, response) if kind.solves else made
+    made = _completed(made, own) if kind.solves else made
+    relaxing = response.eigenvalue[slow], response.output[:, slow], response.input[slow]
+    return made.with_slow(*relaxing)
 
 
 def _joined(projection: Projection, count: int, columns: Array) -> Array:

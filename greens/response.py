@@ -111,6 +111,18 @@ class Response:
             relaxing=0,
         )
 
+    def with_slow(self, eigenvalue: np.ndarray, output: np.ndarray, push: np.ndarray) -> Response:
+        """The response with real poles (p,) 1/s behind its own, which relax; `output` (r, p), `push` (p, k)."""
+        none = np.zeros((len(self.momentum), len(eigenvalue)))
+        return replace(
+            self,
+            eigenvalue=np.concatenate([self.eigenvalue, eigenvalue]),
+            output=np.hstack([self.output, output]),
+            input=np.vstack([self.input, push]),
+            momentum=np.hstack([self.momentum, none]),
+            relaxing=self.relaxing + len(eigenvalue),
+        )
+
     def impulse(self, times: np.ndarray) -> np.ndarray:
         """Green's functions g (t, r, k), m/(N s), without the residual's delta at t = 0."""
         return self._waves(times, self.output, self.block_output)

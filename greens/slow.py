@@ -105,7 +105,8 @@ class _Slow:
         for frequency, wanted in zip(self._frequencies[1:-1], solved[1:], strict=True):
             within += [self._beyond_modes(frequency, shapes)] if wanted else []
         poles = on_root(comm, lambda: self._poles(shapes, within))
-        return Slowed(_joined(self._whole, *poles), *figures)
+        rate, output, push = poles
+        return Slowed(self._whole.with_slow(-rate, output, push), *figures)
 
     @cached_property
     def _frequencies(self) -> list[float]:
@@ -255,16 +256,3 @@ class _Slow:
         known = seen.T @ np.linalg.solve(modal, seen)
         softer: Array = found - known - shapes.T @ self._whole.residual @ shapes
         return softer
-
-
-def _joined(response: Response, rate: Array, output: Array, push: Array) -> Response:
-    """The response with real poles -rate (p,) 1/s behind its own; `output` (r, p), `push` (p, k)."""
-    none = np.zeros((len(response.momentum), len(rate)))
-    return replace(
-        response,
-        eigenvalue=np.concatenate([response.eigenvalue, -rate]),
-        output=np.hstack([response.output, output]),
-        input=np.vstack([response.input, push]),
-        momentum=np.hstack([response.momentum, none]),
-        relaxing=len(rate),
-    )

@@ -352,6 +352,8 @@ class Projection:
         for name in ("squares", "band_rise"):
             if (diagonal := getattr(self, name)) is not None:
                 whole[name] = np.einsum("ij,i,ij->j", turn, diagonal, turn)
+        if self.parts is not None:
+            whole["parts"] = turn.T @ self.parts @ turn
         if self.air is not None:
             whole["air"] = replace(self.air, coupling=self.air.coupling @ turn)
         if self.corner is not None:

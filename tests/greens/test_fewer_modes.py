@@ -96,3 +96,21 @@ def test_all_modes_or_none_are_refused(tire):
     for share in (1e-3, 1.5):
         with pytest.raises(InputError, match="far below"):
             of_fewer_modes(run, rolling, rolling.basis.shape, tire[2], share, "attachment", COMM)
+
+
+def test_what_relaxes_stays_as_it_is(tire, monkeypatch):
+    """Poles of slow rubber are those of the run, and what they add is not taken for flexibility at once."""
+    monkeypatch.setattr(coupling, "FEW", 0)
+    run, rolling = attached(tire, 30, 0.0)
+    share = 0.5 * (tire[1].frequency[20] + tire[1].frequency[21]) / tire[1].frequency[29]
+    given = rolling, rolling.basis.shape, tire[2], share, "attachment", COMM
+    plain = of_fewer_modes(run, *given)
+    into = np.full((1, run.residual.shape[1]), 3.0)
+    output = np.full((len(run.residual), 1), 2e-7)
+    slow = of_fewer_modes(run.with_slow(np.array([-5.0]), output, into), *given)
+    assert slow.relaxing == 1 and slow.eigenvalue[-1] == -5.0
+    assert np.allclose(slow.residual, plain.residual, rtol=1e-12, atol=0)
+    frequency = np.array([0.0, 1.0, 40.0])
+    added = output @ into / (5.0 + 2j * np.pi * frequency[:, None, None])
+    off = slow.receptance(frequency) - plain.receptance(frequency) - added
+    assert np.abs(off).max() < 1e-9 * np.abs(added).max()
