@@ -130,7 +130,7 @@ class Line:
         air: SoundAir,
         beside: Complex | float = 0.0,
     ) -> Line:
-        """Of a `length` m with `stations` (s,) m from the rear; `beside` (f,) m4 s/kg/m: 2 Y, what opens into the groove."""
+        """The line of a groove of a `length` m with `stations` (s,) m from the rear; `beside` (f,) m4 s/kg/m: 2 Y, what opens into it."""
         omega, area = 2 * np.pi * frequency, groove.area
         medium = Medium.in_tube(groove.hydraulic_radius, frequency, air)
         along = 1j * omega * medium.density / area

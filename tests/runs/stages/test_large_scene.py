@@ -225,6 +225,7 @@ def test_it_goes_on_from_a_checkpoint_with_the_same_bits(cleat, tmp_path, monkey
 
 
 @pytest.mark.slow
+@pytest.mark.mpi
 def test_the_same_on_any_number_of_processes(tmp_path_factory):
     base = COMM.bcast(tmp_path_factory.mktemp("several") if not COMM.rank else None)
     several, stages = run(base / "several", SCENE + CLEAT + LARGE, COMM)
