@@ -55,20 +55,20 @@ def test_waves_of_elements_and_of_modes_are_those_of_the_series(monkeypatch):
 
 @pytest.mark.long
 def test_slow_motions_find_moduli_between_static_and_modal_ones(monkeypatch):
-    """Static moduli are the softest; what stands on a rolling tire is the stiffer the faster, and softer than the modes. The
-    loop has them within 1 % of either."""
-    for name, value in {"ALONG": 10, "WAVES": 6, "SPEEDS": (1.0, 20.0, 72.0)}.items():
+    """Static moduli are the softest; what stands on a rolling tire is softer than the modes. The loop has them within 1.5 %
+    of either on elements of 15 degrees."""
+    for name, value in {"ALONG": 10, "WAVES": 40, "SPEEDS": (1.0, 20.0, 72.0)}.items():
         monkeypatch.setattr(slow_motions, name, value)
     monkeypatch.setattr(mobility, "AROUND", 24)
     waves, loop = slow_motions.run()
     for _, static, modes, *found in waves.rows:
         assert 1e3 < static < 1e4
-        assert modes < found[2] < found[1] < found[0] <= 1.0
-        assert modes < 0.97
+        assert modes < found[1] < found[0] <= 1.0
+        assert modes < min(0.97, found[2])  # whose inertia softens it
     for speed, _, modes, slow, wanted, off in loop.rows:
-        assert modes < 0.97 * wanted
+        assert modes < 0.99 * wanted
         assert off == pytest.approx(100 * (slow / wanted - 1), abs=0.2)
-        assert abs(off) < 1.0, speed
+        assert abs(off) < 1.5, speed
 
 
 def test_the_plate_by_hand():
