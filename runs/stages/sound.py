@@ -12,6 +12,7 @@ import numpy as np
 from scipy import sparse
 
 from tireroad.contact.results.spectra import a_weighting, band_sums
+from tireroad.contact.setup import ContactSetup
 from tireroad.fem.static.state import StaticState
 from tireroad.greens.basis import Basis
 from tireroad.greens.tire_sound import (
@@ -286,6 +287,7 @@ class SoundStage(WholeTire[SoundPressure]):
     def compute(self, record: Record) -> SoundPressure | None:
         """None but on the root process. Collective."""
         paths, lines, state = self.radiation.product, self.lines.product, self.static.product
+        setup = self.setup.product  # made by all processes
         if lines is None:
             return None
         table = self.job.scene.sound
@@ -315,7 +317,7 @@ class SoundStage(WholeTire[SoundPressure]):
             rough=coarse @ lines.amplitude.T,
         )
         heard, over_time = vibration, volumes @ lines.spectrum.T
-        if (air := self._air(record, lines, tire)) is not None:
+        if (air := self._air(record, lines, tire, setup)) is not None:
             with record.timing("air of the footprint"):
                 amplitude, spectrum = air.volumes(tire, state, lines.frequency)
                 rougher, _ = air.volumes(rough, state, lines.frequency)
@@ -333,9 +335,11 @@ class SoundStage(WholeTire[SoundPressure]):
         _describe(record, pressure)
         return pressure
 
-    def _air(self, record: Record, lines: Lines, tire: SoundingTire) -> LeavingAir | None:
-        """The air squeezed out of the footprint; None where it is not asked for or not known."""
-        table, setup = self.job.scene.sound, self.setup.product
+    def _air(
+        self, record: Record, lines: Lines, tire: SoundingTire, setup: ContactSetup | None
+    ) -> LeavingAir | None:
+        """The air squeezed out of the footprint; None where it is not asked for or not known. Root process only."""
+        table = self.job.scene.sound
         assert table is not None, "the stage runs with [sound] only"
         wanted = lines.frequency[-1] >= SQUEEZED if table.air is None else table.air
         if not wanted or self.contact is None or setup is None:

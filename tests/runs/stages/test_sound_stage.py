@@ -8,6 +8,7 @@ import wave
 from pathlib import Path
 from types import SimpleNamespace
 
+import h5py
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -339,3 +340,20 @@ def test_contact_points_at_nodes_have_no_air_and_say_so(tmp_path: Path) -> None:
     assert np.isnan(found["sound/third_octave/air_level"]).all()
     notes = " ".join(found.summary["sound"].get("notes", []))
     assert "contact.points" in notes
+
+
+@pytest.mark.mpi
+def test_air_is_heard_alike_on_any_number_of_processes(tmp_path_factory) -> None:
+    comm = MPI.COMM_WORLD
+    base = comm.bcast(tmp_path_factory.mktemp("several") if not comm.rank else None)
+    if not comm.rank:
+        (base / "scene.toml").write_text(SCENE)
+    comm.Barrier()
+    scene, levels = load(base / "scene.toml", ["sound.air=true"]), []
+    for one in (comm, MPI.COMM_SELF):
+        folder = base / (f"alone-{comm.rank}" if one is MPI.COMM_SELF else "together")
+        run_scene(scene, folder, one, until="sound", fresh=False, petsc_options=[])
+        with h5py.File(folder / "sound.h5") as file:
+            levels.append(file["third_octave/air_level"][:])
+    assert np.isfinite(levels[0]).all()
+    np.testing.assert_allclose(levels[0], levels[1], atol=1e-6)
