@@ -87,4 +87,4 @@ def test_all_runs_are_seen(measured: dict[int, dict], width: int) -> None:
     assert found["narrowest"] > 70 and found["cut"] == 0
     assert found["letters"] > 9  # px
     for name in (f"{SOUND}cpx front", f"{SOUND}pass-by", "sound power level", "axle force z"):
-        assert f"Third octaves: {name}." in found["captions"]
+        assert any(told.startswith(f"Third octaves: {name}.") for told in found["captions"])

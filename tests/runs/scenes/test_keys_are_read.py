@@ -136,11 +136,11 @@ class Recorder:
         self._patch.setattr(of, "__getattribute__", reading, raising=False)
 
 
-def _run(folder: Path, text: str, *overrides: str) -> None:
+def _run(folder: Path, text: str, *overrides: str, until: str = "spectra") -> None:
     folder.mkdir(exist_ok=True)
     (folder / "scene.toml").write_text(text)
     scene = load(folder / "scene.toml", overrides)
-    run_scene(scene, folder, MPI.COMM_WORLD, until="spectra", fresh=False, petsc_options=[])
+    run_scene(scene, folder, MPI.COMM_WORLD, until=until, fresh=False, petsc_options=[])
 
 
 @pytest.mark.long
@@ -196,6 +196,8 @@ def test_every_key_is_read_by_a_run(tmp_path: Path, monkeypatch) -> None:
         _run(tmp_path / "rubbing", RUBBING, *slides)
         _run(tmp_path / "rubbing", RUBBING, *slides, "rotation.speed=20")
         _run(tmp_path / "rubbing", RUBBING, "sound.up_to=100", "sound.road.thickness=0.03")
+        heard = "sound.up_to=150", "time.duration=0.1", points
+        _run(tmp_path / "rolling", ROLLING.format(kind="flat"), *heard, until="sound")
         _run(tmp_path / "full", FULL)
         (tmp_path / "drawing.toml").write_text(DRAWING)
         for section in ('section = "radial"', 'mesh = "drawing.toml"'):
