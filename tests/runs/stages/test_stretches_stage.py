@@ -55,8 +55,10 @@ chance_db = 3.0
 
 def finished(folder, comm, *sets):
     """A run of the scene in a folder; the parts it leaves."""
-    folder.mkdir(exist_ok=True, parents=True)
-    (folder / "given.toml").write_text(SCENE)
+    if comm.rank == 0:  # another process could read what is half written
+        folder.mkdir(exist_ok=True, parents=True)
+        (folder / "given.toml").write_text(SCENE)
+    comm.Barrier()
     with console.quiet():
         scene = load(folder / "given.toml", list(sets))
         return run_scene(scene, folder, comm, until="spectra", fresh=False, petsc_options=[])
