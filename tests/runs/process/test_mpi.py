@@ -140,12 +140,14 @@ def test_the_others_work_until_the_root_has_ended():
     def meanwhile(ended) -> None:
         began = time.monotonic()
         asked.append(ended())
+        comm.send(None, 0)
         while not ended() and time.monotonic() - began < 30.0:
             time.sleep(0.01)
         asked.append(ended())
 
     def slow() -> int:
-        time.sleep(0.3)
+        for rank in range(1, comm.size):  # have all asked
+            comm.recv(source=rank)
         return 7
 
     assert mpi.on_root_beside(comm, slow, meanwhile) == 7
