@@ -149,15 +149,19 @@ def inertia(groove: Groove, frequency: Array, air: SoundAir) -> Complex:
     return 2j * np.pi * frequency * air.density * FLANGED * radius / groove.area
 
 
-def radiation_resistance(far: Transfer, shares: sparse.csr_matrix, lines: Array) -> Array:
-    """Resistance (o, o, l) Pa s/m3 that sources (shares (e, o) of the elements) radiate against, each's own and with each other.
+def radiation_resistance(
+    far: Transfer, met: sparse.csr_matrix, sources: sparse.csr_matrix, lines: Array
+) -> Array:
+    """Resistance (m, o, l) Pa s/m3 that sources `met` (shares (e, m) of the elements) radiate against beside `sources` (e, o).
 
     R_ij = (w rho)^2 / (rho c) int Re(g_i g_j*) r^2 dOmega, from the Green's functions `far` to `directions`, of which quotients by
     w^2 are interpolated at lines (l,) Hz. Of a source on a plane rho w^2 / (2 pi c), which is a flanged pipe's.
     """
     weight = directions()[1] * FAR**2
-    solved = np.stack([np.asarray(shares.T @ one.T) for one in far.ahead])  # (f, o, d)
-    found = np.einsum("fid,fjd,d->fij", solved, solved.conj(), weight).real
+    own, every = (
+        np.stack([np.asarray(shares.T @ one.T) for one in far.ahead]) for shares in (met, sources)
+    )
+    found = ((own * weight) @ np.swapaxes(every.conj(), 1, 2)).real
     at_lines = interpolate.CubicSpline(far.frequency, found)(lines)
     scale = (2 * np.pi * lines * far.air.density) ** 2 / far.air.impedance
     return np.asarray(np.moveaxis(at_lines * scale[:, None, None], 0, -1))
@@ -248,14 +252,14 @@ class Outlets:
     ) -> Complex:
         """Volume velocities (e + 2 g, f) m3/s at the `places`, of those squeezed (o, f) m3/s, with a mean gap of `height` m.
 
-        `resistance` (e + 2 g, e + 2 g, f): `radiation_resistance` of the places. The ends U of the grooves meet the pressures of all
+        `resistance` (2 g, e + 2 g, f): `radiation_resistance` that the grooves' ends meet beside all places. The ends U of the grooves meet the pressures of all
         places: U = U_0 - Y p, p = Z U + R Q, Z of the ends' inertia and R.
         """
         first = len(self.edge)
         over = rate[:first] * reaching(self.reach, height, frequency, air)
         ends = 2 * len(self.grooves)
         admittance = np.zeros((ends, ends, len(frequency)), complex)
-        impedance = resistance[first:, first:].astype(complex)
+        impedance = resistance[:, first:].astype(complex)
         shorted = np.zeros((ends, len(frequency)), complex)
         begun = first
         for k, (groove, end, station, reach) in enumerate(
@@ -276,7 +280,7 @@ class Outlets:
             )
         if not ends:
             return over
-        outside = np.einsum("ijf,jf->if", resistance[first:, :first], over)
+        outside = np.einsum("ijf,jf->if", resistance[:, :first], over)
         shorted -= np.einsum("ijf,jf->if", admittance, outside)
         held, met = np.moveaxis(admittance, -1, 0), np.moveaxis(impedance, -1, 0)
         out = np.linalg.solve(np.eye(ends) + held @ met, shorted.T[..., None])[..., 0].T

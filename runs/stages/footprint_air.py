@@ -70,7 +70,8 @@ class LeavingAir:
         late = lines.frequency * found.over
         true = np.exp(1j * np.pi * late) / np.sinc(np.minimum(late, 0.5))
         shares = on_elements(tire, _face(state), outlets.places)
-        resistance = radiation_resistance(far, shares, lines.frequency)
+        ends = shares[:, len(outlets.edge) :]
+        resistance = radiation_resistance(far, ends, shares, lines.frequency)
         given = lines.frequency, found.height, far.air, resistance
         amplitude, spectrum = (
             outlets.leaving((part * true[:, None]).T, *given)
