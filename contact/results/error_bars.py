@@ -63,8 +63,8 @@ class Measured:
     """Quantities of a force for comparison.
 
     `mean`, `deviation` (3,) N within the valid band of the model; `level` (b, 3) dB of the bands at
-    `centre` (b,) Hz, NaN of those for which the record is too short; `lines` (f, 3) N: Fourier coefficients of the variable part in that band, `spacing` Hz apart from 0
-    on (contact.results.spectra.low_part); histories are compared up to `up_to` Hz.
+    `centre` (b,) Hz, NaN of those for which the record is too short; `lines` (f, 3) N: Fourier coefficients of the variable
+    part in that band, `spacing` Hz apart from 0 on (contact.results.spectra.low_part); histories are compared up to `up_to` Hz.
     """
 
     mean: np.ndarray

@@ -5,40 +5,22 @@ import tracemalloc
 import numpy as np
 import pytest
 from mpi4py import MPI
+from probed_torus import probed_torus
 from scipy import sparse
 
 from tireroad.fem.matrices import compliance as compliance_module
-from tireroad.fem.matrices import probe
 from tireroad.fem.matrices.compliance import LoadedShapes, compliance, on_own_rows
-from tireroad.fem.matrices.operators import Operators
-from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.load_steps import LoadStepper
-from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.material import compound
 from tireroad.greens import coupling
 from tireroad.greens.coupling import Basis, Wheel
 from tireroad.modal.basis import project
-from tireroad.modal.solver import undamped
-from tireroad.runs.validation.cases import thesis_torus
 
 COMM = MPI.COMM_WORLD
-SOFT = {"model": "neo-hookean", "youngs_modulus": 48e6, "poisson_ratio": 0.45, "density": 1200.0}
 
 
 @pytest.fixture(scope="module")
 def tire():
-    """7,200 unknowns, 40 modes, vertical probes at 15 x 9 points 8 mm apart (closer than the nodes)."""
-    section = thesis_torus(segments=24, elements_arc=9, footprint_size=0.4)
-    body = Body(COMM, section, compound(**SOFT))
-    LoadStepper(Equilibrium(body), lambda progress: None).inflate(2e5)
-    operators = Operators(body, 2e5)
-    modes = undamped.solve(operators.stiffness, operators.mass, 40)
-    spots = [
-        probe.directed(probe.spot(body.lattice, angle, arc), (0, 0, 1.0))
-        for angle in np.linspace(-0.175, 0.175, 15)
-        for arc in np.linspace(-0.32, 0.32, 9)
-    ]
-    return operators, modes, sparse.csr_matrix(np.stack(spots))
+    """40 modes, vertical probes at 15 x 9 points 8 mm apart (closer than the nodes)."""
+    return probed_torus(40, 15, 9)
 
 
 @pytest.mark.long

@@ -5,15 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from mpi4py import MPI
-from scipy import sparse
+from probed_torus import probed_torus
 
 from tireroad.fem.errors import InputError
-from tireroad.fem.matrices import probe
-from tireroad.fem.matrices.operators import Operators
-from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.load_steps import LoadStepper
-from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.material import compound
 from tireroad.fem.wheel import Turning
 from tireroad.greens import coupling
 from tireroad.greens.coupling import Basis, Wheel
@@ -21,28 +15,15 @@ from tireroad.greens.fewer_modes import of_fewer_modes
 from tireroad.modal.basis import ModalBasis, project
 from tireroad.modal.rolling import RollingModes
 from tireroad.modal.rotation_shapes import with_rotation_shapes
-from tireroad.modal.solver import undamped
-from tireroad.runs.validation.cases import thesis_torus
 
 COMM = MPI.COMM_WORLD
-SOFT = {"model": "neo-hookean", "youngs_modulus": 48e6, "poisson_ratio": 0.45, "density": 1200.0}
 DAMPING = (100.0, 0.0)
 
 
 @pytest.fixture(scope="module")
 def tire():
-    """7,200 unknowns, 60 modes, loads at 9 x 5 points of the footprint."""
-    section = thesis_torus(segments=24, elements_arc=9, footprint_size=0.4)
-    body = Body(COMM, section, compound(**SOFT))
-    LoadStepper(Equilibrium(body), lambda progress: None).inflate(2e5)
-    operators = Operators(body, 2e5)
-    modes = undamped.solve(operators.stiffness, operators.mass, 60)
-    spots = [
-        probe.directed(probe.spot(body.lattice, angle, arc), (0, 0, 1.0))
-        for angle in np.linspace(-0.175, 0.175, 9)
-        for arc in np.linspace(-0.32, 0.32, 5)
-    ]
-    return operators, modes, sparse.csr_matrix(np.stack(spots))
+    """60 modes, loads at 9 x 5 points of the footprint."""
+    return probed_torus(60, 9, 5)
 
 
 def attached(tire, count: int, speed: float):
