@@ -29,6 +29,9 @@ from tireroad.fem.errors import ConvergenceError, UnsuitedSettings
 MOST_POINTS = 1_000_000
 LOAD_TOLERANCE = 1e-7
 
+ACROSS = 8  # points across the footprint below which twice their spacing gives no estimate
+MOST = 1000  # points that touch at rest with half the spacing, up to which a factor solves them
+
 
 class DeformedTread(Protocol):
     """The deformed tread (fem.tread_surface.TreadSurface)."""
@@ -185,10 +188,6 @@ def _bracket(excess: Callable[[float], float], step: float) -> tuple[float, floa
         "contact: no height of the tire gives the static load on the points; take a finer grid "
         "(contact.points), or a larger contact.reach"
     )
-
-
-ACROSS = 8  # points across the footprint below which twice their spacing gives no estimate
-MOST = 1000  # points that touch at rest with half the spacing, up to which a factor solves them
 
 
 def ratio(patch: Patch, most: float = MOST) -> float:

@@ -15,6 +15,11 @@ from tireroad.fem.errors import InputError
 
 _ACROSS = 21  # points across the square that the sphere is pressed into
 
+Array = NDArray[np.float64]
+_NARROW = 0.25  # of the mean width
+_PHASES = 64  # over one period, for the mean load
+_CLASSES = 24
+
 
 def fitted_stiffness(law: TreadLaw, radius: float, depth: float) -> float:
     """Stiffness (N/m^3) of the bed that carries as much as the tread under a rigid sphere.
@@ -32,11 +37,6 @@ def fitted_stiffness(law: TreadLaw, radius: float, depth: float) -> float:
     matrix = law.matrix(points, half, 4 * reach)
     force = float(ActiveSet(matrix).solve(-sunk).sum())
     return force / float(np.maximum(sunk, 0.0).sum() * pitch**2)
-
-
-Array = NDArray[np.float64]
-_NARROW = 0.25  # of the mean width
-_PHASES = 64  # over one period, for the mean load
 
 
 @dataclass(frozen=True)
@@ -150,9 +150,6 @@ class ShiftedSprings:
         sunk[np.abs(place) > self.length] = 0.0
         springs = 4 / 3 * self.modulus * np.sqrt(self.road.radius) * sunk**1.5
         return rows * springs.sum(axis=1)
-
-
-_CLASSES = 24
 
 
 @dataclass(frozen=True)

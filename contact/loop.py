@@ -36,6 +36,10 @@ MEETINGS = 20  # solutions of a step, at most
 GENTLE, STEEP = 0.5, 1.0
 MIXED = 5  # of them whose places are combined
 
+# What needs no contact is computed for as many steps at once as make this many points, and for at most so many.
+_POINTS_AHEAD, _STEPS_AHEAD = 200_000, 64
+_NO_FORCE, _NULL = np.zeros((2, 0)), COMPILED.ffi.NULL
+
 
 @dataclass(frozen=True)
 class Steps:
@@ -155,10 +159,6 @@ def _packed(found: Solved) -> Array:
     scalars = found.residual, found.penetration
     slope = () if found.slope is None else found.slope.ravel()
     return np.concatenate([scalars, found.force, found.gap, found.horizontal.ravel(), slope])
-
-
-# What needs no contact is computed for as many steps at once as make this many points, and for at most so many.
-_POINTS_AHEAD, _STEPS_AHEAD = 200_000, 64
 
 
 def block_size(points: int) -> int:
@@ -648,9 +648,6 @@ class Mixed:
         return ahead
 
 
-_NO_FORCE, _NULL = np.zeros((2, 0)), COMPILED.ffi.NULL
-
-
 def _pointer(values: Array | None) -> Any:
     return _NULL if values is None else COMPILED.doubles(values)
 
@@ -821,7 +818,7 @@ class DrivenTire:
         return self._pushed(self._tire.predict())
 
     def _pushed(self, free: np.ndarray) -> np.ndarray:
-        """What the contact sees (c,) m of motions (r,) m without the forces of the step."""
+        """Displacements (c,) m along the contact's components, of motions (r,) m without the forces of the step."""
         self._free = free
         if not self._forced:
             return free[: self._seen]
@@ -850,7 +847,7 @@ class DrivenTire:
         self._along = along
 
     def inertia_force(self) -> np.ndarray:
-        """What axle and contact balance (3,), N: rate of momentum less prescribed forces."""
+        """Inertia force (3,) N that axle and contact balance: rate of momentum less prescribed forces."""
         rate = self._tire.inertia_force()
         return rate - self._history[self._step] @ self._directions if self._forced else rate
 

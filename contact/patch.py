@@ -30,6 +30,9 @@ ACROSS = 5.0  # points on the footprint's width or length
 ON_A_WAVE = 12.0  # points on the shortest wave of interest
 ON_A_NODE = 2.0  # points from node to node, at most
 
+# Allowance for the tire's own motion beyond the road's height, m: the smallest reach by default.
+LEAST_REACH = 5e-3
+
 
 def spacing(footprint: Footprint, nodes: Patch, speed: float, highest: float) -> float | None:
     """Spacing (m) of the points, two digits of it; None if nothing touches.
@@ -46,10 +49,6 @@ def spacing(footprint: Footprint, nodes: Patch, speed: float, highest: float) ->
     wanted = max(wanted, between / ON_A_NODE)
     digit = second_digit(wanted)
     return round(math.floor(wanted / digit * (1 + 1e-9)) * digit, 9)
-
-
-# Allowance for the tire's own motion beyond the road's height, m: the smallest reach by default.
-LEAST_REACH = 5e-3
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""What a tire rolls over: contact points, the strip of road under them, and its motion."""
+"""Contact of a tire with its road: the strip of road under them, and its motion."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ class TrainingRoads:
 
     @staticmethod
     def of(setup: ContactSetup) -> TrainingRoads:
-        """Of the setup of a run, level where it has no relief."""
+        """Training roads for the setup of a run, level where it has no relief."""
         # Grids of points are not settled yet and have no forces.
         touching = setup.patch.points[setup.patch.gap < CLOSE, :2]
         low, high = touching.min(axis=0) - BESIDE, touching.max(axis=0) + BESIDE

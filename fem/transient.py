@@ -35,6 +35,19 @@ from tireroad.fem.nonlinear.force import RestoringForce
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.wheel import Axle
 
+Array = np.ndarray
+# State carried from step to step; `balanced` is the mean of two accelerations that satisfies
+# equilibrium at the end of the step.
+_STATE = ("displacement", "velocity", "acceleration", "balanced")
+TOLERANCE = 1e-9  # of the largest displacement
+_FLOOR = 1e-11  # of the wall's thickness: rounding of F
+MOST_TURNS = 60
+_MOST_MET = 500  # solutions of the contact in one of them
+# An iteration that leaves more than this of what the last one left is followed by a new factor: one
+# takes as long as some ten iterations between few points, and as a hundred between many.
+SLOW = 0.3
+_PART = 0.1  # of what is out of balance: changes of the contact's forces that are not felt
+
 
 class ModalDamping:
     """`fields`: own rows (n, m) of M-orthonormal modes, kg^-1/2; `excess` (m, m) 1/s. Collective.
@@ -143,9 +156,6 @@ class AirStep:
     def momentum(self) -> np.ndarray:
         """Momentum (3, rows) kg^1/2 per unit rate."""
         return self._air.duct.momentum[:, : self.rows]
-
-
-Array = np.ndarray
 
 
 class MovingWheel:
@@ -266,11 +276,6 @@ class WheelStep:
     def momentum(self) -> Array:
         """Momentum (3, rows) kg^1/2 per unit rate."""
         return self._wheel.carried[:, : self.rows]
-
-
-# State carried from step to step; `balanced` is the mean of two accelerations that satisfies
-# equilibrium at the end of the step.
-_STATE = ("displacement", "velocity", "acceleration", "balanced")
 
 
 class FullTire:
@@ -467,16 +472,6 @@ class FullTire:
     def inertia_force(self) -> np.ndarray:
         """Rate of momentum (3,) of tire and air, N; convective parts cancel around the ring."""
         return summed(self.comm, self._carried @ self.balanced)
-
-
-TOLERANCE = 1e-9  # of the largest displacement
-_FLOOR = 1e-11  # of the wall's thickness: rounding of F
-MOST_TURNS = 60
-_MOST_MET = 500  # solutions of the contact in one of them
-# An iteration that leaves more than this of what the last one left is followed by a new factor: one
-# takes as long as some ten iterations between few points, and as a hundred between many.
-SLOW = 0.3
-_PART = 0.1  # of what is out of balance: changes of the contact's forces that are not felt
 
 
 class NonlinearTire(FullTire):

@@ -1,4 +1,4 @@
-"""What a response yields besides displacements: axle force and moment, hub force, vibration."""
+"""Outputs of a response besides displacements: axle force and moment, hub force, vibration."""
 
 from __future__ import annotations
 
@@ -19,6 +19,8 @@ from tireroad.modal.solver.slicing import Modes
 
 if TYPE_CHECKING:
     from tireroad.greens.coupling import Wheel
+
+IMPEDANCE = 413.3  # N s/m3, rho c of air at 20 deg C and 1013 hPa
 
 
 def axle_transfer(
@@ -220,9 +222,6 @@ def disagreement(
     if not some.any():
         return None
     return float((np.linalg.norm(one - other, axis=(1, 2))[some] / size[some]).max())
-
-
-IMPEDANCE = 413.3  # N s/m3, rho c of air at 20 deg C and 1013 hPa
 
 
 @dataclass(frozen=True)

@@ -50,6 +50,14 @@ EARLIER = {
     "constant": (1.0, 0.0),
 }
 
+NO_BLOCK = {name: np.zeros(0) for name in ("block_state", "block_force", "block_before")}
+# Bytes of both matrices; smaller ones fit the caches, and processes would only wait.
+SHARED_FROM = 20e6
+_LIBRARY = "user_api", "internal_api", "version", "architecture"
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+LARGEST = 4e9  # bytes of sampled Green's functions
+
 
 class Block:
     """Recursion of the block of nearly defective states, on the first process with states.
@@ -127,9 +135,6 @@ def block_steps(
     return moved[:, :size], *_shares(first, second, scheme)
 
 
-NO_BLOCK = {name: np.zeros(0) for name in ("block_state", "block_force", "block_before")}
-
-
 def weights(x: np.ndarray, step: float, scheme: str) -> tuple[np.ndarray, np.ndarray]:
     """b0 and b1 for x = s h."""
     phi1, phi2 = _phi(x)
@@ -178,7 +183,7 @@ def ahead_of_mean(scheme: str, forces: np.ndarray) -> np.ndarray:
 
 
 def late_answers(response: Response, step: float, scheme: str) -> sparse.csr_matrix | None:
-    """What the outputs and the rate of momentum (r + 3, k) still answer to the step's first force.
+    """The answer (r + 3, k) of outputs and rate of momentum that a step's first force still gives.
 
     It is missing in the answer to its last force: a pulse one step long responds to the mean of both,
     as of a linear force, and a slope (Response.slope) to the difference of both.
@@ -217,11 +222,6 @@ class Spread:
     def _of(self, rank: int, every: np.ndarray) -> np.ndarray:
         owners = self.comm.size - self.idle
         return every[rank - self.idle :: owners] if rank >= self.idle else every[:0]
-
-
-# Bytes of both matrices; smaller ones fit the caches, and processes would only wait.
-SHARED_FROM = 20e6
-_LIBRARY = "user_api", "internal_api", "version", "architecture"
 
 
 def sharers(response: Response, comm: MPI.Comm) -> MPI.Comm:
@@ -267,10 +267,6 @@ def alternating(response: Response, step: float) -> np.ndarray:
 def at_once(response: Response) -> np.ndarray:
     """The residual's contribution (r, k) m/N; that of a pulse, half of it a step late, cancels."""
     return np.zeros_like(response.residual) if response.pulse else response.residual
-
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 
 class SharedRows:
@@ -665,9 +661,6 @@ def marched(
             out += (late[:-3] @ (np.vstack([force, forces[:-1]]) - forces).T).T
         yield out
         force, last = forces[-1], pushes[-2:]
-
-
-LARGEST = 4e9  # bytes of sampled Green's functions
 
 
 class Convolution:

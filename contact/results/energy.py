@@ -16,6 +16,10 @@ from tireroad.modal.rolling import RollingModes, pencil
 
 AT_ONCE = 64  # steps of which the work is computed at a time: it takes nine arrays of their size
 
+# Times the patch's reach, or the smallest default reach: a scene may give one that is far smaller
+# than what the tire moves.
+RUNAWAY = 100.0
+
 
 class Work:
     """Work (J) of the changes of the contact forces on the tire, summed over the steps.
@@ -318,11 +322,6 @@ def energy_left(rolling: RollingModes, kept: dict[str, np.ndarray], slow: np.nda
         projection = replace(projection, air=replace(air, duct=duct))
     _, stiffness = pencil(projection, replace(rolling.turning, damping=(0.0, 0.0)))
     return stored(coordinates, rates, stiffness)
-
-
-# Times the patch's reach, or the smallest default reach: a scene may give one that is far smaller
-# than what the tire moves.
-RUNAWAY = 100.0
 
 
 @dataclass

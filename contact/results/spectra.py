@@ -15,6 +15,15 @@ FEWEST = 3  # lines across a band; with fewer it has no level
 # Lines with which the process's level lies from 3.0 dB below to 4.6 dB above in 95 % of cases.
 FEW = 10
 
+# References of the levels: N, N m, and m/s by ISO 1683.
+FORCE, MOMENT, VELOCITY = 1.0, 1.0, 1e-9
+SILENT = -1000.0  # dB: levels below are of records that do not vary beyond rounding
+BAND = 300.0  # Hz, up to which two histories are compared by default
+_ROUNDING = 1e-12  # of the largest value of a record: less variation than this is rounding
+_SEGMENTS = 4.5  # with half overlap, eight averages
+_LONGEST = 0.5  # s of a segment: lines of 2 Hz; longer records give more averages instead
+_ORDER = 4  # of the filter, passed twice: 24 dB an octave each way
+
 
 def a_weighting(frequency: np.ndarray) -> np.ndarray:
     """A-weighting in dB at frequencies (f,) Hz: the analytic form of IEC 61672-1, 0 at 1 kHz."""
@@ -113,15 +122,6 @@ def confidence(degrees: np.ndarray, share: float = 0.95) -> np.ndarray:
     nu, tail = np.asarray(degrees, float), (1 - share) / 2
     ends = [nu / stats.chi2.ppf(1 - tail, nu), nu / stats.chi2.ppf(tail, nu)]
     return 10 * np.log10(np.stack(ends, axis=-1))
-
-
-# References of the levels: N, N m, and m/s by ISO 1683.
-FORCE, MOMENT, VELOCITY = 1.0, 1.0, 1e-9
-SILENT = -1000.0  # dB: levels below are of records that do not vary beyond rounding
-BAND = 300.0  # Hz, up to which two histories are compared by default
-_ROUNDING = 1e-12  # of the largest value of a record: less variation than this is rounding
-_SEGMENTS = 4.5  # with half overlap, eight averages
-_LONGEST = 0.5  # s of a segment: lines of 2 Hz; longer records give more averages instead
 
 
 def heard(level: np.ndarray) -> np.ndarray:
@@ -301,9 +301,6 @@ def distance(
     seen = [np.fft.irfft(part, 8 * len(exact), axis=0) for part in (off, exact)]
     worst, most = (np.abs(part).max() for part in seen)
     return Distance(float(np.linalg.norm(off) / np.linalg.norm(exact)), float(worst / most))
-
-
-_ORDER = 4  # of the filter, passed twice: 24 dB an octave each way
 
 
 def in_band(values: np.ndarray, step: float, up_to: float) -> np.ndarray:

@@ -85,7 +85,7 @@ class CellMean:
         return self._at(x, COMPILED.lib.slopes_at, (2,))
 
     def _at(self, x: Array, function: Any, more: tuple[int, ...]) -> Array:
-        """What the compiled `function` finds at x (n, c) m, of shape (n, c, *more)."""
+        """Values (n, c, *more) of the compiled `function` at x (n, c) m."""
         x = np.ascontiguousarray(x, dtype=float)
         out = np.empty(x.shape + more)
         if x.size:

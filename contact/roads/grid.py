@@ -31,6 +31,12 @@ SEARCHED, MOST_SEARCHED = 500_000, 64
 # Largest number of heights unpacked into a temporary file: 16 GB.
 MAX_UNPACKED = 2_000_000_000
 
+# Axes that deviate from even spacing by less than this fraction of a step count as even, because
+# files round positions.
+EVEN = 1e-4
+# Limits of steps and positions of a measured road, m; anything beyond is damage.
+FINEST, FARTHEST = 1e-6, 1e8
+
 
 def check_count(file: Path, count: int) -> None:
     """InputError for more positions than can be kept in memory."""
@@ -77,7 +83,7 @@ class GridColumns:
 
 @dataclass(frozen=True)
 class Coding:
-    """What the numbers of a file mean: metres = (number * scale + offset) * unit, and nan for what is no height.
+    """Coding of a file's heights: metres = (number * scale + offset) * unit, and nan for what is no height.
 
     No heights are numbers equal to one of `missing`, and those out of `valid` (lowest, highest).
     """
@@ -372,14 +378,6 @@ def fill_holes(z: Array, x: Array, y: Array, source: str = "road") -> Array:
     for column in range(z.shape[1] if not known.all() else 0):
         z[:, column] = np.interp(x, x[known], z[known, column])
     return z
-
-
-# Axes that deviate from even spacing by less than this fraction of a step count as even, because
-# files round positions.
-EVEN = 1e-4
-
-# Limits of steps and positions of a measured road, m; anything beyond is damage.
-FINEST, FARTHEST = 1e-6, 1e8
 
 
 class Axis:

@@ -59,6 +59,55 @@ ROUGHEST = 2.0
 HIGHEST = 1e4  # m above sea level; larger values are damage
 SAMPLES = 64  # rows inspected
 
+# Exceptions of the standard library, numpy and h5py for damaged files; NotImplementedError and
+# RuntimeError are zipfile's for damaged version numbers and flags, KeyError is h5py's.
+UNREADABLE = (
+    OSError,
+    EOFError,
+    KeyError,
+    zipfile.BadZipFile,
+    zlib.error,
+    NotImplementedError,
+    RuntimeError,
+)
+# Names under which a unit stands: units, x_unit, unit_of_z, height units, UoM; and whose it is by the rest of the name.
+_UNIT_NAME = re.compile(
+    r"(?P<before>.*?)[_ .-]*(?:units?|uom|einheit)(?:[_ -]*(?:of[_ ])?(?P<after>.*))?",
+    re.IGNORECASE,
+)
+_WHOSE = {
+    "": "xyz", "xy": "xy", "length": "xy", "lengths": "xy", "lateral": "xy", "horizontal": "xy", "planar": "xy", "vertical": "z",
+    "measure": "xyz", "measurement": "xyz", "physical": "xyz", "axis": "xyz", "quantity": "xyz", "data": "xyz", "si": "xyz",
+    "symbol": "xyz", "name": "xyz", "long_name": "xyz", "base": "xyz", "coordinate": "xyz", "coordinates": "xyz",
+}  # fmt: skip
+_MISSING_NAME = re.compile(
+    r"_?(?:[xyz]_)?(?:(?:fill|missing|bad|null|invalid|void|undef(?:ined)?|dummy|nan|blank)[_ -]?(?:value|data|code|flag|height|"
+    r"number|marker)?s?|no_?(?:data|height|value)(?:[_ -]?value)?|(?:error|none)[_ -]?(?:value|code))",
+    re.IGNORECASE,
+)
+_FACTORS = re.compile(
+    r"scale|scaling|factor|gain|multiplier|slope|\blsb|conv(?:ersion)?\b|quant(?:um|isation|ization)|calib|(?:^|_)per_|"
+    r"(?:^|_)to_m",
+    re.IGNORECASE,
+)
+_OFFSETS = re.compile(r"offset|intercept|\bbias|shift|datum|zero|\bz0", re.IGNORECASE)
+# Beside heights alone: a resolution of the file can be that of x.
+_FACTORS_OF_Z = re.compile(r"resolution|step|increment", re.IGNORECASE)
+_OFFSETS_OF_Z = re.compile(r"base|reference", re.IGNORECASE)
+_MASKS = "mask", "z_mask"
+_OTHER_MASKS = re.compile(
+    r"mask|valid|nodata|no_data|missing|flag|quality|holes|is_?nan", re.IGNORECASE
+)
+_DIRECTION = re.compile(r"direction|orientation|sign|positive|polarity", re.IGNORECASE)
+_DOWN = re.compile(r"down|inver|neg|flip|-", re.IGNORECASE)
+_OF_FILE = re.compile(
+    r"history|source|conventions|references|institution|creator|author|_nc.*|dimension_labels|name",
+    re.IGNORECASE,
+)
+MAX_CHUNK = 256_000_000  # bytes: HDF5 unpacks a chunk as a whole
+ASSUMED = "m"
+COUNTED = 10_000_000  # heights of a file of which the missing ones are counted for the log
+
 
 def check_plausible(
     extent: tuple[float, float],
@@ -115,19 +164,6 @@ def _median(values: Array) -> float:
     return float(np.median(known)) if known.size else 0.0
 
 
-# Exceptions of the standard library, numpy and h5py for damaged files; NotImplementedError and
-# RuntimeError are zipfile's for damaged version numbers and flags, KeyError is h5py's.
-UNREADABLE = (
-    OSError,
-    EOFError,
-    KeyError,
-    zipfile.BadZipFile,
-    zlib.error,
-    NotImplementedError,
-    RuntimeError,
-)
-
-
 class Header(NamedTuple):
     """The header of an array in an archive."""
 
@@ -176,45 +212,9 @@ def read_numbers(archive: zipfile.ZipFile, name: str, most: int) -> Array:
     return numbers.reshape(header.shape, order="F" if header.by_columns else "C").astype(float)
 
 
-# Names under which a unit stands: units, x_unit, unit_of_z, height units, UoM; and whose it is by the rest of the name.
-_UNIT_NAME = re.compile(
-    r"(?P<before>.*?)[_ .-]*(?:units?|uom|einheit)(?:[_ -]*(?:of[_ ])?(?P<after>.*))?",
-    re.IGNORECASE,
-)
-_WHOSE = {
-    "": "xyz", "xy": "xy", "length": "xy", "lengths": "xy", "lateral": "xy", "horizontal": "xy", "planar": "xy", "vertical": "z",
-    "measure": "xyz", "measurement": "xyz", "physical": "xyz", "axis": "xyz", "quantity": "xyz", "data": "xyz", "si": "xyz",
-    "symbol": "xyz", "name": "xyz", "long_name": "xyz", "base": "xyz", "coordinate": "xyz", "coordinates": "xyz",
-}  # fmt: skip
-_MISSING_NAME = re.compile(
-    r"_?(?:[xyz]_)?(?:(?:fill|missing|bad|null|invalid|void|undef(?:ined)?|dummy|nan|blank)[_ -]?(?:value|data|code|flag|height|"
-    r"number|marker)?s?|no_?(?:data|height|value)(?:[_ -]?value)?|(?:error|none)[_ -]?(?:value|code))",
-    re.IGNORECASE,
-)
-_FACTORS = re.compile(
-    r"scale|scaling|factor|gain|multiplier|slope|\blsb|conv(?:ersion)?\b|quant(?:um|isation|ization)|calib|(?:^|_)per_|"
-    r"(?:^|_)to_m",
-    re.IGNORECASE,
-)
-_OFFSETS = re.compile(r"offset|intercept|\bbias|shift|datum|zero|\bz0", re.IGNORECASE)
-# Beside heights alone: a resolution of the file can be that of x.
-_FACTORS_OF_Z = re.compile(r"resolution|step|increment", re.IGNORECASE)
-_OFFSETS_OF_Z = re.compile(r"base|reference", re.IGNORECASE)
-_MASKS = "mask", "z_mask"
-_OTHER_MASKS = re.compile(
-    r"mask|valid|nodata|no_data|missing|flag|quality|holes|is_?nan", re.IGNORECASE
-)
-_DIRECTION = re.compile(r"direction|orientation|sign|positive|polarity", re.IGNORECASE)
-_DOWN = re.compile(r"down|inver|neg|flip|-", re.IGNORECASE)
-_OF_FILE = re.compile(
-    r"history|source|conventions|references|institution|creator|author|_nc.*|dimension_labels|name",
-    re.IGNORECASE,
-)
-
-
 @dataclass
 class _Meaning:
-    """What stands beside the arrays x, y and z of a file: units by role ("" for all) with their place, and codes by array."""
+    """Texts beside the arrays x, y and z of a file: units by role ("" for all) with their place, and codes by array."""
 
     units: dict[str, tuple[str, str]] = field(default_factory=dict)
     codes: dict[str, dict[str, Any]] = field(default_factory=lambda: {name: {} for name in "xyz"})
@@ -510,9 +510,6 @@ def _stored(file: Path, info: zipfile.ZipInfo, packed: Packed) -> FileRows:
     return FileRows(file, packed._replace(start=start))
 
 
-MAX_CHUNK = 256_000_000  # bytes: HDF5 unpacks a chunk as a whole
-
-
 class Hdf5Rows:
     """Rows of a dataset that stays in its file; `turned`: its columns."""
 
@@ -681,7 +678,6 @@ READERS: dict[str, Callable[[Path, Keys], Found]] = {
     **dict.fromkeys((".h5", ".hdf5"), read_hdf5),
     ".nc": read_netcdf,
 }
-ASSUMED = "m"
 
 
 def read_grid(
@@ -797,9 +793,6 @@ def _grid(
     return grid
 
 
-COUNTED = 10_000_000  # heights of a file of which the missing ones are counted for the log
-
-
 def _gaps(rows: Rows, missing: tuple[float, ...]) -> str:
     """How many heights are missing, where they are few enough to be counted, and the numbers that say so."""
     named = f"no height: {', '.join(f'{one:g}' for one in missing)}" if missing else ""
@@ -821,7 +814,7 @@ def counted(axis: Array) -> bool:
 
 
 def _all_missing(coding: Coding, missing: tuple[float, ...] | None) -> tuple[float, ...]:
-    """What the file and the scene call missing, in the file's numbers."""
+    """Numbers of the file that it or the scene calls missing."""
     given = missing or ()
     if (coding.scale, coding.offset) != (1.0, 0.0):
         given = (*given, *((one - coding.offset) / coding.scale for one in given))

@@ -44,10 +44,24 @@ Scales = tuple[Scale | None, Scale | None, Scale | None]
 BLOCK = 4096  # most lines per block
 BLOCK_CHARACTERS = 32_000_000  # most characters per block
 
+_LAYOUT = "a list of points begins with the line x,y,z, a matrix with a corner that is not read, then the y of its columns"
+_ORDER = re.compile(
+    r"\b(?P<what>(?:first|top|left|1st|erste|header)?[ _-]*(?:rows?|lines?|columns?|cols?|zeilen?|spalten?))\b[^a-z0-9]*"
+    r"(?:(?:are|is|has|holds?|contains?|gives?|along|=|of|the|positions?|values?|coordinates?)[^a-z0-9]*)*\b(?P<axis>[xy])\b"
+    r"|\b(?P<of>[xy])\b[^a-z]*(?P<where>across|down|along (?:the )?(?:rows?|columns?)|in (?:the )?(?:first )?(?:rows?|columns?))\b",
+    re.IGNORECASE,
+)
+_PLAIN = re.compile(
+    r"grid|data|matrix|table|road|corner|nan|na|rows?|columns?|and|by|over|down", re.I
+)
+_ACROSS = re.compile(r"\bx\b[^a-z]*(?:[-=]+>|→|across|columns?\b)", re.I)
+_BRACKETS = re.compile(r"[\[({<][^\])}>]*[\])}>]")
+_SAME = 1e-3  # of a usual step: positions that close are one
+
 
 @dataclass(frozen=True)
 class Keys:
-    """What a scene says of a file: units of lengths and heights, and values that mean "no height" (None: to be looked for)."""
+    """Keys of a scene that describe a file: units of lengths and heights, and values that mean "no height" (None: to be looked for)."""
 
     length_unit: str | None = None
     height_unit: str | None = None
@@ -124,9 +138,6 @@ def _too_few(rows: list[Line], source: str) -> InputError:
     except InputError as error:
         return InputError(f"{error}; {_LAYOUT}")
     return InputError(f"{source}: {len(rows)} lines of data, at least 3 are needed; {_LAYOUT}")
-
-
-_LAYOUT = "a list of points begins with the line x,y,z, a matrix with a corner that is not read, then the y of its columns"
 
 
 def _data(head: list[Line], lines: Iterator[Line], first: int, source: str) -> Iterator[list[Line]]:
@@ -259,14 +270,6 @@ def _matrix(
     )
 
 
-_ORDER = re.compile(
-    r"\b(?P<what>(?:first|top|left|1st|erste|header)?[ _-]*(?:rows?|lines?|columns?|cols?|zeilen?|spalten?))\b[^a-z0-9]*"
-    r"(?:(?:are|is|has|holds?|contains?|gives?|along|=|of|the|positions?|values?|coordinates?)[^a-z0-9]*)*\b(?P<axis>[xy])\b"
-    r"|\b(?P<of>[xy])\b[^a-z]*(?P<where>across|down|along (?:the )?(?:rows?|columns?)|in (?:the )?(?:first )?(?:rows?|columns?))\b",
-    re.IGNORECASE,
-)
-
-
 def _check_order(layout: Layout, source: str) -> None:
     """InputError for a line above a matrix by which its rows are along y: `first column y`, `columns: x`, `x across`."""
     for line in layout.before:
@@ -377,14 +380,6 @@ def _corner(text: str, keys: Keys, stated: Stated, source: str) -> tuple[Column,
     x = heights if "x" in letters else Column()
     y = heights if letters & {"x", "y"} else Column()
     return x, y, heights if "z" in letters else Column()
-
-
-_PLAIN = re.compile(
-    r"grid|data|matrix|table|road|corner|nan|na|rows?|columns?|and|by|over|down", re.I
-)
-_ACROSS = re.compile(r"\bx\b[^a-z]*(?:[-=]+>|→|across|columns?\b)", re.I)
-_BRACKETS = re.compile(r"[\[({<][^\])}>]*[\])}>]")
-_SAME = 1e-3  # of a usual step: positions that close are one
 
 
 def _steps(values: Array) -> tuple[Array, NDArray[np.intp]]:

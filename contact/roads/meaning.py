@@ -1,4 +1,4 @@
-"""What a table of numbers says about itself: form, headings, units, missing values.
+"""Form and meaning of a table of numbers, read from its own text: headings, units, missing values.
 
 Text tables of every kind of road are read through here: the encoding, the separator and the decimal
 mark are found by which of them makes rows of numbers; whatever stands before the numbers (headings,
@@ -37,23 +37,6 @@ _METRES = re.compile(
 )
 _PREFIXES = 1e3, 0.1, 1e-2, 1e-3, 1e-6, 1e-9
 
-
-def _without_accents(text: str) -> str:
-    return "".join(
-        one for one in unicodedata.normalize("NFD", text) if not unicodedata.combining(one)
-    )
-
-
-def _metres(word: str) -> float | None:
-    """Metres of a unit of length in lower case; None where it is none."""
-    if word in _LENGTHS:
-        return _LENGTHS[word]
-    match = _METRES.fullmatch(_without_accents(word))
-    if match is None:
-        return None
-    return next((size for size, part in zip(_PREFIXES, match.groups(), strict=True) if part), 1.0)
-
-
 _TIMES = {
     "s", "sec", "secs", "second", "seconds", "sek", "sekunde", "sekunden", "ms", "us", "μs", "ns", "min", "minutes",
     "h", "hour", "hours",
@@ -74,47 +57,6 @@ _PARTS = {"tenth": "0.1", "zehntel": "0.1", "hundredth": "0.01", "hundertstel": 
 _PART = re.compile(rf"({'|'.join(_PARTS)})s?(?:\s+of)?(?:\s+an?)?\s+(?=\w)")
 _RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺", "0123456789-+")
 _POWER = re.compile(r"10\s*([⁻⁺]?[⁰¹²³⁴-⁹]+)")
-
-
-def _plain(text: str) -> str:
-    """A text with µ as the Greek letter, 10⁻⁶ as 10^-6, and tenths and the like as numbers; lower case."""
-    plain = _POWER.sub(lambda match: f"10^{match[1].translate(_RAISED)}", text).replace("µ", "μ")
-    return _PART.sub(lambda match: f"{_PARTS[match[1]]} ", plain.lower())
-
-
-@dataclass(frozen=True)
-class Unit:
-    """A unit as it is written; `metres` of a length, None of a time or whatever else."""
-
-    text: str
-    metres: float | None
-    time: bool = False
-
-
-def unit_of(text: str) -> Unit | None:
-    """The unit that a text is, also with a factor (0.1 mm, 1/10 mm, 10^-3 m, tenths of mm); None where it is none."""
-    shown = text.strip().strip(".").strip()
-    word = " ".join(_plain(shown).split())
-    if metres := _metres(word):
-        return Unit(shown, metres)
-    if word in _TIMES:
-        return Unit(shown, None, time=True)
-    if word in _OTHERS:
-        return Unit(shown, None)
-    match = _PER.fullmatch(word)
-    metres = _metres(match["word"].strip()) if match else None
-    if match is None or metres is None:
-        return None
-    if match["power"]:
-        times = 10.0 ** int(match["power"])
-    else:
-        times = float(match["number"].replace(",", ".")) / float(match["by"] or 1)
-    # 25 mm is a length, not a unit.
-    if not (times > 0 and abs(np.log10(times) - round(np.log10(times))) < 1e-9):
-        return None
-    return Unit(shown, times * metres)
-
-
 # Headings by what their column holds. The first that fits decides.
 _ROLES: tuple[tuple[str, str], ...] = (
     (
@@ -171,8 +113,6 @@ _BRACKETED = re.compile(r"[\[({<«]([^\])}>»]*)[\])}>»]")
 _PARTED = re.compile(r"\s+in\s+|\s*(?:[,/:;|-]|_+)\s*|\s+")
 _JOINED = re.compile(r"^(x|y|z|height|depth|dist|distance|elevation|h)(\w{2,})$|^(x|y|z)(m)$", re.I)
 _CAMEL = re.compile(r"^(.*[a-z])(MM|Mm|CM|Cm|DM|Dm|UM|Um|μm)$")
-
-
 # What in a heading multiplies its numbers; a heading of which the last word is half a unit: z_e-3 m.
 _TIMES_IN = re.compile(
     r"(?<=\w)\s*[×*·]\s*\d|\s+x\s*10+\b|^[x×*]\s*(?:\d\.|10)|\d\s*[×*]|10\s*(?:\^|\*\*)|[*/]\s*10+\b"
@@ -192,6 +132,106 @@ _DOWN = re.compile(
 )
 _DOWN_FROM = re.compile(r"\b(?:depths?|height|distance)\b.*\bbelow\b", re.IGNORECASE)
 _DEEP = re.compile(r"\b(?:depth|tiefe|prof(?:ondeur|undidad|undit))|(?:^|_)depth", re.IGNORECASE)
+_WORDS = re.compile(r"[A-ZÀ-Ö]?[a-zß-öø-ÿμ]+|[A-ZÀ-Ö]+")  # of ProfileMM, too
+_WITHIN = {"in", "and", "is", "are", "the", "und"}
+_NUMBERED = re.compile(
+    r"^\W*(?:col(?:umn)?|spalte|colonne|field|channel|kanal)\.?\s*(\d+)\s*[:=.)-]?\s+(.+)$", re.I
+)
+_UNIT_WORD = re.compile(r"\b(?:units?|einheit(?:en)?|unit[ée]s?|eenheid|unidad(?:es)?)\b", re.I)
+_UNIT_TEXT = r"(?:\d[\d.,]*(?:e[-+]?\d+)?(?:\s*/\s*\d+)?\s*|10\s*\^\s*-?\d+\s*)?(?:[a-zμµ]+|''|\")(?:/[a-z\d^²]+)?"
+_IN = re.compile(
+    rf"(?P<what>[^\W\d]\w*)(?:\s+(?:is|are|given|measured|values?|data|coordinates?|sind|stored|written))*\s+in\s+\[?(?P<unit>{_UNIT_TEXT})(?!\w)",
+    re.I,
+)
+_EACH = re.compile(rf"(?P<what>[^\W\d]\w*)\s*[:=]?\s*[\[(]?(?P<unit>{_UNIT_TEXT})[\])]?$", re.I)
+_NUMERIC = r"[-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:e[-+]?\d+)?"
+_NODATA = re.compile(
+    r"\b(?P<what>no[ _-]?data(?:[ _-]?value)?|(?:missing|fill|null|undefined|invalid|dummy)(?:[ _-]?(?:value|wert|code|data|height))?s?"
+    rf"|fehlwerte?)\b\W*?(?:is|are|coded as|as)?\s*[:=]?\s*(?P<value>{_NUMERIC})(?![\w.])",
+    re.I,
+)
+_SCALE = re.compile(
+    rf"\b(?P<what>(?:[\w-]+[ _-])?(?:scale|scaling|scale[ _-]?factor|factor|multiplier|gain|faktor|skalierung))(?:\s*[\[(](?P<in>[^\])]*)[\])])?\s*[:=;\t ]\s*(?P<value>{_NUMERIC})",
+    re.I,
+)
+_STEP = re.compile(
+    r"\b(?:dx|delta[ _-]?x|x[ _-]?(?:step|spacing|increment|interval|resolution)|pitch|point[ _-]?spacing|spacing|"
+    r"(?:sampl\w*|abtast\w*|measur\w*)[ _-]?(?:interval|distance|spacing|step|abstand|pitch|increment)|increment|interval|"
+    r"schrittweite|abtastabstand|step(?:[ _-]?size)?)"
+    rf"(?:\s*[\[(](?P<before>[^\])]*)[\])])?\s*(?:=|:|;|,|\t|is|every)?\s*(?P<value>{_NUMERIC})\s*[\[(]?(?P<after>[a-zμµ'\"]+(?:/\w+)?)?",
+    re.I,
+)
+_MULTIPLIED = re.compile(
+    rf"\b(?:multipl(?:y|ied)|divided?|multipliziert|dividiert)\b(?:\s+\w+){{0,3}}?\s+(?:by|with|mit|durch)\s+(?P<value>{_NUMERIC})"
+    rf"|(?P<count>\b(?:1\s+)?(?:lsb|digits?|counts?|bit|ticks?|increment))\s*[:=]\s*{_NUMERIC}\s*(?P<unit>[^\W\d]+)"
+    rf"|\b(?:values?|heights?|numbers?|data|raw|counts?|[xyz])\s*[*×]\s*(?P<factor>{_NUMERIC})",
+    re.I,
+)
+_UPRIGHT = {"vertical": "z", "longitudinal": "x", "lateral": "y", "transverse": "y"}
+_OF_ALL = re.compile(
+    r"\W*(?:(?:all|the|data|measur\w*|si|coordinates?|values?|grid|table|file|column|numbers?|mess\w*|maß|default|base|its|of|in)"
+    r"[ _-]*)*",
+    re.I,
+)
+_FLAGS = re.compile(
+    r"(?:.*[\W_])?(?:(?:in)?valid\w*|flags?|mask|status|outliers?|dropouts?)(?:[\W_].*)?",
+    re.IGNORECASE,
+)
+
+
+def _without_accents(text: str) -> str:
+    return "".join(
+        one for one in unicodedata.normalize("NFD", text) if not unicodedata.combining(one)
+    )
+
+
+def _metres(word: str) -> float | None:
+    """Metres of a unit of length in lower case; None where it is none."""
+    if word in _LENGTHS:
+        return _LENGTHS[word]
+    match = _METRES.fullmatch(_without_accents(word))
+    if match is None:
+        return None
+    return next((size for size, part in zip(_PREFIXES, match.groups(), strict=True) if part), 1.0)
+
+
+def _plain(text: str) -> str:
+    """A text with µ as the Greek letter, 10⁻⁶ as 10^-6, and tenths and the like as numbers; lower case."""
+    plain = _POWER.sub(lambda match: f"10^{match[1].translate(_RAISED)}", text).replace("µ", "μ")
+    return _PART.sub(lambda match: f"{_PARTS[match[1]]} ", plain.lower())
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit as it is written; `metres` of a length, None of a time or whatever else."""
+
+    text: str
+    metres: float | None
+    time: bool = False
+
+
+def unit_of(text: str) -> Unit | None:
+    """The unit that a text is, also with a factor (0.1 mm, 1/10 mm, 10^-3 m, tenths of mm); None where it is none."""
+    shown = text.strip().strip(".").strip()
+    word = " ".join(_plain(shown).split())
+    if metres := _metres(word):
+        return Unit(shown, metres)
+    if word in _TIMES:
+        return Unit(shown, None, time=True)
+    if word in _OTHERS:
+        return Unit(shown, None)
+    match = _PER.fullmatch(word)
+    metres = _metres(match["word"].strip()) if match else None
+    if match is None or metres is None:
+        return None
+    if match["power"]:
+        times = 10.0 ** int(match["power"])
+    else:
+        times = float(match["number"].replace(",", ".")) / float(match["by"] or 1)
+    # 25 mm is a length, not a unit.
+    if not (times > 0 and abs(np.log10(times) - round(np.log10(times))) < 1e-9):
+        return None
+    return Unit(shown, times * metres)
 
 
 def counts_down(text: str) -> bool:
@@ -205,7 +245,7 @@ def downwards_note(title: str) -> list[str]:
 
 
 def role_of(name: str) -> str:
-    """What a column of that name holds: x, y, z, count, time or other; "" where the name does not tell."""
+    """Role of a column by its name: x, y, z, count, time or other; "" where the name does not tell."""
     plain = name.replace("µ", "μ").strip().strip("\"'*:.").strip().lower()
     if match := _PLACED.fullmatch(plain):
         return next(role for role, part in zip("yzx", match.groups(), strict=True) if part)
@@ -259,9 +299,6 @@ def column_of(title: str, where: str = "") -> Column:
     return Column(shown, role, unit, unclear, said, headed=True, name=name)
 
 
-_WORDS = re.compile(r"[A-ZÀ-Ö]?[a-zß-öø-ÿμ]+|[A-ZÀ-Ö]+")  # of ProfileMM, too
-
-
 def _unit_words(name: str) -> list[str]:
     """Words of a heading that are units of length, where none stands in a unit's place: mm Profile, Profile.mm, ProfileMM."""
     words = _WORDS.findall(name)
@@ -307,7 +344,7 @@ def _without_unit(plain: str) -> tuple[str, list[Unit], list[str]]:
 
 @dataclass(frozen=True)
 class Stated:
-    """What the lines before the numbers state: units by role ("" for all), `missing` values, the distance `pitch` m between
+    """Statements of the lines before the numbers: units by role ("" for all), `missing` values, the distance `pitch` m between
     heights; `unclear`, `unclear_pitch`: a line that states a unit or factor, or a distance, which is not understood; `down`: a
     line by which heights are counted downwards.
     """
@@ -536,12 +573,6 @@ def _are_titles(found: Sequence[Column], line: Line, width: int) -> bool:
     return not line.comment and any(column.title for column in found) and width <= 20
 
 
-_WITHIN = {"in", "and", "is", "are", "the", "und"}
-_NUMBERED = re.compile(
-    r"^\W*(?:col(?:umn)?|spalte|colonne|field|channel|kanal)\.?\s*(\d+)\s*[:=.)-]?\s+(.+)$", re.I
-)
-
-
 def _numbered_titles(before: Sequence[Line], width: int) -> list[Column] | None:
     """Titles in lines such as `Column 1: Distance [mm]`."""
     found = {
@@ -553,40 +584,6 @@ def _numbered_titles(before: Sequence[Line], width: int) -> list[Column] | None:
     if sorted(found) == list(range(least, least + width)):
         return [found[least + k] for k in range(width)]
     return None
-
-
-_UNIT_WORD = re.compile(r"\b(?:units?|einheit(?:en)?|unit[ée]s?|eenheid|unidad(?:es)?)\b", re.I)
-_UNIT_TEXT = r"(?:\d[\d.,]*(?:e[-+]?\d+)?(?:\s*/\s*\d+)?\s*|10\s*\^\s*-?\d+\s*)?(?:[a-zμµ]+|''|\")(?:/[a-z\d^²]+)?"
-_IN = re.compile(
-    rf"(?P<what>[^\W\d]\w*)(?:\s+(?:is|are|given|measured|values?|data|coordinates?|sind|stored|written))*\s+in\s+\[?(?P<unit>{_UNIT_TEXT})(?!\w)",
-    re.I,
-)
-_EACH = re.compile(rf"(?P<what>[^\W\d]\w*)\s*[:=]?\s*[\[(]?(?P<unit>{_UNIT_TEXT})[\])]?$", re.I)
-_NUMERIC = r"[-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:e[-+]?\d+)?"
-_NODATA = re.compile(
-    r"\b(?P<what>no[ _-]?data(?:[ _-]?value)?|(?:missing|fill|null|undefined|invalid|dummy)(?:[ _-]?(?:value|wert|code|data|height))?s?"
-    rf"|fehlwerte?)\b\W*?(?:is|are|coded as|as)?\s*[:=]?\s*(?P<value>{_NUMERIC})(?![\w.])",
-    re.I,
-)
-_SCALE = re.compile(
-    rf"\b(?P<what>(?:[\w-]+[ _-])?(?:scale|scaling|scale[ _-]?factor|factor|multiplier|gain|faktor|skalierung))(?:\s*[\[(](?P<in>[^\])]*)[\])])?\s*[:=;\t ]\s*(?P<value>{_NUMERIC})",
-    re.I,
-)
-_STEP = re.compile(
-    r"\b(?:dx|delta[ _-]?x|x[ _-]?(?:step|spacing|increment|interval|resolution)|pitch|point[ _-]?spacing|spacing|"
-    r"(?:sampl\w*|abtast\w*|measur\w*)[ _-]?(?:interval|distance|spacing|step|abstand|pitch|increment)|increment|interval|"
-    r"schrittweite|abtastabstand|step(?:[ _-]?size)?)"
-    rf"(?:\s*[\[(](?P<before>[^\])]*)[\])])?\s*(?:=|:|;|,|\t|is|every)?\s*(?P<value>{_NUMERIC})\s*[\[(]?(?P<after>[a-zμµ'\"]+(?:/\w+)?)?",
-    re.I,
-)
-
-
-_MULTIPLIED = re.compile(
-    rf"\b(?:multipl(?:y|ied)|divided?|multipliziert|dividiert)\b(?:\s+\w+){{0,3}}?\s+(?:by|with|mit|durch)\s+(?P<value>{_NUMERIC})"
-    rf"|(?P<count>\b(?:1\s+)?(?:lsb|digits?|counts?|bit|ticks?|increment))\s*[:=]\s*{_NUMERIC}\s*(?P<unit>[^\W\d]+)"
-    rf"|\b(?:values?|heights?|numbers?|data|raw|counts?|[xyz])\s*[*×]\s*(?P<factor>{_NUMERIC})",
-    re.I,
-)
 
 
 def _names_columns(line: Line) -> bool:
@@ -606,7 +603,7 @@ def _names_columns(line: Line) -> bool:
 def _stated(
     before: Sequence[Line], columns: Sequence[Column], width: int, used: set[int]
 ) -> Stated:
-    """What lines state that are no headings; `used`: the lines that are."""
+    """Statements of the lines that are no headings; `used`: the lines that are."""
     units: dict[str, tuple[Unit, str]] = {}
     missing: list[float] = []
     pitch: tuple[float, str] | None = None
@@ -705,14 +702,6 @@ def _pairs(text: str) -> list[tuple[str, Unit]]:
             return []  # Length: 1 m
         found.append((_UPRIGHT.get(one.name.lower(), one.role), one.unit))
     return found if all(role in ("x", "y", "z") for role, _ in found) else []
-
-
-_UPRIGHT = {"vertical": "z", "longitudinal": "x", "lateral": "y", "transverse": "y"}
-_OF_ALL = re.compile(
-    r"\W*(?:(?:all|the|data|measur\w*|si|coordinates?|values?|grid|table|file|column|numbers?|mess\w*|maß|default|base|its|of|in)"
-    r"[ _-]*)*",
-    re.I,
-)
 
 
 def mentions_unit(text: str) -> bool:
@@ -927,12 +916,6 @@ def scale_of(
     return Scale(unit.metres, f"{unit.text} ({said})", stated=True)
 
 
-_FLAGS = re.compile(
-    r"(?:.*[\W_])?(?:(?:in)?valid\w*|flags?|mask|status|outliers?|dropouts?)(?:[\W_].*)?",
-    re.IGNORECASE,
-)
-
-
 def check_flags(column: Column, values: Array, source: str) -> None:
     """InputError where a column may say which heights hold: it is called so, and its values are not all the same."""
     if _FLAGS.fullmatch(column.title) and len(np.unique(values[np.isfinite(values)])) > 1:
@@ -943,7 +926,7 @@ def check_flags(column: Column, values: Array, source: str) -> None:
 
 @dataclass(frozen=True)
 class ReadAs:
-    """What was read of a file as what, for the user: quantity, the place it was in, its unit, and its gaps."""
+    """A quantity read from a file, for the user: its name, the place it was in, its unit, and its gaps."""
 
     quantity: str
     place: str

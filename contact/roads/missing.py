@@ -52,7 +52,7 @@ _CODES = _usual_codes()
 
 
 def special(values: Array | np.float64) -> NDArray[np.bool_]:
-    """Which of some numbers (any shape) programs use for "none"."""
+    """Mask of the numbers (any shape) that programs write for "no value"."""
     return np.isin(values, _CODES) | (np.abs(values) >= _LARGE)
 
 

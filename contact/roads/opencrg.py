@@ -38,6 +38,32 @@ Blocks = dict[str, list[tuple[int, str]]]
 MAX_HEADER = 1_000_000
 MAX_BYTES = 1_000_000_000_000  # larger: an error, not a road
 
+Array = NDArray[np.float64]
+RECORD = 80
+BLOCK = 4096  # rows of text read at a time
+Channel = tuple[int, str, str]  # line in the file, name, unit
+SMALLEST_RADIUS = 20.0
+# Larger steps (m) are damage, and would overflow later.
+LONGEST_STEP = 1e6
+FORMATS = ("KRBI", "KDBI", "LRFI", "LDFI")
+# Options for searching, checking and logging, which do not affect heights.
+HARMLESS_OPTIONS = ("REFLINE_SEARCH_", "WARN_", "LOG_", "CHECK_")
+# Options that act beyond the ends and sides of what was measured, where no tire rolls, or where
+# heights are missing, which `holes` treats; and a height of the whole road, which is levelled.
+BEYOND = (
+    "REFLINE_CONTINUATION", "BORDER_MODE_", "BORDER_OFFSET_", "BORDER_SMOOTH_", "GRID_NAN_MODE",
+    "GRID_NAN_OFFSET", "REFPOINT_Z",
+)  # fmt: skip
+# Modifiers that only move the road within its plane.
+HARMLESS_MODIFIERS = (
+    "REFPOINT_U", "REFPOINT_V", "REFPOINT_X", "REFPOINT_Y", "REFPOINT_PHI",
+    "REFLINE_ROTCENTER_", "REFLINE_OFFSET_X", "REFLINE_OFFSET_Y", "REFLINE_OFFSET_PHI",
+)  # fmt: skip
+DEEPEST = 8  # files that refer to a file
+SCALES = "SCALE_Z_GRID", "SCALE_LENGTH", "SCALE_WIDTH"
+# Without effect, as slope and banking have to be none.
+OF_THE_LINE = "SCALE_SLOPE", "SCALE_BANKING"
+
 
 def read_header(file: Path) -> tuple[Blocks, int, int]:
     """Named blocks of (line number, text) without comments; byte and line where the data begin.
@@ -82,12 +108,6 @@ def key_values(file: Path, lines: list[tuple[int, str]]) -> dict[str, float]:
         if not np.isfinite(pairs[key.strip().upper()]):
             raise InputError(f"{file}, line {number}: {text!r} is not finite")
     return pairs
-
-
-Array = NDArray[np.float64]
-
-RECORD = 80
-BLOCK = 4096  # rows of text read at a time
 
 
 class Payload(NamedTuple):
@@ -240,27 +260,6 @@ def _is_number(field: bytes) -> bool:
     return True
 
 
-Channel = tuple[int, str, str]  # line in the file, name, unit
-
-SMALLEST_RADIUS = 20.0
-# Larger steps (m) are damage, and would overflow later.
-LONGEST_STEP = 1e6
-FORMATS = ("KRBI", "KDBI", "LRFI", "LDFI")
-# Options for searching, checking and logging, which do not affect heights.
-HARMLESS_OPTIONS = ("REFLINE_SEARCH_", "WARN_", "LOG_", "CHECK_")
-# Options that act beyond the ends and sides of what was measured, where no tire rolls, or where
-# heights are missing, which `holes` treats; and a height of the whole road, which is levelled.
-BEYOND = (
-    "REFLINE_CONTINUATION", "BORDER_MODE_", "BORDER_OFFSET_", "BORDER_SMOOTH_", "GRID_NAN_MODE",
-    "GRID_NAN_OFFSET", "REFPOINT_Z",
-)  # fmt: skip
-# Modifiers that only move the road within its plane.
-HARMLESS_MODIFIERS = (
-    "REFPOINT_U", "REFPOINT_V", "REFPOINT_X", "REFPOINT_Y", "REFPOINT_PHI",
-    "REFLINE_ROTCENTER_", "REFLINE_OFFSET_X", "REFLINE_OFFSET_Y", "REFLINE_OFFSET_PHI",
-)  # fmt: skip
-
-
 def read_opencrg(
     file: Path | str,
     holes: str = "refuse",
@@ -344,9 +343,6 @@ def _target(file: Path, name: str) -> Path:
     return file.parent / name.strip("'\"").replace("\\", "/")
 
 
-DEEPEST = 8  # files that refer to a file
-
-
 def _followed(file: Path) -> tuple[Path, Blocks, int, int, list[str]]:
     """The file that holds the road, its header with the blocks of those that refer to it, where its data begin, and notes.
 
@@ -396,11 +392,6 @@ def _merged(file: Path, blocks: Blocks, over: Blocks) -> Blocks:
         if name in blocks or name in over:
             merged[name] = [*blocks.get(name, []), *over.get(name, [])]
     return merged
-
-
-SCALES = "SCALE_Z_GRID", "SCALE_LENGTH", "SCALE_WIDTH"
-# Without effect, as slope and banking have to be none.
-OF_THE_LINE = "SCALE_SLOPE", "SCALE_BANKING"
 
 
 def _scales(file: Path, blocks: Blocks) -> dict[str, float]:

@@ -50,6 +50,10 @@ _SAME = 0.02  # of a distance between heights that is stated twice
 _SAMPLE = 400  # lines that tell how x is rounded
 HEIGHTS, LENGTHS = "mm", "mm"  # assumed where neither file nor scene says
 
+# m: standard deviation of the relief of roads within a short piece; less than FLAT is an even plate.
+FLAT, SMOOTHEST, ROUGHEST = 1e-8, 3e-6, 0.02
+_WITHIN = 64  # pieces of a profile that are looked at
+
 
 @dataclass(frozen=True)
 class Profile:
@@ -73,7 +77,7 @@ class Profile:
 
 @dataclass(frozen=True)
 class Given:
-    """What a scene says of the file: units, values that mean "no height" (None: to be looked for), distance of heights m."""
+    """Keys of a scene that describe the file: units, values that mean "no height" (None: to be looked for), distance of heights m."""
 
     length_unit: str | None = None
     height_unit: str | None = None
@@ -397,11 +401,6 @@ def _ascending(
         x, z, lines = x[keep], z[keep], lines[keep]
         notes.append(f"{int(same.sum())} lines are there twice: taken once")
     return x, z, lines, notes
-
-
-# m: standard deviation of the relief of roads within a short piece; less than FLAT is an even plate.
-FLAT, SMOOTHEST, ROUGHEST = 1e-8, 3e-6, 0.02
-_WITHIN = 64  # pieces of a profile that are looked at
 
 
 def check_relief(profile: Array, unit: str, source: str) -> None:

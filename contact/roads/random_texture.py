@@ -15,6 +15,24 @@ from tireroad.fem.errors import InputError
 Array = NDArray[np.float64]
 THIRD = 10.0**0.1  # ratio of two third octaves (IEC 61260, base ten)
 
+PER_WAVE = 4  # points of a tile per shortest wave
+WAVES = (16, 6)  # longest waves in a tile, along and across
+WIDEST = 0.6  # m, smallest width of a tile, which repeats across; no tire is wider
+MOST_PLACES = 16_000_000  # points of a tile: 128 MB
+# Fewest blended halves in memory, and points up to which more are kept (64 MB): a run passes over its road several
+# times, to level it, for its bounds and in the loop, and drawing it takes as long as the rest of the road under the points.
+KEPT = 3, 8_000_000
+# Longest over shortest wave of one field of tiles. The tiles of long waves can be coarse; the
+# number of points of a single field for all waves would grow with the fourth power of their ratio.
+_RATIO = 8.0
+MOST_SKEW = 1.5
+_NEIGHBOURS = 11
+# Flanks of stones are that steep at most, times the pitch (as the limit of ISO 13473-1 for spikes).
+STEEP = 3.0
+_NOISE = 50e-6  # m
+MOST_LOST = 0.1  # share of a profile that may be bridged
+_LONGEST = 4  # longest waves of the surface that fit into the profile; twice the width fits one
+
 
 def bands(shortest: float, longest: float) -> Array:
     """Edges (k + 1,) 1/m, ascending, of bands that fill the waves from `shortest` to `longest` (m).
@@ -66,15 +84,6 @@ def filter_of(edges: Array, density: Array, wave: Array) -> Array:
     band = np.searchsorted(edges, wave, side="right") - 1
     inside = (band >= 0) & (band < len(density))
     return np.where(inside, np.sqrt(density[np.clip(band, 0, len(density) - 1)]), 0.0)
-
-
-PER_WAVE = 4  # points of a tile per shortest wave
-WAVES = (16, 6)  # longest waves in a tile, along and across
-WIDEST = 0.6  # m, smallest width of a tile, which repeats across; no tire is wider
-MOST_PLACES = 16_000_000  # points of a tile: 128 MB
-# Fewest blended halves in memory, and points up to which more are kept (64 MB): a run passes over its road several
-# times, to level it, for its bounds and in the loop, and drawing it takes as long as the rest of the road under the points.
-KEPT = 3, 8_000_000
 
 
 def tile_size(longest: float) -> tuple[float, float]:
@@ -248,12 +257,6 @@ class Tiles:
         return self
 
 
-# Longest over shortest wave of one field of tiles. The tiles of long waves can be coarse; the
-# number of points of a single field for all waves would grow with the fourth power of their ratio.
-_RATIO = 8.0
-MOST_SKEW = 1.5
-
-
 class Skewed:
     """z = rms (h + b (h^2 - 1)) / sqrt(1 + 2 b^2) of a Gaussian h of variance 1.
 
@@ -378,13 +381,6 @@ def band_power(wavelength: Sequence[float], level: Sequence[float], edges: Array
     return 1e-12 * 10 ** (of / 10) * width
 
 
-_NEIGHBOURS = 11
-# Flanks of stones are that steep at most, times the pitch (as the limit of ISO 13473-1 for spikes).
-STEEP = 3.0
-_NOISE = 50e-6  # m
-MOST_LOST = 0.1  # share of a profile that may be bridged
-
-
 @dataclass(frozen=True)
 class Cleaned:
     """`profile` (n,) m without holes; counts of `missing` and `outliers`; `longest` gap, m."""
@@ -459,9 +455,6 @@ def _longest_run(lost: NDArray[np.bool_]) -> tuple[int, int]:
         return 0, 0
     which = int(np.argmax(end - begin))
     return int(end[which] - begin[which]), int(begin[which])
-
-
-_LONGEST = 4  # longest waves of the surface that fit into the profile; twice the width fits one
 
 
 def widened(profile: Array, pitch: float, width: float, seed: int) -> tuple[Array, Array]:

@@ -27,6 +27,14 @@ MISSING = re.compile(
 )
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?")
 
+COMMENTS = ("#", "%", "//", "!")
+HEAD_LINES, HEAD_CHARACTERS = 2000, 4_000_000
+_SAMPLE = 400  # lines by which the form is found
+_TYPED = {ord("\x1a"): None, ord("\ufeff"): None, ord("−"): "-", 0xA0: " ", 0x202F: " "}
+MAX_LINE = 16_000_000  # characters of a line: about a million heights across the road
+_COUNTED = 64  # lines of a block: where trailing zeros are dropped, one in ten has fewer decimals
+_INTEGER_OR_FIXED = re.compile(r"[+-]?\d*(?:[.,](\d*))?$")
+
 
 @dataclass(frozen=True)
 class Form:
@@ -80,9 +88,6 @@ _FORMS = (
     Form(";", False), Form(";", True), Form("\t", False), Form("\t", True), Form("|", False), Form("|", True),
     Form(",", False), Form(",", True), Form("", False), Form("", True),
 )  # fmt: skip
-COMMENTS = ("#", "%", "//", "!")
-HEAD_LINES, HEAD_CHARACTERS = 2000, 4_000_000
-_SAMPLE = 400  # lines by which the form is found
 
 
 @dataclass(frozen=True)
@@ -146,10 +151,6 @@ def _utf8(file: IO[bytes], head: bytes, source: str) -> str:
             return "cp1252"
         done += len(piece)
     return "utf-8"
-
-
-_TYPED = {ord("\x1a"): None, ord("\ufeff"): None, ord("−"): "-", 0xA0: " ", 0x202F: " "}
-MAX_LINE = 16_000_000  # characters of a line: about a million heights across the road
 
 
 def lines_of(stream: TextIO, source: str) -> Iterator[Line]:
@@ -286,10 +287,6 @@ def numbers_of(lines: Sequence[Line], form: Form, width: int, source: str) -> ND
             )
         table[k, : len(row)] = row
     return table
-
-
-_COUNTED = 64  # lines of a block: where trailing zeros are dropped, one in ten has fewer decimals
-_INTEGER_OR_FIXED = re.compile(r"[+-]?\d*(?:[.,](\d*))?$")
 
 
 @dataclass

@@ -21,6 +21,30 @@ from numpy.typing import NDArray
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Parameters, choice, number
 
+Array = NDArray[np.float64]
+BASE = 0.1  # m, of a piece
+SAMPLING = 5e-4  # m, between the samples from which the mean profile depth is taken
+CUT_OFF = (
+    2.4e-3  # m, of its low-pass filter, which runs there and back: half is left of 3 mm in power
+)
+REFERENCE = 1e-6  # m
+_CYCLES = 5  # waves in a piece at a band's centre, at least
+_SEAM = 0.1  # of the length, and at most this many metres, are blended
+_LONGEST = 0.2
+# The profile of the strip is sampled at no more than this many points.
+MOST_POINTS = 1_000_000
+PIECE = 20_000  # points evaluated at once
+# The Gaussian profile filter of ISO 16610-21 passes half of a wave of the cut-off length; its
+# weight exp(-pi (x / (alpha lambda))^2) has the standard deviation alpha lambda / sqrt(2 pi).
+DEVIATION = np.sqrt(np.log(2) / np.pi) / np.sqrt(2 * np.pi)
+NOTHING = 1e-9  # m: relief below is rounding
+# Smallest number of pieces that a strip is divided into for its bounds: the level varies slowly
+# over one.
+PIECES = 64
+LONGEST = 0.25  # m, longest piece
+# The reported texture: longest and shortest profile (m), most points, largest spacing (m).
+_SEEN, _LEAST_SEEN, _MOST_SEEN, _COARSEST = 20.0, 0.1, 100_000, 1e-3
+
 
 @dataclass(frozen=True, kw_only=True)
 class Placement(Parameters):
@@ -76,7 +100,7 @@ def begun_at(road: object, start: float | None) -> float:
 
 
 def moved_start(first: float) -> str:
-    """What is said of a run that begins at the first x (m) of its file by default."""
+    """Message on a run that begins at the first x (m) of its file by default."""
     return (
         f"the axle starts at x = {shown(first)} m, the first of the file, which does not contain 0; "
         "road.start sets another x"
@@ -86,16 +110,6 @@ def moved_start(first: float) -> str:
 def shown(x: float) -> str:
     """A position along the road (m) to the millimetre, as messages show it."""
     return f"{round(float(x), 3) + 0.0:.12g}"
-
-
-Array = NDArray[np.float64]
-BASE = 0.1  # m, of a piece
-SAMPLING = 5e-4  # m, between the samples from which the mean profile depth is taken
-CUT_OFF = (
-    2.4e-3  # m, of its low-pass filter, which runs there and back: half is left of 3 mm in power
-)
-REFERENCE = 1e-6  # m
-_CYCLES = 5  # waves in a piece at a band's centre, at least
 
 
 @dataclass(frozen=True)
@@ -186,10 +200,6 @@ def _without_short(profile: Array, pitch: float) -> Array:
     return sosfiltfilt(butter(2, 2 * pitch / CUT_OFF, output="sos"), profile)
 
 
-_SEAM = 0.1  # of the length, and at most this many metres, are blended
-_LONGEST = 0.2
-
-
 class Repeated:
     """h(x mod L) of a road h, whose last part b blends into the mirror image of its beginning:
 
@@ -246,14 +256,6 @@ class Repeated:
     def prepare(self, x0: float, x1: float, y0: float, y1: float) -> Repeated:
         """The repeated road, with one period prepared. InputError if the road is shorter."""
         return Repeated(self._road.prepare(*self._period, y0, y1), self._length)
-
-
-# The profile of the strip is sampled at no more than this many points.
-MOST_POINTS = 1_000_000
-PIECE = 20_000  # points evaluated at once
-# The Gaussian profile filter of ISO 16610-21 passes half of a wave of the cut-off length; its
-# weight exp(-pi (x / (alpha lambda))^2) has the standard deviation alpha lambda / sqrt(2 pi).
-DEVIATION = np.sqrt(np.log(2) / np.pi) / np.sqrt(2 * np.pi)
 
 
 class Level:
@@ -357,15 +359,6 @@ def make_motion(
     if kind == "sine":
         return lambda t: amplitude * math.sin(2.0 * math.pi * frequency * t)
     return lambda t: 0.0
-
-
-NOTHING = 1e-9  # m: relief below is rounding
-# Smallest number of pieces that a strip is divided into for its bounds: the level varies slowly
-# over one.
-PIECES = 64
-LONGEST = 0.25  # m, longest piece
-# The reported texture: longest and shortest profile (m), most points, largest spacing (m).
-_SEEN, _LEAST_SEEN, _MOST_SEEN, _COARSEST = 20.0, 0.1, 100_000, 1e-3
 
 
 class Bounded(Protocol):

@@ -31,6 +31,15 @@ _C, _FFI = COMPILED.lib, COMPILED.ffi
 # both 0 would enter and leave for ever.
 ROUNDING = 1e-12
 
+# Number of steps over which the frequency of touching is averaged.
+MEMORY = 200
+# Share of the time below which a point is dropped; one that always touched goes after 1400 steps.
+SELDOM = 1e-3
+# Operations of a new pivot, over c^3 of the c points taken: product, inverse, check, copies.
+PRICE = 6.0
+# Points are added in portions, a share of those taken but at least so many: each needs a new pivot.
+PORTION, FEWEST_CANDIDATES = 0.05, 8
+
 
 class ActiveSet:
     """Semismooth Newton (primal-dual active set), safeguarded as block principal pivoting.
@@ -242,16 +251,6 @@ def _pivoted(whole: Array, b: int) -> Array:
     out[b:, :b] = whole[b:, :b] @ inverse
     out[b:, b:] = whole[b:, b:] + whole[b:, :b] @ out[:b, b:]
     return out
-
-
-# Number of steps over which the frequency of touching is averaged.
-MEMORY = 200
-# Share of the time below which a point is dropped; one that always touched goes after 1400 steps.
-SELDOM = 1e-3
-# Operations of a new pivot, over c^3 of the c points taken: product, inverse, check, copies.
-PRICE = 6.0
-# Points are added in portions, a share of those taken but at least so many: each needs a new pivot.
-PORTION, FEWEST_CANDIDATES = 0.05, 8
 
 
 class UsualSet:

@@ -23,6 +23,14 @@ from tireroad.fem.errors import ConvergenceError
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
+Mask = NDArray[np.bool_]
+TARGET = 1e-10  # a tenth of the tolerance, since the residual is evaluated again for the record
+MAX_ITERATIONS = 1000
+# Rows and columns of points around those that touch, among which a step looks for others: a footprint is half of
+# the points within reach of the road.
+_AROUND = 3
+_EMPTY: Box = (2**31, 0, 2**31, 0)
+
 
 class Compliance(Protocol):
     """The operations on A (c, c) m/N that the solvers need.
@@ -98,18 +106,6 @@ class MatrixCompliance:
     def precondition(self, approach: Array) -> Array:
         """Forces (c,) N for a displacement (c,) m, point by point."""
         return approach / self.diagonal
-
-
-Mask = NDArray[np.bool_]
-
-TARGET = 1e-10  # a tenth of the tolerance, since the residual is evaluated again for the record
-MAX_ITERATIONS = 1000
-# Rows and columns of points around those that touch, among which a step looks for others: a footprint is half of
-# the points within reach of the road.
-_AROUND = 3
-
-
-_EMPTY: Box = (2**31, 0, 2**31, 0)
 
 
 def _widened(cells: Index, points: Mask, first: int, last: int) -> tuple[int, int]:

@@ -21,6 +21,10 @@ from tireroad.fem.errors import ConvergenceError
 
 Array = NDArray[np.float64]
 
+Mask = NDArray[np.bool_]
+PREFIX = "contact_"
+MAX_ITERATIONS = 200
+
 
 class Product:
     """A over `unit` between some points, or D_b A + D_a after scaling by the semismooth solver."""
@@ -89,12 +93,6 @@ class Preconditioner:
     def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """y: approximately the inverse of the operator times x."""
         y.array[:] = pc.getOperators()[0].getPythonContext().roughly_inverse(x.array_r)
-
-
-Mask = NDArray[np.bool_]
-
-PREFIX = "contact_"
-MAX_ITERATIONS = 200
 
 
 class SnesVI:

@@ -412,7 +412,7 @@ class BrushFriction:
         return _FFI.new("normal_contact *", {"another": solver}), solver
 
     def unsolved(self) -> ConvergenceError:
-        """What ends a run whose forces do not converge."""
+        """ConvergenceError of a step whose forces do not converge."""
         unbounded = self._brush.law.friction is None
         cure = (
             "give contact.friction, which bounds them, or a smaller brush stiffness or time.step"

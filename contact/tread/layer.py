@@ -24,6 +24,8 @@ PER_THICKNESS = 40  # entries of the table per thickness of distance
 GAUSS_POINTS = 16
 STIFFEST = 1e-4  # of the half-space's; below, a point's own compliance is lost in cancellation
 
+_FIRST = 1e-4  # thicknesses: the table begins near 0, where J1/rho and J2/rho^2 are limits
+
 
 def transform_ratio(m: Array, poisson_ratio: float) -> Array:
     """Compliance of the bonded layer over that of the half-space, at m = wave number x thickness.
@@ -95,9 +97,6 @@ class LayerInfluence:
             cosh = np.cosh(top * (node + 1.0))
             total += weight * (self._bounded(np.minimum(x * cosh, REACH)) / cosh - x)
         return np.where(x > 0.0, top * total, 0.0)
-
-
-_FIRST = 1e-4  # thicknesses: the table begins near 0, where J1/rho and J2/rho^2 are limits
 
 
 def transforms(m: Array, poisson_ratio: float) -> tuple[Array, Array, Array]:

@@ -66,6 +66,40 @@ from tireroad.runs.stages.training import TrainedMotion
 
 _WHOLE = 0.9  # share of the wall from which a compound counts as all of it
 
+STATIC_TO_GREENS: tuple[type[PipelinePart], ...] = (
+    Motions,
+    Setup,
+    ModesStage,
+    AirColumn,
+    Fields,
+    FullMatrices,
+    RotatingStage,
+    GreensStage,
+)
+COARSER = "coarser"  # folder, in the run's own, of the coarser companion's stages
+LEAST = (8, 4)  # fewest elements around and along of a companion's mesh
+SHARE = 0.5  # of the run's own cost: budget of all companion runs together
+# Of the run's loop: no more of them. On two processes one repeats loops while the other computes the run's own, then both: they
+# end half a loop's time after it.
+LOOPS = 1.75
+_FEWEST, _PERIODS = 64, 2  # least steps after the run-in, and periods of `up_to`, to repeat
+# Cost of five companion runs in time loops per repeated step, by the spacing of that of the points.
+_LOOPS = {2.0: 3.5, 0.5: 6.0}
+_COARSE = 0.14  # cost on elements of twice the size, as a share of the run's cost before the loop
+# Cost of a step per touching point, from `MOST` of them on: conjugate gradients (radial tire on
+# cobblestones, 1,840 points: 84 ms).
+_TOUCHING = 5e-5
+FEWER = 1 / np.sqrt(2)  # share of the highest mode up to which the companion keeps states
+# Loops of each cause, about: twice as many points take longer than all others.
+_LONGEST_FIRST = {"points": 8.0, "mesh": 2.0, "modes": 1.0, "step": 0.5}
+_AHEAD = (
+    "points",
+    "step",
+    "modes",
+)  # that need no other process: elements of twice the size take all
+FORCES = ("contact_force", "axle_force")
+_UNITS = {"mean": "N", "deviation": "N", "level": "dB", "history": "-"}
+
 
 class Backing(NamedTuple):
     """Replacements for the run's own contact, setup (not settled) and response."""
@@ -256,20 +290,6 @@ def equilibrated(
     return setup.equilibrated(response, force, job.scene.contact)[0]
 
 
-STATIC_TO_GREENS: tuple[type[PipelinePart], ...] = (
-    Motions,
-    Setup,
-    ModesStage,
-    AirColumn,
-    Fields,
-    FullMatrices,
-    RotatingStage,
-    GreensStage,
-)
-COARSER = "coarser"  # folder, in the run's own, of the coarser companion's stages
-LEAST = (8, 4)  # fewest elements around and along of a companion's mesh
-
-
 @dataclass(frozen=True, kw_only=True)
 class CoarserStatic(StaticStage):
     """The static state on the coarser mesh, reached in a few steps from that of the `run`.
@@ -352,19 +372,6 @@ def _made(
     return part.result() if part else None
 
 
-SHARE = 0.5  # of the run's own cost: budget of all companion runs together
-# Of the run's loop: no more of them. On two processes one repeats loops while the other computes the run's own, then both: they
-# end half a loop's time after it.
-LOOPS = 1.75
-_FEWEST, _PERIODS = 64, 2  # least steps after the run-in, and periods of `up_to`, to repeat
-# Cost of five companion runs in time loops per repeated step, by the spacing of that of the points.
-_LOOPS = {2.0: 3.5, 0.5: 6.0}
-_COARSE = 0.14  # cost on elements of twice the size, as a share of the run's cost before the loop
-# Cost of a step per touching point, from `MOST` of them on: conjugate gradients (radial tire on
-# cobblestones, 1,840 points: 84 ms).
-_TOUCHING = 5e-5
-
-
 def least_steps(step: float, up_to: float) -> int:
     """Fewest steps of `step` s after the run-in, for histories compared up to `up_to` Hz."""
     return max(_FEWEST, int(np.ceil(_PERIODS / (up_to * step))))
@@ -383,7 +390,7 @@ class Budget:
 
     @classmethod
     def of(cls, scene: Scene, steps: int) -> Budget:
-        """Of a scene that takes so many steps."""
+        """The budget of a scene that takes so many steps."""
         work = estimate(scene).work
         loop = work["contact loop"]
         return cls(sum(work.values()) - loop, loop / steps, steps)
@@ -409,9 +416,6 @@ class Budget:
         count = round((self._whole - _COARSE * self.before) / each)
         count = int(np.clip(count, min(least, self.steps), self.steps))
         return count - count % 2
-
-
-FEWER = 1 / np.sqrt(2)  # share of the highest mode up to which the companion keeps states
 
 
 def longer_step(given: Given) -> ContactForces:
@@ -501,15 +505,6 @@ COMPANIONS: dict[str, Callable[[Given], ContactForces]] = {
 """By the cause of the error that each estimates (contact.results.error_bars.CAUSES)."""
 
 
-# Loops of each cause, about: twice as many points take longer than all others.
-_LONGEST_FIRST = {"points": 8.0, "mesh": 2.0, "modes": 1.0, "step": 0.5}
-_AHEAD = (
-    "points",
-    "step",
-    "modes",
-)  # that need no other process: elements of twice the size take all
-
-
 def _dealt(causes: Iterable[str], count: int) -> list[list[str]]:
     """Causes, the longest first, for each of `count` processes: the next for the one with the least to do."""
     hands: list[list[str]] = [[] for _ in range(count)]
@@ -592,7 +587,7 @@ def _attempted(record: Record, part: str, run: Callable[[], Any]) -> Any:
 
 
 class Window(NamedTuple):
-    """What companions repeat (`given`), from which step on they are compared, and to which `limit` and `up_to` (Hz)."""
+    """Part of a run that companions repeat (`given`): its first compared step, and the `limit` and `up_to` (Hz) of the comparison."""
 
     given: Given
     start: int
@@ -601,7 +596,7 @@ class Window(NamedTuple):
 
 
 class Ahead(NamedTuple):
-    """What a process `found` beside the loop, by cause, of what was `given`, and the seconds it took."""
+    """Forces that a process computed beside the loop, by cause (`found`), their inputs (`given`), and the seconds taken."""
 
     given: Given
     found: dict[str, Told]
@@ -628,10 +623,6 @@ def all_limits(setup: ContactSetup, rolling: RollingModes, step: float) -> tuple
 def model_limit(setup: ContactSetup, rolling: RollingModes, step: float) -> Limit:
     """The lowest of the limits."""
     return lowest(all_limits(setup, rolling, step))
-
-
-FORCES = ("contact_force", "axle_force")
-_UNITS = {"mean": "N", "deviation": "N", "level": "dB", "history": "-"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -726,7 +717,7 @@ class AccuracyStage(Computed[Accuracy]):
         return product
 
     def _window(self) -> Window | None:
-        """What companions repeat; None of a run too short for any. The same on every process."""
+        """The window that companions repeat; None for a run too short for any. The same on every process."""
         history, setup = self.contact.product, self.setup.product
         start = first_step(setup, self.job.scene.road, history.time)
         start += start % 2  # even: where a step of the companion with twice the step begins

@@ -81,6 +81,16 @@ _ASTRAY = 1e-3  # of the steps
 # Share of the static deflection: motion of the contact up to which a linear tire is trusted.
 LINEAR = 1 / 3
 
+# Share of the energy exchanged, beyond which the steps are too long or something is wrong.
+# Measured: 0.012 at most where forces were right to 1 % up to 300 Hz, 0.024 where they were off by
+# 35 %.
+_UNBALANCED = 0.02
+_TAKEN = 0.1  # share of the energy exchanged that the forces of a scheme may dissipate
+_LEAST = 1e-9  # J: below is rounding
+# Share of the energy of the static contact (load times deflection), below which no error matters:
+# a run on a road of 1 um moved 1e-7 of it.
+_SLIGHT = 1e-6
+
 
 def describe(
     record: Record, counted: Totals, factorisations: int, chosen: Integration, taken: int
@@ -230,17 +240,6 @@ class Watch:
         if due:
             self._last = time.monotonic()
         return asked, due
-
-
-# Share of the energy exchanged, beyond which the steps are too long or something is wrong.
-# Measured: 0.012 at most where forces were right to 1 % up to 300 Hz, 0.024 where they were off by
-# 35 %.
-_UNBALANCED = 0.02
-_TAKEN = 0.1  # share of the energy exchanged that the forces of a scheme may dissipate
-_LEAST = 1e-9  # J: below is rounding
-# Share of the energy of the static contact (load times deflection), below which no error matters:
-# a run on a road of 1 um moved 1e-7 of it.
-_SLIGHT = 1e-6
 
 
 @dataclass(frozen=True)

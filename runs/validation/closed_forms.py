@@ -30,6 +30,10 @@ from tireroad.runs.validation.tables import Table
 FLAT = 1e6  # m, radius of the section circle: the part of the torus in use is a cylinder
 COMM = MPI.COMM_SELF
 
+GOLDEN = 653.0, 63.3, 6.0, 0.15  # k_t, k_s 1/s2, c 1/s, m_u for a body of 1 kg
+PUBLISHED = -2.590 + 7.323j, -20.410 + 64.423j  # 1/s
+ABOUT = "tube, rings, oscillator, Hertz, punch, friction, creep of rolling, static friction, brush, creeping rubber, pattern and golden car against closed forms"
+
 
 def tire_rows() -> Iterator[tuple]:
     """All cases."""
@@ -172,10 +176,6 @@ def _oscillator() -> Iterator[tuple]:
             yield f"oscillator of appendix D after {k} steps of 0.7 s", "m", found, float(closed)
 
 
-GOLDEN = 653.0, 63.3, 6.0, 0.15  # k_t, k_s 1/s2, c 1/s, m_u for a body of 1 kg
-PUBLISHED = -2.590 + 7.323j, -20.410 + 64.423j  # 1/s
-
-
 def golden_car_rows() -> Iterator[tuple]:
     """Real and imaginary parts of both poles, against the polynomial of the car."""
     for number, (found, exact) in enumerate(zip(poles(), exact_poles(), strict=True), 1):
@@ -236,9 +236,6 @@ def exact_poles() -> list[complex]:
     both = np.polymul([m_u, c, k_s + k_t], [1.0, c, k_s])
     roots = np.roots(np.polysub(both, np.polymul(spring, spring)))
     return [complex(roots[np.abs(roots - near).argmin()]) for near in PUBLISHED]
-
-
-ABOUT = "tube, rings, oscillator, Hertz, punch, friction, creep of rolling, static friction, brush, creeping rubber, pattern and golden car against closed forms"
 
 
 def run() -> list[Table]:

@@ -51,6 +51,30 @@ YOUNG, POISSON = 3.4e6, 0.49
 MODULUS = exact.contact_modulus(YOUNG, POISSON)
 FRICTION, LOAD, HALF = 0.4, 1000.0, 0.02  # of the rolling cylinder and the brush: -, N, m
 
+# C11, C22, C23 of a circle by Poisson's ratio: Kalker, Three-Dimensional Elastic Bodies in Rolling
+# Contact, table E.3.
+KALKER = {0.25: (4.12, 3.67, 1.47), 0.5: (5.20, 3.98, 1.63)}
+CELLS = (6, 12, 24)
+CREEP, SHEAR_FRICTION = 1e-3, 0.5
+Array = NDArray[np.float64]
+SETTLED = 1e-5  # relative change of the force in a step
+SHEAR, NU, RADIUS, CREEP_LOAD, CREEP_SPEED = 1143e6, 0.4, 0.05, 600e3, 1.0
+POINTS, DX, DY = 99, 0.16e-3, 1.0
+PUBLISHED = {1e-9: 60.32, 0.009: 78.74, 0.045: 84.72, 2.0: 85.31}  # MPa at relaxation times, s
+# One body against a rigid one deforms like two with twice its modulus.
+INFLUENCE = partial(half_space_influence, youngs_modulus=(1 + NU) * SHEAR, poisson_ratio=NU)
+BED, SPEED, STEP, PITCHES = 2e8, 20.0, 1e-4, 40
+AROUND = 2.0  # m
+WIDTH, GROOVED_LOAD, TIMES = (
+    0.012,
+    500.0,
+    10,
+)  # m: width of a groove; N; number of pitches that pass
+FLAT = 1e3  # m, radius of the section circle
+_GROWTH = 1.5
+E = TypeVar("E", bound=Equilibrium)
+STATIC_FRICTION, STATIC_HALF = 0.3, 0.015  # -; m, half the length of the contact
+
 
 def normal_rows() -> Iterator[tuple]:
     """All cases."""
@@ -217,15 +241,6 @@ def _steady(x, normal, slip: float, stiffness: float, compliance) -> float:
     return float(horizontal[:, 0].sum())
 
 
-# C11, C22, C23 of a circle by Poisson's ratio: Kalker, Three-Dimensional Elastic Bodies in Rolling
-# Contact, table E.3.
-KALKER = {0.25: (4.12, 3.67, 1.47), 0.5: (5.20, 3.98, 1.63)}
-CELLS = (6, 12, 24)
-CREEP, SHEAR_FRICTION = 1e-3, 0.5
-Array = NDArray[np.float64]
-SETTLED = 1e-5  # relative change of the force in a step
-
-
 def shear_rows() -> Iterator[tuple]:
     """All cases.
 
@@ -346,13 +361,6 @@ def _rolled(disc: Disc, nu: float, slip) -> np.ndarray:
     return last
 
 
-SHEAR, NU, RADIUS, CREEP_LOAD, CREEP_SPEED = 1143e6, 0.4, 0.05, 600e3, 1.0
-POINTS, DX, DY = 99, 0.16e-3, 1.0
-PUBLISHED = {1e-9: 60.32, 0.009: 78.74, 0.045: 84.72, 2.0: 85.31}  # MPa at relaxation times, s
-# One body against a rigid one deforms like two with twice its modulus.
-INFLUENCE = partial(half_space_influence, youngs_modulus=(1 + NU) * SHEAR, poisson_ratio=NU)
-
-
 def creep_rows() -> Iterator[tuple]:
     """The largest pressure at each relaxation time.
 
@@ -404,15 +412,6 @@ def rolled_strip(time: float) -> np.ndarray:
     """Pressures (MPa) of the rolling cylinder with one relaxation `time` (s), modulus halved."""
     patch, creep = cylinder(), (np.array([1.0]), np.array([time]))
     return pressed(ActiveSet(matrix(patch) @ steady(creep, patch, CREEP_SPEED)), patch.gap)
-
-
-BED, SPEED, STEP, PITCHES = 2e8, 20.0, 1e-4, 40
-AROUND = 2.0  # m
-WIDTH, GROOVED_LOAD, TIMES = (
-    0.012,
-    500.0,
-    10,
-)  # m: width of a groove; N; number of pitches that pass
 
 
 class Rigid:
@@ -499,11 +498,6 @@ def rolled(pattern: Pattern | None, steps: int) -> tuple[np.ndarray, Patch]:
         setup = replace(setup, patch=replace(patch, force=carried, gap=patch.gap + lifted))
     run = roll(Rigid(len(patch.points)), ActiveSet(bed), setup.patch, setup.drive, STEP, steps)
     return np.array([one.force.sum() for one in run]), setup.patch
-
-
-FLAT = 1e3  # m, radius of the section circle
-_GROWTH = 1.5
-E = TypeVar("E", bound=Equilibrium)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -605,7 +599,6 @@ def middle(equilibrium: Equilibrium) -> tuple[np.ndarray, np.ndarray]:
     return x[some], some
 
 
-STATIC_FRICTION, STATIC_HALF = 0.3, 0.015  # -; m, half the length of the contact
 STIFF = Roller()
 LAYER = Roller(outer=1.0, size=1e-3, reach=0.025, poisson_ratio=0.0)
 

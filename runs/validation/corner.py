@@ -51,48 +51,7 @@ CORNER = (
 )
 HELD = CORNER.format(body=300.0, spring=1e15).replace("body_mass = 300.0\n", "")
 
-
-def table() -> Table:
-    """Targets and results."""
-    with tempfile.TemporaryDirectory() as folder:
-        base = Path(folder)
-        corner, told = _run(base, CORNER.format(body=300.0, spring=25e3))
-        stiff, _ = _run(base, HELD)
-        fixed, _ = _run(base, LIMIT_SCENE)
-        free, _ = _run(base, LIMIT_SCENE + '[axle]\nkind = "free"\n')
-    vary = np.ptp(fixed["axle_force"], axis=0).max()
-    off = [v["value"] for k, v in told["greens"]["indicators"].items() if "blocked force" in k]
-    rows = [
-        ["springs of 1e15 N/m against a held axle, force on the axle in time", 1e-6,
-         float(np.abs(stiff["axle_force"] - fixed["axle_force"]).max() / vary)],
-        ["force on the hub against that by the blocked force, over frequency", 0.01, float(off[0])],
-        ["force on a free wheel less its load, of the load", 1e-6,
-         float(np.abs(free["axle_force"][:, 2] - 500.0).max() / 500.0)],
-        ["mean load over the time of the run: held axle, of its static load less 1", "none",
-         float(fixed["total_force"][:, 2].mean() / 500.0 - 1)],
-        ["the same, on the corner", "none",
-         float(corner["total_force"][:, 2].mean() / 500.0 - 1)],
-    ]  # fmt: skip
-    columns = [("limit", ""), ("target", "-"), ("found", "-")]
-    notes = ["Soft torus of 20 x 6 elements, 60 modes, 50 rad/s over waves of 0.5 mm, 0.04 s."]
-    return Table("Wheel on its corner: limits", columns, rows, notes)
-
-
-def _run(base: Path, text: str) -> tuple[dict[str, np.ndarray], dict]:
-    """Forces in contact.h5 and the summary of a scene, in a folder whose stages are reused."""
-    (base / "scene.toml").write_text(text)
-    scene, out = load(base / "scene.toml"), base / "out"
-    out.mkdir(exist_ok=True)
-    with console.quiet():
-        run_scene(scene, out, MPI.COMM_SELF, until="contact", fresh=False, petsc_options=[])
-    with h5py.File(out / "contact.h5") as file:
-        kept = {name: file[name][:] for name in ("axle_force", "total_force")}
-    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
-    return kept, summary["stages"]
-
-
 ABOUT = "a wheel on its corner: modes against full finite elements of the same mesh, standing and rolling"
-
 SCENE = (
     LOADED
     + """
@@ -137,6 +96,45 @@ CHOICES = (
 STEPS = (1e-4, 5e-5)  # s, of the full finite elements
 MESH = {"segments": 16, "elements_arc": 6, "duration": 0.1}
 WITHIN = 0.01
+
+
+def table() -> Table:
+    """Targets and results."""
+    with tempfile.TemporaryDirectory() as folder:
+        base = Path(folder)
+        corner, told = _run(base, CORNER.format(body=300.0, spring=25e3))
+        stiff, _ = _run(base, HELD)
+        fixed, _ = _run(base, LIMIT_SCENE)
+        free, _ = _run(base, LIMIT_SCENE + '[axle]\nkind = "free"\n')
+    vary = np.ptp(fixed["axle_force"], axis=0).max()
+    off = [v["value"] for k, v in told["greens"]["indicators"].items() if "blocked force" in k]
+    rows = [
+        ["springs of 1e15 N/m against a held axle, force on the axle in time", 1e-6,
+         float(np.abs(stiff["axle_force"] - fixed["axle_force"]).max() / vary)],
+        ["force on the hub against that by the blocked force, over frequency", 0.01, float(off[0])],
+        ["force on a free wheel less its load, of the load", 1e-6,
+         float(np.abs(free["axle_force"][:, 2] - 500.0).max() / 500.0)],
+        ["mean load over the time of the run: held axle, of its static load less 1", "none",
+         float(fixed["total_force"][:, 2].mean() / 500.0 - 1)],
+        ["the same, on the corner", "none",
+         float(corner["total_force"][:, 2].mean() / 500.0 - 1)],
+    ]  # fmt: skip
+    columns = [("limit", ""), ("target", "-"), ("found", "-")]
+    notes = ["Soft torus of 20 x 6 elements, 60 modes, 50 rad/s over waves of 0.5 mm, 0.04 s."]
+    return Table("Wheel on its corner: limits", columns, rows, notes)
+
+
+def _run(base: Path, text: str) -> tuple[dict[str, np.ndarray], dict]:
+    """Forces in contact.h5 and the summary of a scene, in a folder whose stages are reused."""
+    (base / "scene.toml").write_text(text)
+    scene, out = load(base / "scene.toml"), base / "out"
+    out.mkdir(exist_ok=True)
+    with console.quiet():
+        run_scene(scene, out, MPI.COMM_SELF, until="contact", fresh=False, petsc_options=[])
+    with h5py.File(out / "contact.h5") as file:
+        kept = {name: file[name][:] for name in ("axle_force", "total_force")}
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    return kept, summary["stages"]
 
 
 def run() -> list[Table]:

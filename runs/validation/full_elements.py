@@ -33,6 +33,32 @@ from tireroad.runs.stages.setup import Probes, probes, scene_setup
 from tireroad.runs.stages.stage import Job
 from tireroad.runs.validation.tables import Table
 
+# Spectral radius of the full finite elements' scheme. Axle force on a cleat at steps of 1e-4 s with
+# 0, 0.5 and 0.8: 5.4, 2.8 and 2.1 % off; contact force on cobblestones at 2.5e-5 s: 0 and 0.5 are
+# 0.08 % apart, 0.8 is 0.2 % off.
+RADIUS = 0.5
+LOADED = """
+name = "validate"
+[tire]
+segments = {segments}
+elements_arc = {elements_arc}
+footprint_size = 0.35
+[tire.material]
+youngs_modulus = 48e6
+[static]
+load = 500.0
+"""
+"""Beginning of a scene: the soft torus under 500 N, with the elements left open."""
+TIMES = 3  # repetitions: a modal loop takes 0.1 s, and its CPU time scatters threefold
+NOTES = [
+    f"Errors: relative L2 of what varies in 0 to {BAND:g} Hz (Hann window); worst: largest difference "
+    "there in time over the largest variation. All against the full finite elements at their smallest "
+    "step, whose own error is estimated: a third of its distance from the step before (second order).",
+    "Ratio: loop of the full finite elements, at the largest step at which they are as accurate, over "
+    f"the loop of the row, both in processor seconds of one thread, of modes the least of {TIMES}. Set-up: second eigenproblem (once for "
+    "all roads) and residual, or factorisation; static state and modes are shared.",
+]
+
 
 @dataclass(frozen=True)
 class FullHistory:
@@ -85,24 +111,6 @@ def follow(trial: Conditions, tire, step: float, setup: float) -> FullHistory:
         "displacement": np.concatenate([block.displacement for block in blocks]),
     }
     return FullHistory(step, values, seconds, setup)
-
-
-# Spectral radius of the full finite elements' scheme. Axle force on a cleat at steps of 1e-4 s with
-# 0, 0.5 and 0.8: 5.4, 2.8 and 2.1 % off; contact force on cobblestones at 2.5e-5 s: 0 and 0.5 are
-# 0.08 % apart, 0.8 is 0.2 % off.
-RADIUS = 0.5
-LOADED = """
-name = "validate"
-[tire]
-segments = {segments}
-elements_arc = {elements_arc}
-footprint_size = 0.35
-[tire.material]
-youngs_modulus = 48e6
-[static]
-load = 500.0
-"""
-"""Beginning of a scene: the soft torus under 500 N, with the elements left open."""
 
 
 @dataclass(frozen=True)
@@ -259,18 +267,6 @@ class Tires(Elements):
         points = points.on_face if counted else points
         given = points.outputs, points.loads, residual, lambda: rolling.basis
         return make_response(lambda: self.wheel, rolling, *given).response
-
-
-TIMES = 3  # repetitions: a modal loop takes 0.1 s, and its CPU time scatters threefold
-
-NOTES = [
-    f"Errors: relative L2 of what varies in 0 to {BAND:g} Hz (Hann window); worst: largest difference "
-    "there in time over the largest variation. All against the full finite elements at their smallest "
-    "step, whose own error is estimated: a third of its distance from the step before (second order).",
-    "Ratio: loop of the full finite elements, at the largest step at which they are as accurate, over "
-    f"the loop of the row, both in processor seconds of one thread, of modes the least of {TIMES}. Set-up: second eigenproblem (once for "
-    "all roads) and residual, or factorisation; static state and modes are shared.",
-]
 
 
 @dataclass(frozen=True)

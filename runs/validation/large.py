@@ -31,6 +31,9 @@ INFLATION, BED = 2.2e5, 1e9  # Pa; N/m3 of the tread's springs: 10 MPa over 10 m
 SEGMENTS, ACROSS, FINER = 16, 8, 12  # elements around; across; across the finer mesh
 LOADS = (4000.0, 2000.0, 6000.0)  # N
 
+NAMES = "linear, place at rest", "linear, moved place", "reduced"
+_TIMES, _RISES, _NONE = 100, (5e-3, 15e-3), 1e-3
+
 
 def bar(height: float, length: float, position: float, ramp: float) -> Feature:
     """A bar across the road, mm."""
@@ -106,9 +109,6 @@ class Found:
     road: Feature
     exact: Standing | None
     others: dict[str, Standing | None]
-
-
-NAMES = "linear, place at rest", "linear, moved place", "reduced"
 
 
 def compared(study: Study, training: Training, roads: Sequence[Feature]) -> Iterator[Found]:
@@ -212,9 +212,6 @@ def run() -> list[Table]:
         Table("Trainings of the reduced force", about, trainings, []),
         _meshes(),
     ]
-
-
-_TIMES, _RISES, _NONE = 100, (5e-3, 15e-3), 1e-3
 
 
 def _meshes() -> Table:

@@ -30,7 +30,7 @@ AXES = ("along the road", "across it", "vertical")
 
 
 def against_elements(scene: Path, duration: float = LONGEST) -> list[Table]:
-    """What the modes and the time step of a scene cost: its forces against full finite elements, direction by direction.
+    """Error of a scene's modes and time step: its forces against full finite elements, direction by direction.
 
     The scene is run as it stands but for its first `duration` s of road (or what it has), on one process. Full finite
     elements of the same mesh, in the same state, with the same points, tread, friction and damping take steps of the same

@@ -56,6 +56,86 @@ from tireroad.runs.validation.tables import Table
 
 BALANCED = 1e-9  # residual of an equilibrium, relative to the force scale
 
+COUNT = 120
+DAMPING = (0.0, 500.0, 5e3, 1e5)  # gamma1, 1/s
+SPEEDS = (0.0, 0.3, 0.999, 1.3)  # of the critical speed
+SQUARES = np.array([50.0, 400.0, 2.6e4]) ** 2  # 1/s2
+SHAPE = np.random.default_rng(3).normal(size=(3, 3))  # kg^-1/2
+STEPS = (1e-7, 1e-5, 1e-3, 1e-2)  # s
+FREE_STEPS = 200_000
+MODAL_DAMPING = {
+    "gamma1 = 0": 0.0,
+    "light damping": 5.0,
+    "critical damping": 800.0,
+    "critical damping but for 1e-14": 800.0 * (1 + 1e-14),
+    "gamma1 = 1e5 1/s": 1e5,
+}
+PATCH = oval_patch((9, 7), (0.015, 0.02), 500.0)
+HALF_SPACE = half_space_compliance(PATCH.points[:, :2], PATCH.half_sizes, 5e6, 0.45)
+SHEAR = MatrixShear(
+    PATCH.points[:, :2],
+    PATCH.half_sizes,
+    lambda x, y, a, b: half_space_shear(x, y, a, b, 5e6, 0.45),
+)
+CRITICAL = 60.0  # m/s: wave speed of the strip
+SHORTEST = 0.06  # s: the road's waves reach full height after 15 ms
+_BASE = """
+name = "combined"
+[tire]
+segments = 16
+elements_arc = 6
+[tire.material]
+youngs_modulus = 48e6
+[static]
+load = 800.0
+error_estimate = false
+camber = {camber}
+{static}
+[modal]
+count = 40
+[damping]
+mass = 200.0
+[rotation]
+speed = 40.0
+{rotation}
+[axle]
+kind = "{axle}"
+[contact]
+points = {{ dx = 0.008, dy = 0.008 }}
+reach = 0.025
+tread = "{tread}"
+youngs_modulus = 1e7
+{contact}
+{pattern}
+[road]
+{road}
+[time]
+duration = 0.08
+[accuracy]
+estimate = false
+[output]
+spectra = false
+"""
+_GROOVES = """
+[pattern]
+pitches = 50
+[[pattern.groove]]
+width = 0.008
+depth = 0.006
+[[pattern.groove]]
+direction = "circumferential"
+width = 0.006
+depth = 0.006
+"""
+_BRUSH = "brush_stiffness_per_area = 1e8\nfriction = 0.8\n"
+_CREEPS = "relaxation = [0.3, 0.2]\nrelaxation_time = [1e-3, 1e-2]\n"
+_ROUGH = 'kind = "two-slope"\nstone_size = 0.02\nroad_class = "C"\n'
+_BAR = 'kind = "cleat"\nposition = 0.2\nheight = 0.01\nlength = 0.02\n'
+_HOLE = 'kind = "step"\nposition = 0.3\nheight = -0.02\nramp = 0.0\n'
+_DRUM = "drum_radius = 0.85\n"
+_INSIDE = 'drum_radius = 1.0\ndrum = "inside"\n'
+ABOUT = "finite elements, modes, Green's functions and the contact loop under stress"
+
 
 @dataclass(frozen=True)
 class Attempt:
@@ -163,11 +243,6 @@ def outcome(ended: EndedRun) -> tuple[str, str]:
     return f"converged: {held}", "needs no catching"
 
 
-COUNT = 120
-DAMPING = (0.0, 500.0, 5e3, 1e5)  # gamma1, 1/s
-SPEEDS = (0.0, 0.3, 0.999, 1.3)  # of the critical speed
-
-
 def modal_rows() -> list[list]:
     """(package, case, result, how it was caught)."""
     section = thesis_torus(segments=8, elements_arc=4)
@@ -239,19 +314,6 @@ def _past_critical(projection: Projection) -> list:
     first = onset(projection, damping, "full", high) if rate else np.inf
     what = f"grows at {rate:.3g} 1/s at {high:.0f} rad/s, from {first:.0f} rad/s on"
     return ["twice the critical speed", what, "a warning with the speed at which growth begins"]
-
-
-SQUARES = np.array([50.0, 400.0, 2.6e4]) ** 2  # 1/s2
-SHAPE = np.random.default_rng(3).normal(size=(3, 3))  # kg^-1/2
-STEPS = (1e-7, 1e-5, 1e-3, 1e-2)  # s
-FREE_STEPS = 200_000
-MODAL_DAMPING = {
-    "gamma1 = 0": 0.0,
-    "light damping": 5.0,
-    "critical damping": 800.0,
-    "critical damping but for 1e-14": 800.0 * (1 + 1e-14),
-    "gamma1 = 1e5 1/s": 1e5,
-}
 
 
 def greens_rows() -> list[list]:
@@ -369,17 +431,6 @@ def _limits() -> list:
         exact = turn**2 / 6 * (1 - turn**2 / 20) if turn < 1 else 1 - np.sin(turn) / turn
         worst = max(worst, abs(tire.same_step[0, 0] / exact - 1))
     return ["s dt from 1e-12 to 1e4", f"{worst:.0e} off the closed form", "series below 0.3"]
-
-
-PATCH = oval_patch((9, 7), (0.015, 0.02), 500.0)
-HALF_SPACE = half_space_compliance(PATCH.points[:, :2], PATCH.half_sizes, 5e6, 0.45)
-SHEAR = MatrixShear(
-    PATCH.points[:, :2],
-    PATCH.half_sizes,
-    lambda x, y, a, b: half_space_shear(x, y, a, b, 5e6, 0.45),
-)
-CRITICAL = 60.0  # m/s: wave speed of the strip
-SHORTEST = 0.06  # s: the road's waves reach full height after 15 ms
 
 
 @dataclass(frozen=True)
@@ -595,63 +646,6 @@ def many_points(steps: int = 150) -> RolledCase:
     return _contact_followed("20,000 points", instants, steps)
 
 
-_BASE = """
-name = "combined"
-[tire]
-segments = 16
-elements_arc = 6
-[tire.material]
-youngs_modulus = 48e6
-[static]
-load = 800.0
-error_estimate = false
-camber = {camber}
-{static}
-[modal]
-count = 40
-[damping]
-mass = 200.0
-[rotation]
-speed = 40.0
-{rotation}
-[axle]
-kind = "{axle}"
-[contact]
-points = {{ dx = 0.008, dy = 0.008 }}
-reach = 0.025
-tread = "{tread}"
-youngs_modulus = 1e7
-{contact}
-{pattern}
-[road]
-{road}
-[time]
-duration = 0.08
-[accuracy]
-estimate = false
-[output]
-spectra = false
-"""
-_GROOVES = """
-[pattern]
-pitches = 50
-[[pattern.groove]]
-width = 0.008
-depth = 0.006
-[[pattern.groove]]
-direction = "circumferential"
-width = 0.006
-depth = 0.006
-"""
-_BRUSH = "brush_stiffness_per_area = 1e8\nfriction = 0.8\n"
-_CREEPS = "relaxation = [0.3, 0.2]\nrelaxation_time = [1e-3, 1e-2]\n"
-_ROUGH = 'kind = "two-slope"\nstone_size = 0.02\nroad_class = "C"\n'
-_BAR = 'kind = "cleat"\nposition = 0.2\nheight = 0.01\nlength = 0.02\n'
-_HOLE = 'kind = "step"\nposition = 0.3\nheight = -0.02\nramp = 0.0\n'
-_DRUM = "drum_radius = 0.85\n"
-_INSIDE = 'drum_radius = 1.0\ndrum = "inside"\n'
-
-
 @dataclass(frozen=True)
 class Combination:
     """Values of the scene's keys."""
@@ -746,9 +740,6 @@ def _ended(one: Combination, folder: Path) -> tuple[str, str]:
         f"{len(load_)} steps, load {load_.min():.4g} to {load_.max():.4g} N",
         f"complementarity in every step, worst {residual:.0e}",
     )
-
-
-ABOUT = "finite elements, modes, Green's functions and the contact loop under stress"
 
 
 def run() -> list[Table]:

@@ -121,7 +121,7 @@ def _check(out: Path) -> None:
 
 
 def _left(results: dict[str, list[Table]], out: Path | None) -> str:
-    """What a stop leaves, in words."""
+    """Message on the results that a stop leaves."""
     if out is None:
         return "nothing is kept; with --out FILE.json what is finished is written there"
     finished = f"{', '.join(results)} in {out}" if results else "nothing in the file of --out"

@@ -25,6 +25,8 @@ INK, MUTED = "#1d2733", "#9aa5b1"
 MOST_MARKS = 40  # curves with more points are drawn without marks
 SIZES = (4.0, 9.0)  # points: sizes of the marks for the smallest and the largest value
 
+LONG = 16  # rows above which a table is collapsed
+
 
 def drawn(table: Any) -> str | None:
     """The figure that `plot` of a runs.validation.tables.Table asks for, as a data URI, or None.
@@ -224,9 +226,6 @@ def _guides(axes: Axes, plot: dict) -> None:
 
 
 _KINDS: dict[str, Callable[[Any], str]] = {"lines": _lines, "front": _front, "bars": _bars}
-
-
-LONG = 16  # rows above which a table is collapsed
 
 
 def page(results: dict[str, list], about: dict[str, str]) -> str:

@@ -1,4 +1,4 @@
-"""What weakens a tire's waves on their way around it: each simplification of a run alone, at the bench of `mobility`.
+"""Decay of a tire's waves on their way around it: the effect of each simplification of a run alone, at the bench of `mobility`.
 
 Everything here is solved wave by wave around, so that one cause changes at a time.
 

@@ -11,6 +11,8 @@ from tireroad.fem.parameters import ParameterError, number
 
 Array = NDArray[np.float64]
 
+SHARP = 1e-3  # m: assumed length of an edge without a ramp
+
 
 @road_kind("flat", "flat: all heights are 0")
 class Flat(EndlessRoad):
@@ -58,9 +60,6 @@ class Sine(EndlessRoad):
     def lowest(self, x0: float, x1: float, y0: float, y1: float) -> float:
         """Minus the amplitude, m."""
         return -self.amplitude
-
-
-SHARP = 1e-3  # m: assumed length of an edge without a ramp
 
 
 @dataclass(frozen=True, kw_only=True)
