@@ -10,6 +10,14 @@ extern blas linked;
 
 enum { SOLVED, SINGULAR, NO_SET, NOT_FINITE, UNSOLVED, REFUSED, AGAIN };
 enum { LAGS = 40, TURNS = 40 };  /* at most: steps in a row whose normal and tangential forces lag; turns of a step */
+enum { LIFT_PATIENCE = 10 };     /* turns, before a point without a bound that comes and goes is lifted by its own bristle */
+/* Where a Newton step does not let the residual fall to this share, fewer points are to be found slipping: r, which is that
+   of single points, then is too large for displacements of all of them. Any r > 0 has the same solution. */
+typedef struct {
+    double falls, caution, least_caution;
+    double inner; /* residual reduction in a Newton step; which points slip is known no better */
+} newton_rules;
+extern newton_rules newton;
 
 /* f >= 0, g = A (f - f_ref) + q >= 0, f . g = 0 for a matrix A (n, n), stored by rows and by columns. */
 typedef struct {
@@ -848,11 +856,8 @@ void plane_drag(plane *s, const double *force, const double *pressed, int count,
 
 /* ---- Stick and slip ---------------------------------------------------------------------------------------------- */
 
-/* Where a Newton step does not let the residual fall to this share, fewer points are to be found slipping: r, which is that
-   of single points, then is too large for displacements of all of them. Any r > 0 has the same solution. */
-static const double FALLS = 0.7, CAUTION = 0.1, LEAST_CAUTION = 1e-4;
+newton_rules newton = {.falls = 0.7, .caution = 0.1, .least_caution = 1e-4, .inner = 1e-1};
 enum { NEWTON_STEPS = 30, GRADIENT_STEPS = 5000, FEW = 200, SHORT = 40 };
-static const double INNER = 1e-1; /* residual reduction in a Newton step; which points slip is known no better */
 
 /* One cycle of GMRES of at most `most` steps from x = 0: x (n,) with |A x - b| <= tolerance |b| if that is enough. */
 static int cycle(int n, int most, int (*apply)(void *, const double *, double *), void *of, const double *right,
@@ -1098,13 +1103,13 @@ int stick_slip_solve(stick_slip *s, double tolerance) {
     for (int step = 0; step < NEWTON_STEPS; step++) {
         s->off = residual(s, trial, off);
         s->largest = most_force(s);
-        if (s->off > FALLS * before) s->caution = fmax(CAUTION * s->caution, LEAST_CAUTION);
+        if (s->off > newton.falls * before) s->caution = fmax(newton.caution * s->caution, newton.least_caution);
         before = s->off;
         if (s->off <= tolerance * s->largest) {
             found = SOLVED;
             break;
         }
-        newton_step(s, trial, off, INNER);
+        newton_step(s, trial, off, newton.inner);
     }
     if (found != SOLVED) {
         memcpy(s->force, begun, 2 * a * sizeof(double));
@@ -1189,7 +1194,7 @@ int at_once_step(at_once *s, const double *right, double tolerance, double *step
 /* ---- Both in turn -------------------------------------------------------------------------------------------------- */
 
 /* Turns in which the normal forces follow in a Newton step; after which stick and slip are solved in each. */
-enum { FOLLOWED = 8, FLAT = 30, MIXED = 4, LIFT_PATIENCE = 10 };
+enum { FOLLOWED = 8, FLAT = 30, MIXED = 4 };
 static const double ENOUGH = 0.1; /* of the tolerance: stick and slip within a turn */
 static const double SHRUNK = 0.03, SMALL = 1e-6; /* of the first residual of a step, down to a share of the largest bound */
 
@@ -1503,7 +1508,7 @@ int brush_solve(brush *s, normal_contact *normal, const double *q, const uint8_t
         problem.off = residual(&problem, w->ahead, w->off);
         problem.largest = most_force(&problem);
         if (!isfinite(problem.off)) return NOT_FINITE;
-        if (problem.off > FALLS * before) caution = fmax(CAUTION * caution, LEAST_CAUTION);
+        if (problem.off > newton.falls * before) caution = fmax(newton.caution * caution, newton.least_caution);
         before = problem.off;
         if (s->turns == 1) first = problem.off;
         const double limit = brush_limit(s, first, problem.largest);
@@ -1527,7 +1532,7 @@ int brush_solve(brush *s, normal_contact *normal, const double *q, const uint8_t
                 problem.normal = normal, problem.friction = unbounded ? 0.0 : s->friction;
                 problem.touching = w->touches, problem.touch = w->touch;
             }
-            newton_step(&problem, w->ahead, w->off, INNER);
+            newton_step(&problem, w->ahead, w->off, newton.inner);
             onto_discs(a, w->bound, w->force);
         }
         s->products += problem.products;

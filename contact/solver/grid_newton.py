@@ -13,25 +13,23 @@ from tireroad.contact.solver.active_set import COMPILED
 from tireroad.contact.solver.conditions import Array, Index, Mask, check_residual, penetration
 from tireroad.contact.solver.projected_cg import ProjectedCG
 from tireroad.contact.solver.stick_slip import TURNS, BrushFriction, CompressedRows
-from tireroad.contact.tread.kernel import Box
+from tireroad.contact.tread.kernel import EMPTY, Box, points_in, widened
 from tireroad.contact.tread.shear import GridTread, KernelShear
 from tireroad.greens.recursion import LoadedColumns
 
 _C, _FFI = COMPILED.lib, COMPILED.ffi
+_RULES = _C.newton  # as for the steps of stick and slip
 
 # Of the largest gap: residual of normal forces and gaps, at the worst point. On rough asphalt about a thousandth of deflections.
 GAP_TOLERANCE = 1e-5
-INNER = 0.1  # residual reduction in a Newton step
 NEAR = 4.0  # spacings of nodes up to which a Newton step has the tire's compliance between them,
 MOST = 0.5  # unless what is left out is more than this share of it: then all of it
 # Where what is out of balance has grown from its least by more than this factor, the near parts of the compliance do not do: the
 # whole of it is taken in this step and those that follow.
 GROWN, WHOLLY = 10.0, 200
 PATIENT = 12  # Newton steps, before fewer points are to be found slipping where the residual does not fall
-FALLS, CAUTION, LEAST_CAUTION = 0.7, 0.1, 1e-4
-LIFT_PATIENCE = 10  # Newton steps, before a point without a bound that comes and goes is lifted by its own bristle
 READINGS = 12  # Newton steps in which the road is read, at most: on a steep flank a point may go to and fro
-_AROUND = 3  # rows and columns of points beyond those that touch, which take part too; the edge of a brush needs one
+_EDGE = 1  # rows and columns of points beyond those that touch, which the edge of a brush needs
 
 # Heights (c,) m and slopes (c, 2) of the road under points at places (2, c) m beside their own.
 Reading = Callable[[Array], tuple[Array, Array]]
@@ -76,7 +74,7 @@ class GridNewton:
         self._constant = np.concatenate([self._whole(at_rest)[:1], self._whole(pressed)[1:]])
         self._tire = LoadedColumns(same_step)
         self._near = _near(same_step, _positions(weights, patch.points[:, :2]))
-        self._box, self.index, self._inside = (0, 0, 0, 0), np.arange(0), self._whole
+        self._box, self.index, self._inside = EMPTY, np.arange(0), self._whole
         self.before, self.force, self.slope = at_rest.copy(), at_rest.copy(), np.zeros((c, 2))
         self.wholly = 0  # steps to come with the whole compliance in Newton steps
         self._compile(p)
@@ -163,32 +161,22 @@ class GridNewton:
         problem = _FFI.new("at_once *", self._kernel | compliance | {name: COMPILED.doubles(values) for name, values in held.items()} | {
             "count": len(at), "index": COMPILED.ints(index), "kept": COMPILED.flags(np.ascontiguousarray(kept)), "caution": caution, "reads": reads,
         })  # fmt: skip
-        _C.at_once_step(problem, COMPILED.doubles(right), INNER, COMPILED.doubles(step))
+        _C.at_once_step(problem, COMPILED.doubles(right), _RULES.inner, COMPILED.doubles(step))
         return step
 
     def take_box(self, points: Mask) -> bool:
         """Solve between the points of a box around these (c,) bool too; whether it has grown."""
         if not points.any():
             return False
-        rows, columns = (cells[points] for cells in self._cells)
-        top, bottom, left, right = self._box
-        if not len(self.index):
-            top, bottom, left, right = rows.min(), rows.max() + 1, columns.min(), columns.max() + 1
-        box = (
-            *_widened(rows, top, bottom, self._whole.shape[0]),
-            *_widened(columns, left, right, self._whole.shape[1]),
-        )
+        touching = self._cells[0][points], self._cells[1][points]
+        box = widened(self._box, touching, self._whole.shape, _EDGE)
         if box == self._box:
             return False
         self._set_box(box)
         return True
 
     def _set_box(self, box: Box) -> None:
-        top, bottom, left, right = self._box = box
-        rows, columns = self._cells
-        self.index = np.flatnonzero(
-            (rows >= top) & (rows < bottom) & (columns >= left) & (columns < right)
-        )
+        self._box, self.index = box, points_in(box, self._cells)
         self._inside = self._grid.inside(box)
 
     def state(self) -> dict[str, Array]:
@@ -207,15 +195,6 @@ class GridNewton:
         top, bottom, left, right = state["box"].astype(int).tolist()
         if bottom:
             self._set_box((top, bottom, left, right))
-
-
-def _widened(cells: Index, first: int, last: int, count: int) -> tuple[int, int]:
-    """The range from `first` to before `last` of `count` cells, grown where `cells` lie near its ends."""
-    low, high = int(cells.min()), int(cells.max()) + 1
-    return (
-        first if low > first or first == 0 else max(low - _AROUND, 0),
-        last if high < last or last == count else min(high + _AROUND, count),
-    )
 
 
 class _Step:
@@ -263,8 +242,8 @@ class _Step:
                 continue
             if self._rest < least:
                 least, best = self._rest, self.force.copy()
-            if turn >= PATIENT and self._off > max(FALLS * before, self._limit):
-                self._caution = max(CAUTION * self._caution, LEAST_CAUTION)
+            if turn >= PATIENT and self._off > max(_RULES.falls * before, self._limit):
+                self._caution = max(_RULES.caution * self._caution, _RULES.least_caution)
             before = self._off
             self._newton(normal, plane, turn)
         return False
@@ -358,7 +337,7 @@ class _Step:
     def _newton(self, normal: bool, plane: bool, turn: int) -> None:
         """Forces that balance gaps and slips where they are linear; those of points that leave the road go."""
         solver, index = self._solver, self._solver.index
-        if plane and self._brush.unbounded and turn > LIFT_PATIENCE:
+        if plane and self._brush.unbounded and turn > _C.LIFT_PATIENCE:
             self._bears[index[self._touches != (self.force[0, index] > 0.0)]] = False
         touches = self._touches if normal else self.force[0, index] > 0.0
         part = np.flatnonzero(touches | self.force[:, index].any(axis=0))

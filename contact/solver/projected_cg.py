@@ -17,7 +17,7 @@ from tireroad.contact.solver.conditions import (
     complementarity_residual,
     penetration,
 )
-from tireroad.contact.tread.kernel import Box, KernelTread
+from tireroad.contact.tread.kernel import EMPTY, Box, KernelTread, widened
 from tireroad.fem.errors import ConvergenceError
 
 Array = NDArray[np.float64]
@@ -26,10 +26,6 @@ Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 TARGET = 1e-10  # a tenth of the tolerance, since the residual is evaluated again for the record
 MAX_ITERATIONS = 1000
-# Rows and columns of points around those that touch, among which a step looks for others: a footprint is half of
-# the points within reach of the road.
-_AROUND = 3
-_EMPTY: Box = (2**31, 0, 2**31, 0)
 
 
 class Compliance(Protocol):
@@ -108,16 +104,6 @@ class MatrixCompliance:
         return approach / self.diagonal
 
 
-def _widened(cells: Index, points: Mask, first: int, last: int) -> tuple[int, int]:
-    """The range from `first` to before `last` of `cells` (n,), grown where `points` lie beyond it."""
-    few = cells[points]
-    low, high = int(few.min()), int(few.max()) + 1
-    return (
-        first if low >= first else max(low - _AROUND, 0),
-        last if high <= last else min(high + _AROUND, int(cells.max()) + 1),
-    )
-
-
 def _gap(compliance: Compliance, force: Array, base: Array, q: Array) -> Array:
     return q + compliance.apply(force - base)
 
@@ -143,7 +129,8 @@ class ProjectedCG:
         self._grid = compliance if isinstance(compliance, SpreadCompliance) else None
         self.tread = self._grid.tread if self._grid else None
         self._cells = self._grid.cells if self._grid else ()
-        self._box = _EMPTY
+        self._shape = tuple(int(cells.max()) + 1 for cells in self._cells)
+        self._box = EMPTY
         self._inner, self._index = compliance, np.arange(n)
         self._last: Array | None = None
         self._before: Array | None = None
@@ -179,9 +166,8 @@ class ProjectedCG:
         """Let the box contain these points; whether it grew."""
         if not self._cells or not points.any():
             return False
-        top, bottom, left, right = self._box
-        rows = _widened(self._cells[0], points, top, bottom)
-        return self._take_box((*rows, *_widened(self._cells[1], points, left, right)))
+        touching = self._cells[0][points], self._cells[1][points]
+        return self._take_box(widened(self._box, touching, self._shape))
 
     def _take_box(self, box: Box) -> bool:
         """Solve between the points of this box from now on; whether it is another."""

@@ -11,8 +11,13 @@ from scipy import fft
 from tireroad.contact.tread.compliance import Influence
 
 Array = NDArray[np.float64]
+Index = NDArray[np.intp]
 MARGIN = 4  # points
 Box = tuple[int, int, int, int]  # first row, one past the last, first column, one past the last
+EMPTY: Box = (2**31, 0, 2**31, 0)
+# Rows and columns of points around those that touch, among which a step looks for others: a footprint is half of
+# the points within reach of the road.
+AROUND = 3
 
 
 @dataclass(frozen=True)
@@ -21,7 +26,7 @@ class GridPlaces:
 
     shape: tuple[int, int]
     spacing: tuple[float, float]
-    place: NDArray[np.intp]
+    place: Index
 
 
 class KernelTread:
@@ -59,22 +64,20 @@ class KernelTread:
         return np.ascontiguousarray(self._kernel[i[:, None], j])
 
     @property
-    def cells(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    def cells(self) -> tuple[Index, Index]:
         """Row and column (c,) of each point in the grid."""
         rows, columns = np.divmod(self.grid.place, self.grid.shape[1])
         return rows, columns
 
-    def inside(self, box: Box) -> tuple[KernelTread, NDArray[np.intp]]:
+    def inside(self, box: Box) -> tuple[KernelTread, Index]:
         """The same for the points in a box of the grid, and which those are (a,)."""
         (top, bottom, left, right), (rows, columns) = box, self.cells
-        index = np.flatnonzero(
-            (rows >= top) & (rows < bottom) & (columns >= left) & (columns < right)
-        )
+        index = points_in(box, self.cells)
         shape = bottom - top, right - left
         place = (rows[index] - top) * shape[1] + columns[index] - left
         return KernelTread(GridPlaces(shape, self.grid.spacing, place), self._influence), index
 
-    def block(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Array:
+    def block(self, rows: Index, columns: Index) -> Array:
         """The matrix between the points `rows` (a,) and `columns` (b,), (a, b) m/N."""
         i, j = np.divmod(self.grid.place[rows, None], self.grid.shape[1])
         k, m = np.divmod(self.grid.place[columns], self.grid.shape[1])
@@ -95,6 +98,28 @@ class KernelTread:
         spectrum = fft.rfft2(field.reshape(nx, ny), size)
         spectrum *= transform
         return fft.irfft2(spectrum, size)[:nx, :ny].ravel()[self.grid.place]
+
+
+def points_in(box: Box, cells: tuple[Index, Index]) -> Index:
+    """The points (a,), of those with rows and columns `cells` (c,) each, that lie in a box of the grid."""
+    (top, bottom, left, right), (rows, columns) = box, cells
+    return np.flatnonzero((rows >= top) & (rows < bottom) & (columns >= left) & (columns < right))
+
+
+def widened(box: Box, cells: tuple[Index, Index], shape: tuple[int, ...], edge: int = 0) -> Box:
+    """The box, grown by `AROUND` on each side where `cells` (rows and columns) lie beyond it or in its outermost `edge`."""
+    (top, bottom, left, right), (rows, columns) = box, cells
+    along, across = (top, bottom, rows, shape[0]), (left, right, columns, shape[1])
+    return (*_widened(*along, edge), *_widened(*across, edge))
+
+
+def _widened(first: int, last: int, cells: Index, count: int, edge: int) -> tuple[int, int]:
+    """The range from `first` to before `last` of `count` cells, grown where `cells` lie beyond it."""
+    low, high = int(cells.min()), int(cells.max()) + 1
+    return (
+        first if low >= first + edge else max(low - AROUND, 0),
+        last if high <= last - edge else min(high + AROUND, count),
+    )
 
 
 def doubled(grid: GridPlaces) -> tuple[tuple[int, ...], Array, Array]:

@@ -27,7 +27,7 @@ from tireroad.contact.tread.compliance import (
     primitive_product,
     rectangle_potential,
 )
-from tireroad.contact.tread.kernel import Box, GridPlaces, KernelTread, doubled
+from tireroad.contact.tread.kernel import Box, GridPlaces, KernelTread, doubled, points_in
 from tireroad.fem.compiled import Library
 
 Array = NDArray[np.float64]
@@ -311,8 +311,7 @@ class GridConvolution:
 
     def __init__(self, around: Array, coupled: bool, box: Box, cells: tuple[Index, Index]) -> None:
         top, bottom, left, right = box
-        rows, columns = cells
-        inside = (rows >= top) & (rows < bottom) & (columns >= left) & (columns < right)
+        (rows, columns), inside = cells, points_in(box, cells)
         self._row, self._column = rows[inside] - top, columns[inside] - left
         self.shape = shape = bottom - top, right - left
         self._size = tuple(fft.next_fast_len(2 * n - 1, real=True) for n in shape)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import h5py
 import numpy as np
+from scipy import sparse
 
 from tireroad.contact.results.squeezed_air import FootprintCells, squeezed
 from tireroad.contact.setup import ContactSetup
@@ -33,10 +34,12 @@ def grooves(scene: Scene) -> list[Groove]:
 class LeavingAir:
     """Volume velocities that leave a footprint at the `places` (o, 2) m of the road, over the lines (f,) of a run.
 
-    `amplitude` and `spectrum` (o, f) m3/s: as those of runs.stages.whole_tire.Lines; `height` (m): mean gap in the footprint.
+    `amplitude` and `spectrum` (o, f) m3/s: as those of runs.stages.whole_tire.Lines; `height` (m): mean gap in the footprint;
+    `shares` (e, o): of a tire's elements in the places.
     """
 
     places: Array
+    shares: sparse.csr_matrix
     amplitude: Array
     spectrum: Array
     height: float
@@ -77,13 +80,16 @@ class LeavingAir:
             outlets.leaving((part * true[:, None]).T, *given)
             for part in transformed(found.rate, step, numbers)
         )
-        return LeavingAir(outlets.places, amplitude, spectrum, found.height)
+        return LeavingAir(outlets.places, shares, amplitude, spectrum, found.height)
 
-    def volumes(self, tire: SoundingTire, state: StaticState, frequency: Array) -> Array:
-        """Displaced volumes (2, e, f) m3 of the tire's elements that sound as this air does: amplitude and spectrum."""
-        shares = on_elements(tire, _face(state), self.places)
+    def on(self, tire: SoundingTire, state: StaticState) -> LeavingAir:
+        """The same air in front of another tire's elements."""
+        return replace(self, shares=on_elements(tire, _face(state), self.places))
+
+    def volumes(self, frequency: Array) -> Array:
+        """Displaced volumes (2, e, f) m3 of the elements that sound as this air does: amplitude and spectrum."""
         rate = 2j * np.pi * frequency
-        return np.stack([shares @ part / rate for part in (self.amplitude, self.spectrum)])
+        return np.stack([self.shares @ part / rate for part in (self.amplitude, self.spectrum)])
 
 
 def _face(state: StaticState) -> Array:

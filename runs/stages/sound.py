@@ -319,8 +319,8 @@ class SoundStage(WholeTire[SoundPressure]):
         heard, over_time = vibration, volumes @ lines.spectrum.T
         if (air := self._air(record, lines, tire, setup)) is not None:
             with record.timing("air of the footprint"):
-                amplitude, spectrum = air.volumes(tire, state, lines.frequency)
-                rougher, _ = air.volumes(rough, state, lines.frequency)
+                amplitude, spectrum = air.volumes(lines.frequency)
+                rougher, _ = air.on(rough, state).volumes(lines.frequency)
             heard = replace(
                 vibration,
                 volume=vibration.volume + amplitude,

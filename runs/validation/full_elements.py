@@ -7,6 +7,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -141,25 +142,43 @@ class Elements:
 
     def full(self, step: float, radius: float = RADIUS) -> tuple[FullTire, float, float]:
         """All degrees of freedom between the same points; step; set-up in s."""
-        wheel, points = self.wheel, self._all_points
-        axle = self.job.axle
+        wheel, axle = self.wheel, self.job.axle
         began = time.perf_counter()
-        damping, modal = self._damping()
         tire = FullTire(
-            operators=wheel.operators,
+            **self._between_points(step),
             rotation=wheel.rotation,
             speed=wheel.speed,
-            damping=damping,
-            step=step,
-            outputs=points,
-            loads=points,
             inertia=wheel.inertia,
             spectral_radius=radius,
-            modal=modal,
             air=wheel.air,
             corner=(axle, self.motions.rim_motion(wheel.speed != 0)) if axle else None,
         )
         return tire, step, time.perf_counter() - began
+
+    def nonlinear(self, step: float) -> tuple[NonlinearTire, float, float]:
+        """The full finite elements with large motions; step; set-up in s."""
+        wheel, static = self.wheel, self.run.static
+        began = time.perf_counter()
+        tire = NonlinearTire(
+            **self._between_points(step),
+            inflation=static.inflation,
+            spectral_radius=RADIUS,
+            turning=(wheel.rotation, static.rolling) if wheel.speed else None,
+        )
+        return tire, step, time.perf_counter() - began
+
+    def _between_points(self, step: float) -> dict[str, Any]:
+        """The arguments that any full tire has between the points of the contact. Collective."""
+        points = self._all_points
+        damping, modal = self._damping()
+        return {
+            "operators": self.wheel.operators,
+            "damping": damping,
+            "modal": modal,
+            "step": step,
+            "outputs": points,
+            "loads": points,
+        }
 
     @property
     def _all_points(self) -> sparse.csr_matrix:
@@ -177,24 +196,6 @@ class Elements:
         excess = excess - uniform.mass * np.eye(len(excess))
         turning = (wheel.rotation.body, wheel.speed) if wheel.speed else ()
         return uniform, ModalDamping(wheel.operators, modes.modes.vectors, excess, *turning)
-
-    def nonlinear(self, step: float) -> tuple[NonlinearTire, float, float]:
-        """The full finite elements with large motions; step; set-up in s."""
-        points, static, wheel = self._all_points, self.run.static, self.wheel
-        began = time.perf_counter()
-        damping, modal = self._damping()
-        tire = NonlinearTire(
-            operators=self.motions.operators,
-            inflation=static.inflation,
-            damping=damping,
-            step=step,
-            outputs=points,
-            loads=points,
-            spectral_radius=RADIUS,
-            modal=modal,
-            turning=(wheel.rotation, static.rolling) if wheel.speed else None,
-        )
-        return tire, step, time.perf_counter() - began
 
 
 class Tires(Elements):

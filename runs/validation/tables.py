@@ -9,7 +9,9 @@ import json
 import pkgutil
 import tempfile
 import time
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 
@@ -67,14 +69,38 @@ def run_all(package: str, names: list[str], out: Path | None, large: bool = Fals
     for name in names:
         if name not in known:
             raise InputError(f"{name!r} is none of: {', '.join(known)}")
+    measurements = {
+        name: (known[name].ABOUT, partial(_measured, known[name], out, large))
+        for name in names or known
+    }
+    _all_measured(measurements, out)
+
+
+def run_scenes(scenes: list[Path], out: Path | None) -> None:
+    """Run scenes against full finite elements in time, show their tables, and save them as `run_all` does."""
+    from tireroad.runs.validation.own_scene import against_elements
+
+    about = "forces of a scene against full finite elements of the same mesh, in time"
+    _all_measured({str(scene): (about, partial(against_elements, scene)) for scene in scenes}, out)
+
+
+def _all_measured(
+    measurements: Mapping[str, tuple[str, Callable[[], list[Table]]]], out: Path | None
+) -> None:
+    """Show the tables of each measurement, (what it is about, its function) by name; save them after each."""
     if out is not None:
         _check(out)
     results: dict[str, list[Table]] = {}
     try:
-        for name in names or known:
-            results[name] = _measured(known[name], name, out, large)
+        for name, (about, measure) in measurements.items():
+            console.say(f"{name}: {about}")
+            began = time.perf_counter()
+            results[name] = measure()
+            for table in results[name]:
+                show(table)
+            console.say(f"{name}: {time.perf_counter() - began:.1f} s\n")
             if out is not None:
-                _keep(results, {name: known[name].ABOUT for name in results}, out)
+                _keep(results, {name: measurements[name][0] for name in results}, out)
     except Stopped as stop:
         stop.kept = _left(results, out)
         raise
@@ -83,25 +109,6 @@ def run_all(package: str, names: list[str], out: Path | None, large: bool = Fals
     failed = [line for tables in results.values() for table in tables for line in table.failed]
     if failed:
         raise ConvergenceError(f"not measured: {'; '.join(failed)}")
-
-
-def run_scenes(scenes: list[Path], out: Path | None) -> None:
-    """Run scenes against full finite elements in time, show their tables, and save them as `run_all` does."""
-    from tireroad.runs.validation.own_scene import against_elements
-
-    if out is not None:
-        _check(out)
-    results, about = {}, {}
-    for scene in scenes:
-        name = str(scene)
-        about[name] = "forces of a scene against full finite elements of the same mesh, in time"
-        results[name] = against_elements(scene)
-        for table in results[name]:
-            show(table)
-        if out is not None:
-            _keep(results, about, out)
-    if out is not None:
-        console.say(f"{out} and {out.with_suffix('.html')}")
 
 
 def _check(out: Path) -> None:
@@ -133,19 +140,10 @@ def _left(results: dict[str, list[Table]], out: Path | None) -> str:
     return f"kept are {finished}; name those that remain, with another --out"
 
 
-def _measured(module: ModuleType, name: str, out: Path | None, large: bool) -> list[Table]:
-    """Run a module and show its tables."""
-    console.say(f"{name}: {module.ABOUT}")
-    began = time.perf_counter()
-    tables = module.run_large() if large else _run(module, out)
-    for table in tables:
-        show(table)
-    console.say(f"{name}: {time.perf_counter() - began:.1f} s\n")
-    return tables
-
-
-def _run(module: ModuleType, out: Path | None) -> list[Table]:
-    """Run a module; one that can resume gets a folder beside `out` for its results so far."""
+def _measured(module: ModuleType, out: Path | None, large: bool) -> list[Table]:
+    """The tables of a module; one that can resume gets a folder beside `out` for its results so far."""
+    if large:
+        return module.run_large()
     if out is not None and "kept" in inspect.signature(module.run).parameters:
         return module.run(kept=out.with_suffix(".kept"))
     return module.run()
