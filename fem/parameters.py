@@ -267,12 +267,20 @@ def text(default: str | None, doc: str, *, only_for: OnlyFor = None) -> Any:
     return parameter(key, default)
 
 
-def numbers(doc: str, unit: str, limits: Limits, default: tuple[float, ...] | None = ()) -> Any:
-    """A list of finite numbers of any length, each within the limits. A default of None makes it optional."""
+def numbers(
+    doc: str,
+    unit: str,
+    limits: Limits,
+    default: tuple[float, ...] | None = (),
+    *,
+    size: int | None = None,
+) -> Any:
+    """A list of finite numbers, each within the limits, of any length or `size`. A default of None makes it optional."""
+    many = "" if size is None else f"{size} "
 
     def read(value: Any) -> tuple[float, ...]:
-        if not isinstance(value, list | tuple):
-            raise ValueError(f"must be a list of numbers, not {described(value)}")
+        if not isinstance(value, list | tuple) or size not in (None, len(value)):
+            raise ValueError(f"must be a list of {many}numbers, not {described(value)}")
         result = tuple(finite(part) for part in value)
         for part in result:
             limits.check(part, unit)
@@ -282,7 +290,7 @@ def numbers(doc: str, unit: str, limits: Limits, default: tuple[float, ...] | No
         read=read,
         unit=unit,
         doc=doc,
-        values=f"numbers, {limits}",
+        values=f"{many}numbers, {limits}",
         limits=limits,
         optional=default is None,
     )
@@ -355,20 +363,8 @@ def vector(
     absent: bool = False,
 ) -> Any:
     """A list of finite numbers, as many as the default has; `absent`: None is what it has instead."""
-    size = len(default)
     limits = Limits(least=least, most=most)
-
-    def read(value: Any) -> tuple[float, ...]:
-        if not isinstance(value, list | tuple) or len(value) != size:
-            raise ValueError(f"must be a list of {size} numbers, not {described(value)}")
-        result = tuple(finite(part) for part in value)
-        for part in result:
-            limits.check(part, unit)
-        return result
-
-    allowed = f"{size} numbers, {limits}"
-    key = Key(read=read, unit=unit, doc=doc, values=allowed, limits=limits, optional=absent)
-    return parameter(key, None if absent else default)
+    return numbers(doc, unit, limits, None if absent else default, size=len(default))
 
 
 T = TypeVar("T", bound=Parameters)

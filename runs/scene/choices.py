@@ -69,19 +69,15 @@ def air(scene: Scene, given: Given) -> Scene:
 
 def friction(scene: Scene, given: Given) -> Scene:
     """The friction of a dry road where the tread shears, unless the static state has its own."""
-    if scene.contact is None or scene.static.friction is not None:
+    assert scene.contact is not None
+    if scene.static.friction is not None:
         return scene
     return replace(scene, contact=scene.contact.by_default())
 
 
 def by_band(scene: Scene, given: Given) -> Scene:
-    """Choose by accuracy.up_to, where a scene gives it, what it leaves open: mesh, modes, step.
-
-    A search chooses for itself. Points follow later (points).
-    """
+    """Choose by accuracy.up_to what a scene leaves open: mesh, modes, step. Points follow later (points)."""
     tables = {name: given.keys(name) for name in ("modal", "rotation", "time", "tire")}
-    if not _by_band(scene, given):
-        return scene
     top, chosen = BAND_EDGE * scene.accuracy.up_to, []
     if not {"count", "up_to"} & set(tables["modal"]):
         highest = 10.0 * math.ceil(top / USABLE / 10)
@@ -111,8 +107,8 @@ def by_band(scene: Scene, given: Given) -> Scene:
     return scene
 
 
-def _by_band(scene: Scene, given: Given) -> bool:
-    """Whether accuracy.up_to chooses what the scene leaves open."""
+def has_band(scene: Scene, given: Given) -> bool:
+    """Whether accuracy.up_to chooses what the scene leaves open; a search chooses for itself."""
     method = scene.rotation.method if scene.rotation else "projected"
     stated = "up_to" in given.keys("accuracy") and method == "projected"
     return scene.in_contact and stated and not scene.accuracy.searches
@@ -129,9 +125,9 @@ def points(scene: Scene, given: Given) -> Scene:
     `contact.points = "auto"` else (contact.patch).
     """
     contact, rotation = scene.contact, scene.rotation
-    if not _by_band(scene, given) or "points" in given.keys("contact"):
+    if "points" in given.keys("contact") or contact is None or contact.on_nodes:
         return scene
-    if contact is None or contact.on_nodes or rotation is None or not rotation.speed:
+    if rotation is None or not rotation.speed:
         return scene
     speed = rotation.speed * scene.tire.proportions().outer_radius
     wave = speed / scene.accuracy.up_to
@@ -169,8 +165,9 @@ def _unheard(wanted: float, speed: float, scene: Scene) -> float:
 def tread_rubber(scene: Scene, given: Given) -> Scene:
     """Rubber of the contact of a radial tire where the scene leaves it open: as much stiffer as its tread."""
     contact = scene.contact
+    assert contact is not None
     stiffer = scene.tire.shape.tread_over_own(scene.tire, scene.temperature)
-    if contact is None or stiffer is None or "youngs_modulus" in given.keys("contact"):
+    if stiffer is None or "youngs_modulus" in given.keys("contact"):
         return scene
     if not isinstance(contact.law, ElasticTread):
         return scene
@@ -198,7 +195,8 @@ def warmth(scene: Scene, given: Given) -> Scene:
 def wheel_speed(scene: Scene, given: Given) -> Scene:
     """Set the wheel's speed for a travel speed until the static state gives its rolling radius."""
     rotation = scene.rotation
-    if rotation is None or rotation.travel_speed is None:
+    assert rotation is not None
+    if rotation.travel_speed is None:
         return scene
     speed = rotation.travel_speed / (
         rotation.rolling_radius or scene.tire.proportions().outer_radius
@@ -208,13 +206,14 @@ def wheel_speed(scene: Scene, given: Given) -> Scene:
 
 def damping(scene: Scene, given: Given) -> Scene:
     """Set the default proportional damping if neither it nor a compound's loss factor is given."""
-    loses = scene.tire.shape.has_losses(scene.tire)
-    return replace(scene, damping=DampingTable()) if scene.damping is None and not loses else scene
+    if scene.damping is not None or scene.tire.shape.has_losses(scene.tire):
+        return scene
+    return replace(scene, damping=DampingTable())
 
 
 def flat_road(scene: Scene, given: Given) -> Scene:
     """Set a flat road where there is contact with none given."""
-    if scene.contact is None or scene.road is not None:
+    if scene.road is not None:
         return scene
     given.say("no [road]: it is flat")
     return replace(scene, road=RoadTable())
@@ -244,7 +243,8 @@ def count_of_modes(scene: Scene, given: Given) -> Scene:
     A given number is judged only if the modes will be computed.
     """
     modal = scene.modal
-    if modal is None or modal.up_to is not None:
+    assert modal is not None
+    if modal.up_to is not None:
         return scene
     count, free = modal.count, scene.tire.free_unknowns()
     if count < free:
@@ -261,32 +261,37 @@ def count_of_modes(scene: Scene, given: Given) -> Scene:
 
 
 class Choice(NamedTuple):
-    """A choice, left out where one of the tables it is made `by` is wrong."""
+    """A choice for scenes that have the table `of` and for which `where` holds; left out where a table it is made `by` is wrong."""
 
     make: Callable[[Scene, Given], Scene]
     by: frozenset[str] = frozenset()
+    of: str = "tire"
+    where: Callable[[Scene, Given], bool] | None = None
 
 
 CHOICES = (
     Choice(air),
-    Choice(friction),
-    Choice(by_band),
+    Choice(friction, of="contact"),
+    Choice(by_band, where=has_band),
     Choice(mesh),
     Choice(damping, TIRE),
     Choice(warmth),
-    Choice(tread_rubber, TIRE),
-    Choice(wheel_speed, TIRE),
-    Choice(points, TIRE),
-    Choice(flat_road),
+    Choice(tread_rubber, TIRE, of="contact"),
+    Choice(wheel_speed, TIRE, of="rotation"),
+    Choice(points, TIRE, where=has_band),
+    Choice(flat_road, of="contact"),
     Choice(outputs),
     Choice(lambda scene, given: with_modal(scene, given.until)),
-    Choice(count_of_modes, MODES),
+    Choice(count_of_modes, MODES, of="modal"),
 )
 
 
 def chosen(scene: Scene, given: Given) -> Scene:
     """The scene with everything chosen that it leaves open."""
     for choice in CHOICES:
-        if not choice.by & given.source.broken():
+        concerned = getattr(scene, choice.of) is not None and (
+            choice.where is None or choice.where(scene, given)
+        )
+        if concerned and not choice.by & given.source.broken():
             scene = choice.make(scene, given)
     return scene

@@ -141,12 +141,11 @@ def drop_unused(
 
 def _selected(of: type, raw: dict[str, Any]) -> Iterator[tuple[str, str, list[str]]]:
     """(selecting key, its value, keys of a table that this value does not use)."""
-    defaults = {item.name: item.default for item in fields(of)}
     unused: dict[str, list[str]] = {}
     for item in fields_of(of):
         part, key = variant_of(item), key_of(item)
         if part is not None:
-            kind = raw.get(part.selector, defaults[part.selector])
+            kind = raw.get(part.selector, getattr(of, part.selector))
             if isinstance(kind, str) and kind in part.registry:
                 law = part.registry[kind]
                 own = {*names(of), *names(law)}
@@ -154,10 +153,10 @@ def _selected(of: type, raw: dict[str, Any]) -> Iterator[tuple[str, str, list[st
                 yield part.selector, kind, [*others, *getattr(law, "without", ())]
         elif key is not None and key.only_for is not None:
             selector, kinds = key.only_for
-            if raw.get(selector, defaults[selector]) not in kinds:
+            if raw.get(selector, getattr(of, selector)) not in kinds:
                 unused.setdefault(selector, []).append(item.name)
     for selector, lost in unused.items():
-        yield selector, raw.get(selector, defaults[selector]), lost
+        yield selector, raw.get(selector, getattr(of, selector)), lost
 
 
 def _given(path: Path_, changed: Set[Path_]) -> bool:
@@ -219,7 +218,8 @@ def load(
     unread = frozenset() if meets_road(until) else frozenset({("road", "file")})
     source = Source(path, text, changed, unread=unread)
     raw.setdefault("name", scene_name(path.stem))
-    drop_unused(Scene, raw, changed, say)
+    if changed:
+        drop_unused(Scene, raw, changed, say)
     by_section(raw)
     scene = _table(Scene, raw, (), source)
     if not NAME.fullmatch(scene.name):
@@ -283,7 +283,7 @@ def _without_checks(of: type, values: dict[str, Any]) -> Any:
 def _kind(of: type, item: Field, values: dict[str, Any]) -> type:
     """The class selected by a key of the table; the default class if the name is invalid."""
     part = variant_of(item)
-    default: Any = next(f.default for f in fields(of) if f.name == part.selector)
+    default = getattr(of, part.selector)
     selected = values.get(part.selector, default)
     return part.registry[default if selected is _WRONG else selected]
 
@@ -385,8 +385,7 @@ def _unknown(of: type, path: tuple[str, ...], name: str, values: dict, source: S
     other = owners(of, name)
     if other is not None:
         selector, kinds = other
-        default = next(f.default for f in fields(of) if f.name == selector)
-        this = values.get(selector, default)
+        this = values.get(selector, getattr(of, selector))
         if this is not _WRONG and this not in kinds:
             _of_another_kind((*path, name), selector, kinds, this, source)
         return

@@ -7,16 +7,14 @@ the key reference and the range tests derive from it: a class without parameters
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, ClassVar
 
 import numpy as np
 
-from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Parameters, Registry
+from tireroad.runs.scene.schema import Where
 
 Curves = dict[str, tuple[np.ndarray, str]]
-Where = Callable[[tuple[str, ...], str], InputError]
 
 MOST_FREQUENCIES = 1_000_000
 

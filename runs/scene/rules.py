@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any, NamedTuple
 
 from tireroad.contact.roads.grid import Grid
 from tireroad.contact.roads.kinds.shapes import Edges
@@ -13,11 +13,17 @@ from tireroad.contact.roads.under_tire import Road, begun_at, is_level, moved_st
 from tireroad.fem.errors import InputError
 from tireroad.greens.residuals import names, residual_of
 from tireroad.runs.scene.outputs import Output, check_steps
-from tireroad.runs.scene.schema import Source
-from tireroad.runs.scene.tables.contact import check_tread
+from tireroad.runs.scene.schema import Source, Where
+from tireroad.runs.scene.tables.contact import ContactTable, PatternTable, TimeTable, check_tread
 from tireroad.runs.scene.tables.scene import (
+    ModalTable,
+    OutputTable,
+    PointForceTable,
     RoadTable,
+    RotationTable,
     Scene,
+    SoundTable,
+    StaticTable,
     check_accuracy,
     check_axle,
     check_motion,
@@ -25,6 +31,7 @@ from tireroad.runs.scene.tables.scene import (
     confined,
     has_air,
 )
+from tireroad.runs.scene.tables.tire import Raw, TireTable
 
 # Least ratio of a pressed tire's effective rolling radius to its outer radius, and farthest reach
 # of the patch ahead of the axle, m: only what a run would certainly refuse is refused here.
@@ -32,7 +39,6 @@ LEAST_RADIUS = 0.85
 AHEAD = 0.5
 # Half the width of road, and length, that `check` looks at for relief, m.
 BESIDE, LOOKED = 0.5, 20.0
-Where = Callable[[tuple[str, ...], str], InputError]
 
 
 # Least ratio of an inside drum's radius to the tire's outer radius that leaves room to press it.
@@ -41,11 +47,11 @@ _MADE: dict[tuple, Road] = {}  # only the last road
 MOST_SPEEDS = 10_000
 
 
-def check_shape(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+def check_shape(tire: TireTable, scene: Scene, raw: Raw, error: Where) -> None:
     """Raise an error for a drum too small for the tire, or held modes without a level plane."""
     road, camber = scene.road, scene.static.camber
     drum = road.drum_radius if road else None
-    outer = scene.tire.proportions().outer_radius
+    outer = tire.proportions().outer_radius
     if drum is not None and road.drum == "inside" and drum < _ROOM * outer:
         raise error(
             ("road", "drum_radius"),
@@ -191,9 +197,9 @@ def least_travel(scene: Scene) -> float:
     return travel if math.isfinite(travel) else 0.0
 
 
-def full_matrices(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+def full_matrices(rotation: RotationTable, scene: Scene, raw: Raw, error: Where) -> None:
     """Raise an error for states of the full matrices without [damping] or with moduli that vary."""
-    if scene.rotation is None or scene.rotation.method != "full":
+    if rotation.method != "full":
         return
     if scene.damping is None:
         advice = "needs a full damping matrix, which loss factors do not give: add [damping]"
@@ -203,9 +209,11 @@ def full_matrices(scene: Scene, raw: dict[str, Any], error: Where) -> None:
         raise error(("rotation", "method"), f'= "full" {advice}')
 
 
-def check_outputs(scene: Scene, raw: dict[str, Any], error: Where) -> Iterator[InputError]:
+def check_outputs(
+    output: OutputTable, scene: Scene, raw: Raw, error: Where
+) -> Iterator[InputError]:
     """The error of each kind of output at the driven points, checked against the scene."""
-    for name, kind in scene.output.kinds:
+    for name, kind in output.kinds:
         try:
             _check_kind(scene, kind, ("output", name), error)
         except InputError as found:
@@ -220,17 +228,19 @@ def _check_kind(scene: Scene, kind: Output, path: tuple[str, ...], error: Where)
     kind.check(scene, path, error)
 
 
-def check_campbell(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+def check_campbell(rotation: RotationTable, scene: Scene, raw: Raw, error: Where) -> None:
     """Check that the Campbell diagram has at least one speed and not too many."""
-    campbell = scene.rotation.campbell if scene.rotation else None
+    campbell = rotation.campbell
     if campbell is not None:
         path = "rotation", "campbell", "step"
         check_steps(path, "speeds", campbell.to, campbell.step, "rad/s", error, most=MOST_SPEEDS)
 
 
-def check_vibration(scene: Scene, raw: dict[str, Any], error: Where) -> Iterator[InputError]:
+def check_vibration(
+    output: OutputTable, scene: Scene, raw: Raw, error: Where
+) -> Iterator[InputError]:
     """Check what the motion of the whole tire needs, in frequency and in time."""
-    output, rotation = scene.output, scene.rotation
+    rotation = scene.rotation
     full = rotation is not None and rotation.speed and rotation.method == "full"
     for key in ("vibration", "fields"):
         path = "output", key
@@ -246,14 +256,12 @@ def check_vibration(scene: Scene, raw: dict[str, Any], error: Where) -> Iterator
         )
 
 
-def check_sound(scene: Scene, raw: dict[str, Any], error: Where) -> Iterator[InputError]:
+def check_sound(sound: SoundTable, scene: Scene, raw: Raw, error: Where) -> Iterator[InputError]:
     """Check that there is a plane road, and vibrations seen through the modes."""
-    if scene.sound is None:
-        return
     rotation = scene.rotation
     if not scene.static.on_road:
         yield error(("sound", "microphones"), "are over the road: give [static] a load (N)")
-    if scene.sound.wheel == "open" and scene.sound.wheel_depth:
+    if sound.wheel == "open" and sound.wheel_depth:
         yield error(
             ("sound", "wheel_depth"), 'is that of discs, which wheel = "open" does not have'
         )
@@ -265,35 +273,33 @@ def check_sound(scene: Scene, raw: dict[str, Any], error: Where) -> Iterator[Inp
         yield error(("output", "spectra"), "find the run-in and the limit of [sound]: take them in")
 
 
-def check(scene: Scene, raw: dict[str, Any], source: Source) -> None:
+def check(scene: Scene, raw: Raw, source: Source) -> None:
     """Note contradictions between keys or tables.
 
     A rule is skipped if a table that it reads has a problem: what it found might be a consequence.
     It yields errors that do not depend on each other, and raises one that ends it.
     """
     broken = source.broken()
-    for tables, rule in RULES:
-        if broken & set(tables):
+    for rule in RULES:
+        table = getattr(scene, rule.of)
+        if not table or broken & {rule.of, *rule.reads}:
             continue
         try:
-            for error in rule(scene, raw, source.error) or ():
+            for error in rule.check(table, scene, raw, source.error) or ():
                 source.problems.append(((), str(error)))
         except InputError as error:
             source.problems.append(((), str(error)))
 
 
-def _static(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+def _static(static: StaticTable, scene: Scene, raw: Raw, error: Where) -> None:
     given = [key for key in ("load", "deflection", "road_height") if key in raw.get("static", {})]
     if len(given) > 1:
         raise error(("static", given[1]), f"and {given[0]} place the road twice: keep one of them")
 
 
-def _rotation(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    rotation = scene.rotation
-    if rotation is None:
-        return
-    given = raw.get("rotation", {}).get("speed")
-    if rotation.travel_speed is not None and given not in (None, rotation.speed):
+def _rotation(rotation: RotationTable, scene: Scene, raw: Raw, error: Where) -> None:
+    speed = raw.get("rotation", {}).get("speed")
+    if rotation.travel_speed is not None and speed not in (None, rotation.speed):
         raise error(
             ("rotation", "travel_speed"), "and speed give the wheel's speed twice: keep one of them"
         )
@@ -308,8 +314,8 @@ def _rotation(scene: Scene, raw: dict[str, Any], error: Where) -> None:
         )
 
 
-def _modal(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    modal, static, rotation = scene.modes, scene.static, scene.rotation
+def _modes(modal: ModalTable, scene: Scene, raw: Raw, error: Where) -> None:
+    static, rotation = scene.static, scene.rotation
     if modal.road == "held" and not static.on_road:
         raise error(("modal", "road"), '= "held" needs a road: add load (N) to [static]')
     for key, why in barred_from_contact(modal.rim, modal.road) if scene.in_contact else ():
@@ -351,8 +357,10 @@ def barred_from_contact(rim: str, road: str) -> Iterator[tuple[str, str]]:
         yield "rim", '= "free" leaves nothing to carry the load: [contact] needs "fixed"'
 
 
-def _force(scene: Scene, raw: dict[str, Any], error: Where) -> Iterator[InputError]:
-    for number, force in enumerate(scene.force):
+def _force(
+    forces: Sequence[PointForceTable], scene: Scene, raw: Raw, error: Where
+) -> Iterator[InputError]:
+    for number, force in enumerate(forces):
         if not any(force.direction):
             yield error(("force", str(number), "direction"), "must not be all zeros")
         bead = scene.tire.proportions().half_angle
@@ -369,9 +377,9 @@ def _force(scene: Scene, raw: dict[str, Any], error: Where) -> Iterator[InputErr
             )
 
 
-def _greens(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    rotation, residual = scene.rotation, scene.greens.residual
-    full = rotation is not None and rotation.speed > 0 and rotation.method == "full"
+def _states(rotation: RotationTable, scene: Scene, raw: Raw, error: Where) -> None:
+    residual = scene.greens.residual
+    full = rotation.speed > 0 and rotation.method == "full"
     if full and residual_of(residual).joins:
         raise error(
             ("greens", "residual"),
@@ -379,20 +387,17 @@ def _greens(scene: Scene, raw: dict[str, Any], error: Where) -> None:
         )
 
 
-def _contact(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    contact, static = scene.contact, scene.static
-    if contact is None:
-        return
+def _contact(contact: ContactTable, scene: Scene, raw: Raw, error: Where) -> None:
+    static, rotation = scene.static, scene.rotation
     if static.friction is not None and contact.has_friction:
         raise error(
             ("static", "friction"),
             "and contact.friction or the bristles of contact.brush_stiffness carry the same horizontal forces: keep one of "
             "them",
         )
-    standing = scene.rotation is None or scene.rotation.speed == 0
+    standing = rotation is None or rotation.speed == 0
     has_friction = static.friction is not None
     check_tread(contact, standing, error, has_friction)
-    rotation = scene.rotation
     if rotation is not None and rotation.free_rolling and contact.friction == 0:
         raise error(
             ("rotation", "free_rolling"),
@@ -410,9 +415,8 @@ def _contact(scene: Scene, raw: dict[str, Any], error: Where) -> None:
             )
 
 
-def _time(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    time = scene.time
-    if time is None or isinstance(time.step, str):
+def _time(time: TimeTable, scene: Scene, raw: Raw, error: Where) -> None:
+    if isinstance(time.step, str):
         return
     if time.step > time.duration:
         raise error(
@@ -426,11 +430,8 @@ def _time(scene: Scene, raw: dict[str, Any], error: Where) -> None:
         )
 
 
-def check_pattern(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+def check_pattern(pattern: PatternTable, scene: Scene, raw: Raw, error: Where) -> None:
     """Raise an error for an invalid pattern, or for one without a grid that resolves it."""
-    pattern = scene.pattern
-    if pattern is None:
-        return
     if scene.contact is None or scene.contact.on_nodes:
         raise error(
             ("pattern",), "needs [contact] on a grid that sees it: contact.points = { dx, dy } (m)"
@@ -444,7 +445,7 @@ def check_pattern(scene: Scene, raw: dict[str, Any], error: Where) -> None:
             raise error(("pattern", "groove", str(number_), "span"), "must ascend")
 
 
-def check_cavity(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+def check_cavity(tire: TireTable, scene: Scene, raw: Raw, error: Where) -> None:
     """Raise an error for what is not available with air."""
     if not has_air(scene):
         return
@@ -463,41 +464,44 @@ def check_cavity(scene: Scene, raw: dict[str, Any], error: Where) -> None:
         )
 
 
-RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
-    (("static",), _static),
-    (("rotation",), _rotation),
-    (("modal", "static", "rotation", "contact", "time", "damping", "greens"), _modal),
-    (("damping", "rotation", "output", "tire"), full_matrices),
-    (("contact", "static", "rotation"), _contact),
-    (
-        ("output", "force", "modal", "axle", "tire", "damping", "contact", "time", "static"),
+class Rule(NamedTuple):
+    """A rule for the table `of` of a scene, where that has one; `reads`: the other tables that it looks at."""
+
+    check: Callable[[Any, Scene, Raw, Where], Iterable[InputError] | None]
+    of: str
+    reads: tuple[str, ...] = ()
+
+
+RULES = (
+    Rule(_static, "static"),
+    Rule(_rotation, "rotation"),
+    Rule(
+        _modes,
+        "modes",
+        ("modal", "static", "rotation", "contact", "time", "damping", "greens"),
+    ),
+    Rule(full_matrices, "rotation", ("damping", "output", "tire")),
+    Rule(_contact, "contact", ("static", "rotation")),
+    Rule(
         check_outputs,
+        "output",
+        ("force", "modal", "axle", "tire", "damping", "contact", "time", "static"),
     ),
-    (("rotation",), check_campbell),
-    (("force", "output", "contact", "time", "tire"), _force),
-    (("greens", "rotation"), _greens),
-    (("stiffness", "static"), check_stiffness),
-    (("tire", "rotation", "modal", "greens"), check_cavity),
-    (("pattern", "contact"), check_pattern),
-    (("axle", "modal", "rotation", "greens", "output", "static"), check_axle),
-    (("output", "time", "contact", "static", "force", "rotation"), check_vibration),
-    (("sound", "road", "rotation", "static", "output", "contact", "time"), check_sound),
-    (("static", "road", "modal", "tire"), check_shape),
-    (("time",), _time),
-    (
-        (
-            "motion",
-            "greens",
-            "rotation",
-            "time",
-            "road",
-            "static",
-            "accuracy",
-            "sound",
-            "output",
-            "contact",
-        ),
+    Rule(check_campbell, "rotation"),
+    Rule(_force, "force", ("output", "contact", "time", "tire")),
+    Rule(_states, "rotation", ("greens",)),
+    Rule(check_stiffness, "stiffness", ("static",)),
+    Rule(check_cavity, "tire", ("rotation", "modal", "greens")),
+    Rule(check_pattern, "pattern", ("contact",)),
+    Rule(check_axle, "axle", ("modal", "rotation", "greens", "output", "static")),
+    Rule(check_vibration, "output", ("time", "contact", "static", "force", "rotation")),
+    Rule(check_sound, "sound", ("road", "rotation", "static", "output", "contact", "time")),
+    Rule(check_shape, "tire", ("static", "road", "modal")),
+    Rule(_time, "time"),
+    Rule(
         check_motion,
+        "motion",
+        ("greens", "rotation", "time", "road", "static", "accuracy", "sound", "output", "contact"),
     ),
-    (("accuracy", "contact", "road", "time", "static", "output", "force"), check_accuracy),
+    Rule(check_accuracy, "accuracy", ("contact", "road", "time", "static", "output", "force")),
 )

@@ -15,7 +15,7 @@ A `Source` holds the origin of a scene's values, the line of each, and collects 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import Field, dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypeVar
@@ -41,6 +41,7 @@ from tireroad.fem.parameters import (
 HEADER = re.compile(r"^\s*(\[\[?)\s*([^\[\]]+?)\s*\]\]?\s*(?:#.*)?$")
 ASSIGNMENT = re.compile(r"""^\s*((?:[A-Za-z0-9_-]+|"[^"]*"|'[^']*')(?:\s*\.\s*[^\s=.]+)*)\s*=""")
 Path_ = tuple[str, ...]
+Where = Callable[[Path_, str], InputError]  # the error of a key, with its place in the file
 _SHOWN = 30
 P = TypeVar("P", bound=Parameters)
 

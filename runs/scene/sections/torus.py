@@ -177,10 +177,14 @@ class TorusSection(SectionKind):
         return torus.ring(patches, plies)
 
     def free_unknowns(self, tire: TireTable) -> int:
-        torus, patches, plies = self._drawn(tire)
-        wall, arc = torus.lines(patches, plies)
-        layers, along = tire.order * (len(wall) - 1) + 1, tire.order * (len(arc) - 1) - 1
-        return 3 * tire.segments * tire.order * layers * along
+        through, along = self.elements_thickness, self.elements_arc
+        if tire.region or tire.cords:  # elements end at their edges, which may take more
+            torus, patches, plies = self._drawn(tire)
+            through, along = (len(line) - 1 for line in torus.lines(patches, plies))
+        nodes = (tire.order * through + 1) * (
+            tire.order * along - 1
+        )  # of a section, not on its rim
+        return 3 * tire.segments * tire.order * nodes
 
     def meshes(self, tire: TireTable) -> tuple[tuple[int, int], ...]:
         return FINER

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from tireroad.contact.tread.law import TREADS, TreadLaw
-from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Limits, filename, flag, numbers
 from tireroad.runs.scene.schema import (
     Pitch,
     Variants,
+    Where,
     choice,
     integer,
     number,
@@ -21,7 +20,6 @@ from tireroad.runs.scene.schema import (
     vector,
 )
 
-Where = Callable[[tuple[str, ...], str], InputError]
 DRY_ASPHALT = 1.0  # coefficient of friction of a passenger tire
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +20,7 @@ from tireroad.runs.scene.outputs import OUTPUTS, Output
 from tireroad.runs.scene.schema import (
     Collects,
     Variants,
+    Where,
     choice,
     collection,
     flag,
@@ -33,9 +34,8 @@ from tireroad.runs.scene.schema import (
 )
 from tireroad.runs.scene.tables.contact import ContactTable, PatternTable, TimeTable
 from tireroad.runs.scene.tables.sound import HEARD, SoundTable
-from tireroad.runs.scene.tables.tire import TireTable
+from tireroad.runs.scene.tables.tire import Raw, TireTable
 
-Where = Callable[[tuple[str, ...], str], InputError]
 Springs = tuple[float, ...] | tuple[tuple[float, ...], ...]
 _SPRINGS = Limits(least=-1e15, most=1e15)  # N/m, N m/rad and per unit of velocity
 _HELD = tuple(name for name in DIRECTIONS if name != "z")
@@ -251,9 +251,8 @@ def axle_of(scene: Scene) -> Axle | None:
     )
 
 
-def check_axle(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+def check_axle(given: AxleTable, scene: Scene, raw: Raw, error: Where) -> None:
     """Raise an error for an unstable corner, and for settings incompatible with a moving wheel."""
-    given = scene.axle
     if given.kind == "fixed":
         return
     try:
@@ -384,9 +383,8 @@ class AccuracyTable:
         return self.aimed and self.search
 
 
-def check_accuracy(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+def check_accuracy(accuracy: AccuracyTable, scene: Scene, raw: Raw, error: Where) -> None:
     """Check what a target requires of the other tables."""
-    accuracy = scene.accuracy
     if not accuracy.aimed:
         return
     key = ("accuracy", "target" if accuracy.target is not None else "target_db")
@@ -492,12 +490,9 @@ def deflections(wanted: StiffnessTable, own: float | None) -> list[float]:
     return (last * np.arange(1, wanted.steps + 1) / wanted.steps).tolist()
 
 
-def check_stiffness(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+def check_stiffness(stiffness: StiffnessTable, scene: Scene, raw: Raw, error: Where) -> None:
     """Raise an error if there is nothing to derive the deflections from."""
-    stiffness, static = scene.stiffness, scene.static
-    if stiffness is None or stiffness.deflections or stiffness.up_to:
-        return
-    if not static.on_road:
+    if not (stiffness.deflections or stiffness.up_to or scene.static.on_road):
         raise error(
             ("stiffness", "up_to"),
             "is needed where the scene has no road: give it (m), or load (N) in [static]",
@@ -824,9 +819,9 @@ def confined(scene: Scene) -> Iterator[tuple[tuple[str, ...], str]]:
             )
 
 
-def check_motion(scene: Scene, raw: dict[str, Any], error: Where) -> Iterator[InputError]:
+def check_motion(motion: MotionTable, scene: Scene, raw: Raw, error: Where) -> Iterator[InputError]:
     """Refuse what large motions do not have, where the scene asks for them."""
-    if scene.motion.kind != "large":
+    if motion.kind != "large":
         return
     for path, reason in confined(scene):
         yield error(path, reason)

@@ -50,7 +50,6 @@ if TYPE_CHECKING:
 # Elements around in the meshes of a search, unless a kind has its own.
 AROUND = (16, 20, 24, 30, 36, 44, 52, 64, 78, 96, 120)
 Raw = dict[str, Any]
-Where = Callable[[tuple[str, ...], str], InputError]
 NEAR_ROAD = 0.2  # footprint_size with a road
 # Of a torus: arc (deg) and depth of a region that has none, and place of a line of cords.
 AROUND_CROWN, WHOLE_WALL = (0.0, 45.0), (0.0, 1.0)
