@@ -67,13 +67,13 @@ def make_grid_patch(
     ]
     shape = len(lines[0]), len(lines[1])
     x, y = (a.ravel() for a in np.meshgrid(*lines, indexing="ij"))
-    ring, arc, found = surface.locate(x, y)
+    ring, arc, inside = surface.locate(x, y)
     height = surface.at(ring, arc)[:, 2]
-    near = found & (height - road_height <= reach)
+    near = inside & (height - road_height <= reach)
     wide = np.pad(near.reshape(shape), 1)
-    taken = wide[2:, 1:-1] | wide[:-2, 1:-1] | wide[1:-1, 2:] | wide[1:-1, :-2]
-    taken = (taken.ravel() | near) & found
-    place = np.flatnonzero(taken)
+    touching = wide[2:, 1:-1] | wide[:-2, 1:-1] | wide[1:-1, 2:] | wide[1:-1, :-2]
+    touching = (touching.ravel() | near) & inside
+    place = np.flatnonzero(touching)
     if len(place) == 0:
         raise UnsuitedSettings("contact.points: no grid point near the road; take a finer grid")
     weights = over_cells(
@@ -110,8 +110,8 @@ def over_cells(
     parts = []
     for signs in product((-1, 1), repeat=2):
         x, y = (points + np.array(signs) * spacing / np.sqrt(12)).T
-        around, along, found = surface.locate(x, y)
-        parts.append(surface.weights(np.where(found, around, ring), np.where(found, along, arc)))
+        around, along, inside = surface.locate(x, y)
+        parts.append(surface.weights(np.where(inside, around, ring), np.where(inside, along, arc)))
     return sum(parts[1:], start=parts[0]) / 4
 
 
@@ -168,9 +168,9 @@ def spread_pull(patch: Patch, pull: np.ndarray, force: np.ndarray) -> np.ndarray
     ratio = pull / np.where(force > 0, force, 1.0)[:, None]
     near = patch.at_points(touching)
     share = patch.at_points(ratio * touching[:, None]) / np.maximum(near, 1e-12)[:, None]
-    found = patch.force[:, None] * share
+    pulls = patch.force[:, None] * share
     whole = float(patch.force.sum()) or 1.0  # none where the tire is clear of the road
-    return found + (pull.sum(axis=0) - found.sum(axis=0)) * (patch.force / whole)[:, None]
+    return pulls + (pull.sum(axis=0) - pulls.sum(axis=0)) * (patch.force / whole)[:, None]
 
 
 def _bracket(excess: Callable[[float], float], step: float) -> tuple[float, float]:
@@ -252,10 +252,10 @@ def halved(patch: Patch, surface: DeformedTread, road_height: float, reach: floa
     steps = np.array(list(product((-1, 0, 1), repeat=2)))
     number = np.unique((number[:, None] + steps).reshape(-1, 2).clip(first, last), axis=0)
     x, y = (number * (along, across)).T
-    ring, arc, found = surface.locate(x, y)
+    ring, arc, inside = surface.locate(x, y)
     weights = over_cells(surface, np.stack([x, y], axis=-1), (along, across), ring, arc)
     weights = weights[:, patch.index].tocsr()
-    held = found & (np.asarray(weights.sum(axis=1)).ravel() > 1 - 1e-9)
+    held = inside & (np.asarray(weights.sum(axis=1)).ravel() > 1 - 1e-9)
     x, y, weights, number = x[held], y[held], weights[held], number[held]
     height = surface.at(ring, arc)[held, 2]
     row, column = (number - first).T

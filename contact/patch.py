@@ -43,12 +43,12 @@ def spacing(footprint: Footprint, nodes: Patch, speed: float, highest: float) ->
     between = math.sqrt(float(nodes.spacing.prod()))
     if not between or not min(footprint.length, footprint.width) > 0:
         return None
-    wanted = min(footprint.length, footprint.width) / ACROSS
+    target = min(footprint.length, footprint.width) / ACROSS
     if speed > 0:
-        wanted = min(wanted, speed / highest / ON_A_WAVE)
-    wanted = max(wanted, between / ON_A_NODE)
-    digit = second_digit(wanted)
-    return round(math.floor(wanted / digit * (1 + 1e-9)) * digit, 9)
+        target = min(target, speed / highest / ON_A_WAVE)
+    target = max(target, between / ON_A_NODE)
+    digit = second_digit(target)
+    return round(math.floor(target / digit * (1 + 1e-9)) * digit, 9)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -271,8 +271,8 @@ def contact_setup(
 
 def nodes_within(face: OuterFace, reach: float) -> Patch:
     """The nodes with a static gap within reach (m), and one more row around them."""
-    given = face.half_sizes, face.normal_force, face.gap, face.shape, reach
-    return make_patch(face.seen, *given)
+    selection = face.half_sizes, face.normal_force, face.gap, face.shape, reach
+    return make_patch(face.seen, *selection)
 
 
 def on_shape(patch: Patch, road: RoadShape) -> Patch:

@@ -85,9 +85,9 @@ class TrainingRoads:
         count = len(self.x) - self._long + 1
         bumpy = np.abs(self.z).max(axis=1) > LEAST
         under = np.array([bumpy[first : first + self._long].any() for first in range(count)])
-        found = np.flatnonzero(under)
-        stride = max(round(APART / PITCH[0]), -(-len(found) // MOST))
-        return PITCH[0] * found[::stride]
+        places = np.flatnonzero(under)
+        stride = max(round(APART / PITCH[0]), -(-len(places) // MOST))
+        return PITCH[0] * places[::stride]
 
     @property
     def _long(self) -> int:

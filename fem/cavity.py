@@ -221,8 +221,8 @@ def modes(
     squares, shape = linalg.eigh(stiffness, mass)
     circular = np.sqrt(np.maximum(squares[1:], 0.0))
     below = 2 * WAVES if up_to is None else int((circular <= 2 * np.pi * up_to).sum())
-    kept = min(max(below, 2), len(circular))
-    circular, shape = circular[:kept], _signed(shape[:, : kept + 1])
+    count = min(max(below, 2), len(circular))
+    circular, shape = circular[:count], _signed(shape[:, : count + 1])
     # Displacement shapes xi_j = P_j' / (w_j ds/dtheta), of unit mass because the potentials are.
     along = slope @ shape[:, 1:] / stretch[:, None] / circular
     rate = _derivative(along)
@@ -327,15 +327,15 @@ class CavityTrace:
         around = 2 * np.pi  # the rim is axisymmetric: it contributes to the mean only
         (r1, y1), (r2, y2) = self._ends
         moments[0] -= around * (y2 - y1) * np.array([(r1**2 + r1 * r2 + r2**2) / 6, (r1 + r2) / 2])
-        found = DuctProfile(*moments.T)
-        volume, area = found.at(np.linspace(0, 2 * np.pi, 8 * self.count))
+        duct = DuctProfile(*moments.T)
+        volume, area = duct.at(np.linspace(0, 2 * np.pi, 8 * self.count))
         if min(volume.min(), area.min()) <= 0:
             raise InputError(
                 f"tire.cavity: the section of the air is {1e4 * area.min():.3g} cm2 at its narrowest: the "
                 "inner face and the rim enclose no ring of air. Check tire.inner, or leave "
                 "[tire.cavity] out."
             )
-        return found
+        return duct
 
     def _scalars(self) -> tuple[float, float]:
         return fem.assemble_scalar(self._volume), fem.assemble_scalar(self._area)
@@ -379,10 +379,10 @@ def rim_cone(end: tuple[float, float], other: tuple[float, float], count: int) -
     turning = weight @ (r * (r * slope + y))
     angle = 2 * np.pi * np.arange(4 * count + 4) / (4 * count + 4)
     chi = waves(count, angle) * (angle[1] - angle[0])
-    zero, one = 0 * angle, 0 * angle + 1
+    zero, unit = 0 * angle, 0 * angle + 1
     radial = np.stack([np.sin(angle), zero, -np.cos(angle)])
     around = np.stack([np.cos(angle), zero, np.sin(angle)])
-    force = -inward * radial + aside * np.stack([zero, one, zero])
+    force = -inward * radial + aside * np.stack([zero, unit, zero])
     return np.vstack([force, turning * around]) @ chi
 
 

@@ -69,7 +69,7 @@ def compiled(comm: Any, make: Callable[[Path], Any]) -> Any:
     folder = _shared_workshop(comm)
     try:
         with _announced(folder):
-            made = make(folder)
+            built = make(folder)
     except (OSError, ImportError, RuntimeError, _cffi_error()) as error:
         raise InputError(
             f"{folder.parent}: finite-element forms cannot be compiled or loaded there ({error});"
@@ -81,7 +81,7 @@ def compiled(comm: Any, make: Callable[[Path], Any]) -> Any:
         raise
     if comm.rank == 0:
         _keep(folder)
-    return made
+    return built
 
 
 def begin(comm: Any, make: Callable[[Path], Any]) -> None:
@@ -184,16 +184,16 @@ def _cffi_error() -> type[Exception]:
 @cache
 def _workshop() -> Path:
     """This process's own folder, with links to all cached forms."""
-    kept = kept_in()
+    target = kept_in()
     try:
-        kept.mkdir(parents=True, exist_ok=True)
-        _sweep(kept)
-        folder = _new_folder(kept)
-        for names in _forms(kept).values():
-            _borrow(kept, folder, names)
+        target.mkdir(parents=True, exist_ok=True)
+        _sweep(target)
+        folder = _new_folder(target)
+        for names in _forms(target).values():
+            _borrow(target, folder, names)
     except OSError as error:
         _LOG.warning(
-            f"compiled forms cannot be kept in {kept} ({error.strerror}) and are compiled anew in"
+            f"compiled forms cannot be kept in {target} ({error.strerror}) and are compiled anew in"
             " every run: name another folder by XDG_CACHE_HOME"
         )
         folder = Path(tempfile.mkdtemp(prefix="tireroad-forms-"))
@@ -213,8 +213,8 @@ def _leave(folder: Path) -> None:
     shutil.rmtree(folder, ignore_errors=True)
 
 
-def _new_folder(kept: Path) -> Path:
-    folder = Path(tempfile.mkdtemp(prefix=folder_prefix(os.getpid()), dir=kept))
+def _new_folder(parent: Path) -> Path:
+    folder = Path(tempfile.mkdtemp(prefix=folder_prefix(os.getpid()), dir=parent))
     _held.append(os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600))
     with suppress(OSError):  # the file system has no locks
         fcntl.flock(_held[-1], fcntl.LOCK_EX)
@@ -277,15 +277,15 @@ def _forms(folder: Path) -> dict[str, list[str]]:
     return forms
 
 
-def _borrow(kept: Path, folder: Path, names: list[str]) -> None:
+def _borrow(source: Path, folder: Path, names: list[str]) -> None:
     """Link a cached form into the folder."""
     for name in names:
         try:
-            os.link(kept / name, folder / name)
+            os.link(source / name, folder / name)
         except FileNotFoundError:
             return  # another process has just removed it: the form will be compiled
         except OSError:
-            os.symlink(kept / name, folder / name)
+            os.symlink(source / name, folder / name)
 
 
 def _keep(folder: Path) -> None:
@@ -330,8 +330,10 @@ def _announce(folder: Path) -> None:
 
 
 @cache
-def _say_once(kept: Path) -> None:
-    _LOG.warning(f"compiling finite-element forms, once for this kind of tire (kept in {kept}) ...")
+def _say_once(folder: Path) -> None:
+    _LOG.warning(
+        f"compiling finite-element forms, once for this kind of tire (kept in {folder}) ..."
+    )
 
 
 def end_compilers(folder: str | Path) -> None:

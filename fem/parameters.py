@@ -304,9 +304,9 @@ def factors(doc: str, limits: Limits, *, only_for: OnlyFor = None) -> Any:
         if not isinstance(value, dict):
             raise ValueError(f"must be a table of numbers by name, not {described(value)}")
         result = {}
-        for name, one in value.items():
+        for name, number in value.items():
             try:
-                result[name] = finite(one)
+                result[name] = finite(number)
                 limits.check(result[name], "-")
             except ValueError as error:
                 raise ValueError(f'"{name}" {error}') from None
@@ -394,12 +394,12 @@ class Registry(Generic[T]):
         def decorate(of: type) -> type:
             if not issubclass(of, self._base):
                 raise InputError(f"{self.label} {name}: must be derived from {self._base.__name__}")
-            made = dataclass(frozen=True, kw_only=True)(of)
+            registered = dataclass(frozen=True, kw_only=True)(of)
             known = self._classes.get(name)
-            if known is not None and known.__qualname__ != made.__qualname__:
+            if known is not None and known.__qualname__ != registered.__qualname__:
                 raise InputError(f"{self.label} {name}: is taken by {known.__qualname__}")
-            self._classes[name], self._docs[name] = made, doc
-            return made
+            self._classes[name], self._docs[name] = registered, doc
+            return registered
 
         return decorate
 
@@ -441,7 +441,7 @@ class Registry(Generic[T]):
 
     def owners(self, parameter: str) -> list[str]:
         """The variants that have a parameter of this name."""
-        return [name for name in self if parameter in {one.name for one in fields(self[name])}]
+        return [name for name in self if parameter in {item.name for item in fields(self[name])}]
 
 
 def second_digit(value: float) -> float:

@@ -88,11 +88,11 @@ class AbsorbingPlane:
     def correction(self, along: Array, heights: Array) -> tuple[Complex, Complex]:
         """C 1/m and P = (dC/d along) / along 1/m3 of points `along` m apart, of `heights` m in sum."""
         along, heights = np.broadcast_arrays(np.asarray(along, float), np.asarray(heights, float))
-        found = np.empty((2, along.size), complex)
+        terms = np.empty((2, along.size), complex)
         for first in range(0, along.size, AT_ONCE):
             some = slice(first, first + AT_ONCE)
-            found[:, some] = self._followed(along.ravel()[some], heights.ravel()[some])
-        return found[0].reshape(along.shape), found[1].reshape(along.shape)
+            terms[:, some] = self._followed(along.ravel()[some], heights.ravel()[some])
+        return terms[0].reshape(along.shape), terms[1].reshape(along.shape)
 
     def _followed(self, along: Array, heights: Array) -> tuple[Complex, Complex]:
         """The same of flat arrays, along the path of steepest descent."""
@@ -211,9 +211,9 @@ class Tabulated:
         j -= column
         place = row * SLOPES + column
         back = np.exp(np.complex64(-1j * self.plane.k) * near) / near
-        found = []
+        rows = []
         for table in self._values:
             one = (1 - j) * table[place] + j * table[place + 1]
             other = (1 - j) * table[place + SLOPES] + j * table[place + SLOPES + 1]
-            found.append(((1 - i) * one + i * other) * back)
-        return found[0], found[1] / near**2
+            rows.append(((1 - i) * one + i * other) * back)
+        return rows[0], rows[1] / near**2

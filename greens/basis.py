@@ -78,10 +78,10 @@ class Basis:
         """
         arguments = self.seen(outputs), self.seen(loads)
         response = couple(self.states, *arguments, self.carried)
-        wanted = self.of_hub(outputs)
-        if wanted.nnz:
-            response = reading(response, self.states, wanted, self.beside(wanted)[3:])
-            direct = wanted @ self.loaded(loads)
+        needed = self.of_hub(outputs)
+        if needed.nnz:
+            response = reading(response, self.states, needed, self.beside(needed)[3:])
+            direct = needed @ self.loaded(loads)
             response = replace(response, residual=response.residual + direct)
         if flexibility is None:
             return response
@@ -120,14 +120,14 @@ class Basis:
         swept = self.speed * ABOUT_AXLE @ moment
         return np.vstack([moment, -2 * swept, self.speed * ABOUT_AXLE @ swept])
 
-    def beside(self, wanted: sparse.csr_matrix) -> np.ndarray:
+    def beside(self, moments: sparse.csr_matrix) -> np.ndarray:
         """Rows that all coordinates carry besides: the momentum (3, m + a + c).
 
-        Where hub moments are `wanted` (r, 3), the rows A_0, A_1, A_2 of greens.response follow,
+        Where hub `moments` (r, 3) are asked for, the rows A_0, A_1, A_2 of greens.response follow,
         (12, m + a + c).
         """
         carried = self.projection.carried
-        if not wanted.nnz:
+        if not moments.nnz:
             return carried
         return np.vstack([carried, *self.projection.moments(self.speed, self.inertia)])
 

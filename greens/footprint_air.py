@@ -83,8 +83,8 @@ class Medium:
 
         def mean(number: float) -> Complex:
             at = height / 2 * np.sqrt(2j * np.pi * frequency * air.density * number / VISCOSITY)
-            found: Complex = np.tanh(at) / at
-            return found
+            ratio: Complex = np.tanh(at) / at
+            return ratio
 
         return Medium._of(mean, air)
 
@@ -106,8 +106,8 @@ def reaching(reach: float, height: float, frequency: Array, air: SoundAir) -> Co
     if not reach * height:
         return np.ones(len(frequency), complex)
     along = Medium.in_slit(height, frequency, air).wave_number(frequency) * reach
-    found: Complex = np.tan(along) / along
-    return found
+    ratio: Complex = np.tan(along) / along
+    return ratio
 
 
 @dataclass(frozen=True)
@@ -161,8 +161,8 @@ def radiation_resistance(
     own, every = (
         np.stack([np.asarray(shares.T @ one.T) for one in far.ahead]) for shares in (met, sources)
     )
-    found = ((own * weight) @ np.swapaxes(every.conj(), 1, 2)).real
-    at_lines = interpolate.CubicSpline(far.frequency, found)(lines)
+    resistance = ((own * weight) @ np.swapaxes(every.conj(), 1, 2)).real
+    at_lines = interpolate.CubicSpline(far.frequency, resistance)(lines)
     scale = (2 * np.pi * lines * far.air.density) ** 2 / far.air.impedance
     return np.asarray(np.moveaxis(at_lines * scale[:, None, None], 0, -1))
 
@@ -208,9 +208,9 @@ class Outlets:
             np.stack([at, left[row]], axis=1),
             np.stack([at, right[row]], axis=1),
         ]
-        taken = [g for g in grooves if inside[:, np.abs(y - g.y).argmin()].any()]
-        nearest = [int(np.abs(y - g.y).argmin()) for g in taken]
-        beyond = [np.maximum(np.abs(across - g.y) - g.width / 2, 0.0) for g in taken]
+        under = [g for g in grooves if inside[:, np.abs(y - g.y).argmin()].any()]
+        nearest = [int(np.abs(y - g.y).argmin()) for g in under]
+        beyond = [np.maximum(np.abs(across - g.y) - g.width / 2, 0.0) for g in under]
         ends = np.array([[low[j] - half, high[j] + half] for j in nearest]).reshape(-1, 2)
         for k, (rear, front) in enumerate(ends):  # only where the groove is beside the cell
             beyond[k] = np.where((at >= rear) & (at <= front), beyond[k], np.inf)
@@ -223,7 +223,7 @@ class Outlets:
         outlet = np.zeros(len(cell), dtype=int)
         outlet[over] = number
         stations, count = [], len(edge)
-        for k in range(len(taken)):
+        for k in range(len(under)):
             some = way == len(ways) + k
             station, index = np.unique(at[some], return_inverse=True)
             outlet[some] = count + index
@@ -233,12 +233,12 @@ class Outlets:
         return Outlets(
             sums=sparse.csr_matrix(ones, shape=(count, len(cell))),
             edge=edge,
-            grooves=tuple(taken),
+            grooves=tuple(under),
             ends=ends,
             stations=tuple(stations),
             # Of cells that lie evenly from 0 to the farthest, twice the mean distance.
             reach=2 * float(own[over].mean()) if over.any() else 0.0,
-            reaches=np.array([2 * _mean(own[way == len(ways) + k]) for k in range(len(taken))]),
+            reaches=np.array([2 * _mean(own[way == len(ways) + k]) for k in range(len(under))]),
         )
 
     @property

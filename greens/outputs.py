@@ -216,12 +216,15 @@ def disagreement(
 
     None if there is no force to compare: nothing holds a wheel that is free in x, y and z.
     """
-    one, other = substituted(basis, turning, loads, frequency), by_states(basis, loads, frequency)
-    size = np.linalg.norm(one, axis=(1, 2))
+    direct, other = (
+        substituted(basis, turning, loads, frequency),
+        by_states(basis, loads, frequency),
+    )
+    size = np.linalg.norm(direct, axis=(1, 2))
     some = size > 0
     if not some.any():
         return None
-    return float((np.linalg.norm(one - other, axis=(1, 2))[some] / size[some]).max())
+    return float((np.linalg.norm(direct - other, axis=(1, 2))[some] / size[some]).max())
 
 
 @dataclass(frozen=True)

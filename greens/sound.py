@@ -106,20 +106,20 @@ def radiate(
 
 def _admittance(impedance: Complex, count: int, road: bool) -> Complex:
     """Admittances (f,) of the road over that of air; InputError for what no road has."""
-    given = np.atleast_1d(np.asarray(impedance, complex))
+    impedances = np.atleast_1d(np.asarray(impedance, complex))
     if not road:
         raise InputError("radiate: impedance is that of the road: road = False has none")
-    if given.shape != (count,):
+    if impedances.shape != (count,):
         raise InputError(
-            f"radiate: impedance has shape {given.shape}; {count} frequencies require {(count,)}"
+            f"radiate: impedance has shape {impedances.shape}; {count} frequencies require {(count,)}"
         )
-    if np.isnan(given).any() or (given == 0).any() or (given.real < 0).any():
+    if np.isnan(impedances).any() or (impedances == 0).any() or (impedances.real < 0).any():
         raise InputError(
             "radiate: impedance must be a number other than 0 whose real part is not negative (e^{+iwt}; a soft "
             "road has a small one)"
         )
-    rigid = np.isinf(given)
-    return np.where(rigid, 0.0, 1 / np.where(rigid, 1.0, given))
+    rigid = np.isinf(impedances)
+    return np.where(rigid, 0.0, 1 / np.where(rigid, 1.0, impedances))
 
 
 def transfer(
@@ -133,12 +133,12 @@ def transfer(
     every, wave = np.unique(frequency), 2 * np.pi / speed_of_sound
     few = max(int(np.ceil(np.ptp(every) / APART)) + 1, 4)
     solved = every if len(every) <= few + 1 else np.linspace(every[0], every[-1], few)
-    found = np.stack([body.solve(wave * f, microphones) for f in solved])
+    pressures = np.stack([body.solve(wave * f, microphones) for f in solved])
     if solved is every:
-        return found[np.searchsorted(solved, frequency)]
+        return pressures[np.searchsorted(solved, frequency)]
     apart = np.linalg.norm(microphones - body.center.mean(axis=0), axis=1)
     ahead = np.exp(1j * wave * solved[:, None] * apart)[:, None]
-    smooth = interpolate.CubicSpline(solved, found * ahead)(frequency)
+    smooth = interpolate.CubicSpline(solved, pressures * ahead)(frequency)
     return smooth * np.exp(-1j * wave * frequency[:, None] * apart)[:, None]
 
 
@@ -316,15 +316,15 @@ class SoundBody:
     @cached_property
     def _closed(self) -> list[tuple[Array, Array, Array]]:
         """D, H and S at k = 0 of the near pairs, in closed form; D and H of an element on itself 0."""
-        found: list[tuple[Array, Array, Array]] = []
+        faces: list[tuple[Array, Array, Array]] = []
         for corners, i, j in zip(self._bodies, *self._near, strict=True):
             x, n, c = self.center[i], self.normal[i], corners[j]
             double = -solid_angles(x, c) / (4 * np.pi)
             hyper = -(n * edge_field(x, c)).sum(axis=1) / (4 * np.pi)
-            if not found:
+            if not faces:
                 double[i == j] = hyper[i == j] = 0.0
-            found.append((double, hyper, potentials(x, c) / (4 * np.pi)))
-        return found
+            faces.append((double, hyper, potentials(x, c) / (4 * np.pi)))
+        return faces
 
     @cached_property
     def _static(self) -> tuple[Array, Array]:
@@ -399,7 +399,7 @@ class SoundBody:
     def _around(self) -> list[tuple[Array, ...]]:
         """Geometry of the near pairs (p,) at 4 x 4 points: r, a, b and c (16, p) of `_smooth`, and n.n' (p,)."""
         place, weight = self.points_and_weights(4)
-        found: list[tuple[Array, ...]] = []
+        strips: list[tuple[Array, ...]] = []
         for mirror, i, j in zip(self._mirrors, *self._near, strict=True):
             x, n = self.center[i], self.normal[i]
             d = np.moveaxis((place * mirror)[j], 1, 0) - x
@@ -407,12 +407,12 @@ class SoundBody:
             r = np.linalg.norm(d, axis=2)
             a, b = -(d * n).sum(axis=2) / r, (d * w).sum(axis=2) / r
             turned = (n * (self.normal * mirror)[j]).sum(axis=1)
-            found.append((r, a, b, (w * n).sum(axis=2), turned))
-        return found
+            strips.append((r, a, b, (w * n).sum(axis=2), turned))
+        return strips
 
     def _smooth(self, k: float, hyper: bool) -> list[tuple[Complex, Complex]]:
         """Smooth parts of D and, if wanted, H of the near pairs: their differences from k = 0."""
-        found = []
+        corners = []
         for (r, a, b, c, turned), closed in zip(self._around, self._closed, strict=True):
             z = k * r
             wave = np.cos(z) - 1j * np.sin(z)
@@ -423,8 +423,8 @@ class SoundBody:
                 second += ((1 + 1j * z) * wave - 1 - z**2 / 2) * c
                 second /= 4 * np.pi * r**3
             more = turned * k**2 / 2 * closed[2]
-            found.append((double.sum(axis=0), second.sum(axis=0) + more))
-        return found
+            corners.append((double.sum(axis=0), second.sum(axis=0) + more))
+        return corners
 
     def _absorbed(self, table: Tabulated, hyper: bool) -> Iterator[tuple[slice, Single, Single]]:
         """Blocks of rows of what C adds to D and, if wanted, H, of pairs whose images are not near."""
@@ -449,8 +449,8 @@ class SoundBody:
             if hyper:
                 along = n[:, :2] @ y[:, :2].T - (n[:, :2] * x[:, :2]).sum(axis=1)[:, None]
                 normal = along, n[:, 2:], n[:, :2] @ w[:, :2].T
-            found = table.at(apart, heights)
-            parts = table.plane.kernels(found, (apart, heights), (ahead, w[:, 2]), normal)
+            absorbed = table.at(apart, heights)
+            parts = table.plane.kernels(absorbed, (apart, heights), (ahead, w[:, 2]), normal)
             own = (i >= rows.start) & (i < rows.stop)
             out = []
             for part in parts if hyper else parts[:1]:
@@ -471,8 +471,8 @@ class SoundBody:
         normal = None
         if hyper:
             normal = (d * n[:, :2]).sum(axis=2), n[:, 2], (w[..., :2] * n[:, :2]).sum(axis=2)
-        found = table.at(apart.astype(np.float32), heights.astype(np.float32))
-        values = found[0].astype(complex), found[1].astype(complex)
+        absorbed = table.at(apart.astype(np.float32), heights.astype(np.float32))
+        values = absorbed[0].astype(complex), absorbed[1].astype(complex)
         parts = table.plane.kernels(values, (apart, heights), (ahead, up), normal)
         # What is singular in them, and its integral in closed form.
         turn = 2j * table.plane.k * table.plane.admittance

@@ -166,13 +166,13 @@ class SoundingTire:
         """
         s = len(self.area)
         moved = np.einsum("sc,scm->sm", self.area, shape.reshape(s, 3, -1))
-        found = np.asarray(self.nodes.T @ moved)
+        volumes = np.asarray(self.nodes.T @ moved)
         if rigid is not None:
             some = ~self.face
             place = self.body.center[some] - [0, 0, self.height]
             place, vector = place @ self.axes, self.body.vector[some] @ self.axes
-            found[some] += np.hstack([vector, np.cross(place, vector)]) @ rigid
-        return found
+            volumes[some] += np.hstack([vector, np.cross(place, vector)]) @ rigid
+        return volumes
 
     @property
     def outline(self) -> Array:
@@ -206,13 +206,13 @@ class SoundingTire:
             np.array([0.7 * length, width, self.height]),
             np.array([length, 0.0, self.height]),
         ]
-        found = []
+        sources = []
         for goal in goals:
             e = some[np.linalg.norm(center[some] - goal, axis=1).argmin()]
             point = center[e] - deep * normal[e]
             point[2] = max(point[2], deep / 2)
-            found.append(point)
-        return np.array(found)
+            sources.append(point)
+        return np.array(sources)
 
     def flux_of(self, source: Array, k: float, admittance: complex = 0.0) -> Complex:
         """F (e,): sum_e F_e g_e is minus the integral of g dG/dn of a point source (3,) m inside.
@@ -263,7 +263,7 @@ def _lines(grid: Array, size: float, coarser: float) -> tuple[Array, Array]:
 
 def _chosen(lines: Array, limit: Array) -> Array:
     """Positions along lines (n, m, 3) whose distance is at most `limit` (n,) m; wide steps divided."""
-    found, last = [0.0], 0
+    places, last = [0.0], 0
     while last < len(lines) - 1:
         after = last + 1
         while after < len(lines) - 1:
@@ -273,9 +273,9 @@ def _chosen(lines: Array, limit: Array) -> Array:
             after += 1
         apart = np.linalg.norm(lines[after] - lines[last], axis=1).max()
         parts = max(int(np.ceil(apart / limit[[last, after]].min() - 1e-9)), 1)
-        found += list(last + (after - last) * np.arange(1, parts + 1) / parts)
+        places += list(last + (after - last) * np.arange(1, parts + 1) / parts)
         last = after
-    return np.array(found)
+    return np.array(places)
 
 
 def _at(grid: Array, rows: Array, columns: Array) -> Array:
@@ -314,13 +314,13 @@ def _disc(ring: Array, size: float, depth: float) -> Array:
     Rings towards the centre halve their points where these come close; triangles repeat a corner.
     Corners follow each other as the points of the ring do.
     """
-    found: list[list[Array]] = []
+    quads: list[list[Array]] = []
     center = ring.mean(axis=0)
     steps = int(np.ceil(abs(depth) / size - 1e-9))
     outer = list(ring)
     for step in range(1, steps + 1):
         inner = list(ring + [0, depth * step / steps, 0])
-        found += _between(outer, inner, range(len(inner)))
+        quads += _between(outer, inner, range(len(inner)))
         outer = inner
     center = center + [0, depth if steps else 0.0, 0]
     while True:
@@ -328,34 +328,36 @@ def _disc(ring: Array, size: float, depth: float) -> Array:
         rings = max(round(radius / size), 1)
         if rings == 1 or len(outer) <= 5:
             n = len(outer)
-            found += [[outer[a], outer[(a + 1) % n], center, center] for a in range(n)]
+            quads += [[outer[a], outer[(a + 1) % n], center, center] for a in range(n)]
             break
         share = 1 - 1 / rings
-        kept = [0]
+        chosen = [0]
         n = len(outer)
         for a in range(1, n):
-            wide = np.linalg.norm(outer[(a + 1) % n] - outer[kept[-1]]) * share
-            if a - kept[-1] == 2 or wide > size:
-                kept.append(a)
-        inner = [center + share * (outer[a] - center) for a in kept]
-        found += _between(outer, inner, kept)
+            wide = np.linalg.norm(outer[(a + 1) % n] - outer[chosen[-1]]) * share
+            if a - chosen[-1] == 2 or wide > size:
+                chosen.append(a)
+        inner = [center + share * (outer[a] - center) for a in chosen]
+        quads += _between(outer, inner, chosen)
         outer = inner
-    return np.array(found)
+    return np.array(quads)
 
 
-def _between(outer: list[Array], inner: list[Array], kept: range | list[int]) -> list[list[Array]]:
-    """Elements between two rings, the inner one of the `kept` points of the outer one."""
-    found, n = [], len(outer)
-    for b, a in enumerate(kept):
+def _between(
+    outer: list[Array], inner: list[Array], chosen: range | list[int]
+) -> list[list[Array]]:
+    """Elements between two rings, the inner one of the `chosen` points of the outer one."""
+    triangles, n = [], len(outer)
+    for b, a in enumerate(chosen):
         p, q = outer[a], inner[b]
-        after = kept[(b + 1) % len(inner)]
+        after = chosen[(b + 1) % len(inner)]
         r, far = inner[(b + 1) % len(inner)], outer[after]
         if (after - a) % n == 1:
-            found.append([p, far, r, q])
+            triangles.append([p, far, r, q])
         else:
             middle = outer[(a + 1) % n]
-            found += [[p, middle, q, q], [middle, far, r, r], [middle, r, q, q]]
-    return found
+            triangles += [[p, middle, q, q], [middle, far, r, r], [middle, r, q, q]]
+    return triangles
 
 
 def _slopes(
@@ -452,11 +454,11 @@ def solved_frequencies(up_to: float) -> Array:
 
 def admittances(road: PorousLayer | None, frequency: Array, air: SoundAir) -> Complex:
     """Admittances (f,) of a road over that of the air at frequencies (f,) Hz: 0 of a rigid one (None), and at 0 Hz."""
-    found = np.zeros(len(frequency), complex)
+    admittance = np.zeros(len(frequency), complex)
     if road is not None:
         some = frequency > 0
-        found[some] = 1 / road.impedance(frequency[some], air.speed, air.density)
-    return found
+        admittance[some] = 1 / road.impedance(frequency[some], air.speed, air.density)
+    return admittance
 
 
 def transfer(
@@ -510,19 +512,19 @@ class Transfer:
 
 
 def source_errors(
-    tire: SoundingTire, given: Transfer, microphones: Array, road: PorousLayer | None = None
+    tire: SoundingTire, far: Transfer, microphones: Array, road: PorousLayer | None = None
 ) -> Array:
     """Errors (n, k, f) dB of the fields of n sources inside, at the frequencies solved but 0 Hz."""
-    sources, frequency = tire.inner_sources(), given.frequency[1:]
-    admittance = admittances(road, frequency, given.air)
+    sources, frequency = tire.inner_sources(), far.frequency[1:]
+    admittance = admittances(road, frequency, far.air)
     out = np.zeros((len(sources), len(microphones), len(frequency)))
     for a, source in enumerate(sources):
         for b, f in enumerate(frequency):
-            k = 2 * np.pi * f / given.air.speed
-            found = (
-                given.ahead[b + 1]
+            k = 2 * np.pi * f / far.air.speed
+            errors = (
+                far.ahead[b + 1]
                 @ tire.flux_of(source, k, admittance[b])
-                * np.exp(-1j * k * given.distance)
+                * np.exp(-1j * k * far.distance)
             )
             exact = np.zeros(len(microphones), complex)
             for mirror in (np.ones(3), MIRROR):
@@ -530,5 +532,5 @@ def source_errors(
                 exact += np.exp(-1j * k * r) / (4 * np.pi * r)
             if admittance[b]:
                 exact += AbsorbingPlane(k, admittance[b]).source(microphones, source)[0]
-            out[a, :, b] = 20 * np.log10(np.abs(found / exact))
+            out[a, :, b] = 20 * np.log10(np.abs(errors / exact))
     return out

@@ -77,8 +77,8 @@ def sweep(
             share = np.ones(len(held))
         else:
             held, share = _continued(before, now, held, drag)
-        found = held >= 0
-        eigenvalue[k, : len(held)][found] = now.eigenvalue[held[found]]
+        is_known = held >= 0
+        eigenvalue[k, : len(held)][is_known] = now.eigenvalue[held[is_known]]
         similarity[k, : len(held)] = share
         if called is not None:
             called.see(now, held)
@@ -105,12 +105,14 @@ class _BranchNames:
             return
         # Those below decide which is the lowest of its kind; there may be thousands above.
         lower = now.eigenvalue.imag <= now.eigenvalue.imag[held[branch]].max()
-        found = self._names(now.among(lower)).at(np.cumsum(lower)[held[branch]] - 1)
-        goes = np.where(found.wave > 0, np.abs(found.travel), 1.0)
-        clear = found.share * goes
+        names = self._names(now.among(lower)).at(np.cumsum(lower)[held[branch]] - 1)
+        goes = np.where(names.wave > 0, np.abs(names.travel), 1.0)
+        clear = names.share * goes
         better = (clear > self._clearest[branch]) & (self._clearest[branch] < CLEAR)
         leans = (clear < CLEAR) & (goes < ALONE)
-        name = [one.rstrip("+-") if so else one for one, so in zip(found.name, leans, strict=True)]
+        name = [
+            name.rstrip("+-") if so else name for name, so in zip(names.name, leans, strict=True)
+        ]
         self._name[branch[better]] = np.array(name, dtype=object)[better]
         self._clearest[branch[better]] = clear[better]
 

@@ -89,8 +89,8 @@ def full_states(
     as in fem.matrices.compliance; `rim`: the reactions to motions of a held rim, for the moments on
     its hub. Collective.
     """
-    found, figures, lacking = _solve(operators, pencil, projected, count, window)
-    fields, coordinates = _orthonormal(operators, found)
+    pencil_states, figures, lacking = _solve(operators, pencil, projected, count, window)
+    fields, coordinates = _orthonormal(operators, pencil_states)
     comm, old = operators.body.comm, projected.basis
     momenta = summed(comm, operators.carried @ fields)
     projection, corner = old.projection, None
@@ -102,7 +102,7 @@ def full_states(
         projection=replace(projection, momentum=momenta, corner=corner),
         modes=None,
     )
-    states = _states(found, coordinates)
+    states = _states(pencil_states, coordinates)
     full = RollingModes(basis=basis, states=states, turning=projected.turning, full=True)
     warnings = (
         []
@@ -112,7 +112,7 @@ def full_states(
             "range: some may be missing. Ask for more by rotation.count or a wider rotation.window."
         ]
     )
-    return full, figures | _compared(found, projected.states), warnings
+    return full, figures | _compared(pencil_states, projected.states), warnings
 
 
 def _solve(
@@ -126,40 +126,40 @@ def _solve(
     drag, full_stiffness = pencil
     whole, s = (operators.mass, drag, full_stiffness), projected.states.eigenvalue
     if not any(window):
-        found = quadratic.solve(*whole, count)
-        sizes = np.abs(found.eigenvalue), np.abs(s)
-        return found, {}, missing(*sizes, 0.0, float(sizes[0].max()))
+        solution = quadratic.solve(*whole, count)
+        sizes = np.abs(solution.eigenvalue), np.abs(s)
+        return solution, {}, missing(*sizes, 0.0, float(sizes[0].max()))
     mass, stiffness = beyond(projected.turning.damping, projected.basis.projection)
     low, high = (2 * np.pi * f for f in window)
     rate = mass + stiffness * high**2
     below = int((np.abs(s) <= np.hypot(high, rate / 2)).sum())
-    found = quadratic.window(*whole, (low, high), rate, below)
+    solution = quadratic.window(*whole, (low, high), rate, below)
     inside = int(((s.imag >= low) & (s.imag <= high)).sum())
     figures = {
-        "states in the window": (len(found.eigenvalue), "-"),
+        "states in the window": (len(solution.eigenvalue), "-"),
         "projected states in the window": (inside, "-"),
     }
-    return found, figures, missing(found.eigenvalue.imag, s.imag, low, high)
+    return solution, figures, missing(solution.eigenvalue.imag, s.imag, low, high)
 
 
-def _orthonormal(operators: Operators, found: FullModes) -> tuple[np.ndarray, np.ndarray]:
+def _orthonormal(operators: Operators, modes: FullModes) -> tuple[np.ndarray, np.ndarray]:
     """An M-orthonormal basis (own rows n, p) of all fields, and their coordinates (p, 4 q).
     Collective.
     """
     comm, mass = operators.body.comm, operators.mass[:, None]
-    fields = np.hstack([found.right.real, found.right.imag, found.left.real, found.left.imag])
+    fields = np.hstack([modes.right.real, modes.right.imag, modes.left.real, modes.left.imag])
     lengths = np.sqrt(comm.allreduce((mass * fields**2).sum(axis=0)))
     lengths[lengths == 0] = 1.0  # the imaginary part of a real state
     products = gram(comm, fields / lengths, mass * fields / lengths)
     sizes, directions = np.linalg.eigh(products)
-    kept = sizes > _ROUNDING * sizes.max()
-    turn = directions[:, kept] / np.sqrt(sizes[kept])
-    coordinates = (directions[:, kept] * np.sqrt(sizes[kept])).T * lengths
+    independent = sizes > _ROUNDING * sizes.max()
+    turn = directions[:, independent] / np.sqrt(sizes[independent])
+    coordinates = (directions[:, independent] * np.sqrt(sizes[independent])).T * lengths
     return fields / lengths @ turn, coordinates
 
 
-def _states(found: FullModes, coordinates: np.ndarray) -> StateModes:
-    s, size = found.eigenvalue, len(coordinates)
+def _states(modes: FullModes, coordinates: np.ndarray) -> StateModes:
+    s, size = modes.eigenvalue, len(coordinates)
     real, imaginary, left_real, left_imaginary = np.split(coordinates, 4, axis=1)
     weight = np.where(s.imag > 0, 2.0, 1.0)
     return StateModes(
@@ -169,15 +169,15 @@ def _states(found: FullModes, coordinates: np.ndarray) -> StateModes:
         block=np.zeros((0, 0)),
         block_right=np.zeros((size, 0)),
         block_left=np.zeros((0, size)),
-        residual=found.residual,
-        left_residual=found.left_residual,
-        condition=found.condition,
+        residual=modes.residual,
+        left_residual=modes.left_residual,
+        condition=modes.condition,
     )
 
 
-def _compared(found: FullModes, projected: StateModes) -> Figures:
+def _compared(modes: FullModes, projected: StateModes) -> Figures:
     """Truncation error of the projected eigenvalues, which tells whether there are enough modes."""
-    error = truncation(found.eigenvalue, projected.eigenvalue)
+    error = truncation(modes.eigenvalue, projected.eigenvalue)
     half = error[: max(len(error) // 2, 1)]
     return {
         "truncation error of the projected eigenvalues, lower half": (float(half.max()), "-"),
@@ -235,7 +235,7 @@ def named_states(
     order = np.lexsort((states.eigenvalue.real, states.eigenvalue.imag))
     right, own = states.right[:, order], shape.shape[1]
     fields = np.tensordot(waves.read(shape), right[:own], 1)
-    given = {int(k): STILL for k in np.flatnonzero(states.eigenvalue[order].imag == 0)}
+    names = {int(k): STILL for k in np.flatnonzero(states.eigenvalue[order].imag == 0)}
     beside, air = own, None
     if projection.air is not None and len(right) > own:  # full states have none of their own
         duct, beside = projection.air.duct, own + projection.air.count
@@ -243,8 +243,8 @@ def named_states(
         air = air_waves(projection.air.share(right), pressure[1::2], pressure[2::2])
     square = np.abs(right) ** 2
     wheel = square[beside:].sum(axis=0) >= HALF * square.sum(axis=0)
-    given |= {int(k): WHEEL for k in np.flatnonzero(wheel)}
-    return waves.named(fields, given, air).at(np.argsort(order))
+    names |= {int(k): WHEEL for k in np.flatnonzero(wheel)}
+    return waves.named(fields, names, air).at(np.argsort(order))
 
 
 def decouple(projection: Projection, turning: Turning, comm: MPI.Comm) -> StateModes:
@@ -270,18 +270,18 @@ def _decoupled(projection: Projection, turning: Turning, comm: MPI.Comm) -> tupl
         )
     if projection.moves:
         projection.wheel.check(turning.speed)
-    given, free_motions = pencil(projection, turning), projection.free_motions
+    pencils, free_motions = pencil(projection, turning), projection.free_motions
     if alone:
         free_motions = np.eye(projection.own)[:, projection.squares == 0]
 
     def solve() -> tuple[StateModes, dict]:
         if free_motions.shape[1]:
-            states = with_free_motions(*given, free_motions)
-            return states, checks(states, *given)
+            states = with_free_motions(*pencils, free_motions)
+            return states, checks(states, *pencils)
         for condition in _CONDITIONS:
-            states = rotating(*given, condition)
+            states = rotating(*pencils, condition)
             try:
-                return states, checks(states, *given)
+                return states, checks(states, *pencils)
             except ConvergenceError as error:
                 failed = error
         raise failed

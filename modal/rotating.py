@@ -246,15 +246,17 @@ def checks(
     return figures
 
 
-def overlap(one: StateModes, other: StateModes, drag: Array) -> Array:
-    """(q, q') share of the states of `other` in those of `one`: the identity for the same problem.
+def overlap(states: StateModes, other: StateModes, drag: Array) -> Array:
+    """(q, q') share of the states of `other` in `states`: the identity for the same problem.
 
     w_i^T [(s_i + s'_j) + D~] u'_j / a_i: left times right vectors of the companion matrices.
     """
     weight = np.where(other.eigenvalue.imag > 0, 2.0, 1.0)
     right = other.right / weight
-    near = one.left @ right
-    return one.eigenvalue[:, None] * near + near * other.eigenvalue + one.left @ (drag @ right)
+    near = states.left @ right
+    return (
+        states.eigenvalue[:, None] * near + near * other.eigenvalue + states.left @ (drag @ right)
+    )
 
 
 def companion_blocks(
@@ -375,14 +377,14 @@ def with_free_motions(
     """
     m, r = free_motions.shape
     others = linalg.qr(free_motions)[0][:, r:]
-    found = rotating(others.T @ drag @ others, others.T @ stiffness @ others)
+    states = rotating(others.T @ drag @ others, others.T @ stiffness @ others)
     block, right, left = companion_blocks(np.arange(r), np.zeros(r), np.zeros(r), r)
     return replace(
-        found,
-        right=others @ found.right,
-        left=found.left @ others.T,
-        block=linalg.block_diag(found.block, block),
-        block_right=np.hstack([others @ found.block_right, free_motions @ right]),
-        block_left=np.vstack([found.block_left @ others.T, left @ free_motions.T]),
+        states,
+        right=others @ states.right,
+        left=states.left @ others.T,
+        block=linalg.block_diag(states.block, block),
+        block_right=np.hstack([others @ states.block_right, free_motions @ right]),
+        block_left=np.vstack([states.block_left @ others.T, left @ free_motions.T]),
         rigid=2 * r,
     )

@@ -67,8 +67,8 @@ def with_rotation_shapes(
         return modes
     if rotation is None:
         raise InputError("rotation shapes: the matrices of the rotating frame are needed")
-    found = _Found(modes, projection, operators, rotation, turning)
-    columns = found.foremost(_uncoupled(projection, turning.inertia))
+    shapes = _Found(modes, projection, operators, rotation, turning)
+    columns = shapes.foremost(_uncoupled(projection, turning.inertia))
     return extended(modes, columns, operators) if columns.shape[1] else modes
 
 
@@ -164,12 +164,12 @@ class _Found:
             take_off(more, self._fields, gram(comm, self._fields, stretched))
         # What was taken off last is K-orthogonal to `more`.
         sizes, turn = np.linalg.eigh(gram(comm, more, stretched))
-        kept = sizes > max(_NOTHING * self._tolerance, _ROUNDING * sizes.max())
-        new = more @ (turn[:, kept] / np.sqrt(sizes[kept]))
+        independent = sizes > max(_NOTHING * self._tolerance, _ROUNDING * sizes.max())
+        new = more @ (turn[:, independent] / np.sqrt(sizes[independent]))
         # Q^T K X = Q^T L, with L the forces; for one matrix and one direction q it is G^T q . phi.
-        given = [sign * f * self._read(matrix, new) for f, matrix, _, sign in self._forces]
+        reads = [sign * f * self._read(matrix, new) for f, matrix, _, sign in self._forces]
         self._fields = np.hstack([self._fields, new])
-        self._of = np.vstack([self._of, np.hstack(given)])
+        self._of = np.vstack([self._of, np.hstack(reads)])
 
     def _counting(self, of: Array) -> tuple[Array, Array]:
         """Left singular vectors of the components `of` X, and the squared values of those that count.

@@ -79,7 +79,7 @@ def solved(
     `up_to` (Hz) is given, within its range. Collective.
     """
     _check_wanted(count, up_to)
-    found = undamped.solve(
+    modes = undamped.solve(
         operators.stiffness,
         operators.mass,
         count,
@@ -89,7 +89,7 @@ def solved(
         journal=journal,
         solver=solver,
     )
-    return _by_own_frequency(found, operators, up_to)
+    return _by_own_frequency(modes, operators, up_to)
 
 
 def _check_wanted(count: int | None, up_to: float | None) -> None:

@@ -121,19 +121,19 @@ class FaceWaves:
     def named(
         self,
         fields: np.ndarray,
-        given: Mapping[int, tuple[str, str]],
+        known_names: Mapping[int, tuple[str, str]],
         air: AirWaves | None = None,
     ) -> ModeNames:
         """Names of `fields` (a, p, 3, m), real or complex (`read`), ascending in frequency.
 
-        `given`: name and motion of those that are named otherwise, by their index. Not collective.
+        `known_names`: name and motion of those that are named otherwise, by their index. Not collective.
         """
-        found = self._series(fields)
-        symmetric = found.parity > 0
-        order = found.order + (found.order % 2 == symmetric)
-        order[found.turns] = 0
-        wave, share, travel = found.wave.copy(), found.share.copy(), found.travel.copy()
-        letter = np.where(found.turns, "T", np.where(symmetric, "R", "L"))
+        series = self._series(fields)
+        symmetric = series.parity > 0
+        order = series.order + (series.order % 2 == symmetric)
+        order[series.turns] = 0
+        wave, share, travel = series.wave.copy(), series.share.copy(), series.travel.copy()
+        letter = np.where(series.turns, "T", np.where(symmetric, "R", "L"))
         if air is not None:
             letter[air.mostly] = "C"
             for values, of_air in ((wave, air.wave), (share, air.pure), (travel, air.travel)):
@@ -142,18 +142,21 @@ class FaceWaves:
         before: Counter[tuple[str, ...]] = Counter()
         named = []
         for k, n in enumerate(wave):
-            if k in given:
-                named.append(given[k])
+            if k in known_names:
+                named.append(known_names[k])
                 continue
-            one, a = str(letter[k]), int(order[k])
-            group, mixed = (one, str(n), str(way[k])), share[k] < HALF and one != "C"
+            letter_here, a = str(letter[k]), int(order[k])
+            group, mixed = (
+                (letter_here, str(n), str(way[k])),
+                share[k] < HALF and letter_here != "C",
+            )
             before[group] += not mixed
             pair = n and abs(travel[k]) < ALONE  # both can lean the same way on a loaded tire
-            lowest = before[group] <= (2 if pair else 1) and a == (one == "L")
-            text = f"{one}{n}" if lowest or one in "TC" else f"[{n},{a}]"
+            lowest = before[group] <= (2 if pair else 1) and a == (letter_here == "L")
+            text = f"{letter_here}{n}" if lowest or letter_here in "TC" else f"[{n},{a}]"
             if mixed:
-                text += f"/{found.second[k]}"
-            named.append((text + way[k], MOTION[one]))
+                text += f"/{series.second[k]}"
+            named.append((text + way[k], MOTION[letter_here]))
         return ModeNames(
             name=np.array([name for name, _ in named], dtype=object),
             motion=np.array([motion for _, motion in named], dtype=object),
@@ -206,9 +209,9 @@ class FaceWaves:
     def _nodal_lines(radial: np.ndarray) -> np.ndarray:
         """Changes of sign (m,) of radial motions (m, p) along the tread, in phase with the largest."""
         lines = np.zeros(len(radial), int)
-        for k, one in enumerate(radial):
-            largest = one[np.abs(one).argmax()]
-            line = (one * largest.conj()).real
+        for k, row in enumerate(radial):
+            largest = row[np.abs(row).argmax()]
+            line = (row * largest.conj()).real
             seen = np.sign(line[np.abs(line) > _SEEN * np.abs(largest) ** 2])
             lines[k] = np.count_nonzero(np.diff(seen))
         return lines

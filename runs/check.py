@@ -84,9 +84,9 @@ def _demand(scene: Scene, processes: int, until: str | None) -> list[str]:
 
     Raises InputError if it has far too little.
     """
-    wanted = estimate(scene, until)
-    on_disk = out_of_core(wanted, processes)
-    size, parts = wanted.sizes, memory_of(wanted, processes, on_disk)
+    demand = estimate(scene, until)
+    on_disk = out_of_core(demand, processes)
+    size, parts = demand.sizes, memory_of(demand, processes, on_disk)
     counts = [f"{size.free} unknowns not held by the rim"]
     if scene.modal is not None:
         counts.append(f"{size.modes} modes")
@@ -102,13 +102,13 @@ def _demand(scene: Scene, processes: int, until: str | None) -> list[str]:
     lines = [
         "",
         f"estimated sizes   {', '.join(counts)}",
-        f"estimated time    {duration(sum(wanted.seconds.values()))} of one core",
-        f"estimated disk    {sum(wanted.disk.values()) / 1e9:.2g} GB",
+        f"estimated time    {duration(sum(demand.seconds.values()))} of one core",
+        f"estimated disk    {sum(demand.disk.values()) / 1e9:.2g} GB",
         f"estimated memory  {sum(parts.values()) / processes / 1e9:.2f} GB in {_each(processes)}"
         + (", factors on disk" if on_disk else ""),
         *(f"  {name:26}{part / processes / 1e9:6.2f} GB" for name, part in parts.items()),
     ]
-    warnings = [*check_demand(wanted, Path.cwd(), processes), *crowded(processes)]
+    warnings = [*check_demand(demand, Path.cwd(), processes), *crowded(processes)]
     return lines + [f"warning: {text}" for text in warnings]
 
 

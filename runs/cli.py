@@ -110,9 +110,11 @@ def parser() -> argparse.ArgumentParser:
     commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name, command in COMMANDS.items():
         about = command.about or command.text
-        one = _parser(commands.add_parser, name, about, help=command.text, usage=command.usage)
+        command_parser = _parser(
+            commands.add_parser, name, about, help=command.text, usage=command.usage
+        )
         for names, settings in command.arguments:
-            one.add_argument(*names, **settings)
+            command_parser.add_argument(*names, **settings)
     return top
 
 
@@ -301,11 +303,11 @@ def _export(args: argparse.Namespace) -> None:
     )
     for path in paths:
         print(path)
-    made = {path.name for path in paths}
+    written = {path.name for path in paths}
     for name, text in told:
-        if name in made:
+        if name in written:
             print(f"{name}: {text}", file=sys.stderr)
-    lacking = [f"no {name}: {text}" for name, text in told if name not in made]
+    lacking = [f"no {name}: {text}" for name, text in told if name not in written]
     if lacking:  # all else is written
         raise InputError("; ".join(lacking))
 
@@ -591,8 +593,8 @@ def _alone(args: argparse.Namespace) -> int:
         return DONE
     signals.stop_on_signals()
     command = COMMANDS[args.command]
-    kept = "the same command begins again" if command.leaves_nothing else mpi.KEPT
-    with mpi.ending(kept) as end:
+    advice = "the same command begins again" if command.leaves_nothing else mpi.KEPT
+    with mpi.ending(advice) as end:
         assert command.alone is not None, "a command of one process"
         command.alone(args)
     if end.message:

@@ -153,11 +153,11 @@ class FitFigures:
     @property
     def targets(self) -> dict[str, float]:
         """The value asked for of each figure by name."""
-        found = {name: self.values[name] for name in KINDS if name in self.values}
-        found |= {_load_name(deflection): load for deflection, load in self.loads}
+        known = {name: self.values[name] for name in KINDS if name in self.values}
+        known |= {_load_name(deflection): load for deflection, load in self.loads}
         for load, length, width in self.footprints:
-            found |= {_print_name("length", load): length, _print_name("width", load): width}
-        return found
+            known |= {_print_name("length", load): length, _print_name("width", load): width}
+        return known
 
     def tolerance(self, name: str) -> float:
         """Relative tolerance of a figure; many points of one curve count as `ALIKE` do."""
@@ -255,7 +255,9 @@ def _rows(
     ):
         raise InputError(f"{path}: {key} is a list of {form}")
     rows = [
-        tuple(_number(path, key, one, *limits) for one, limits in zip(row, ranges, strict=True))
+        tuple(
+            _number(path, key, number, *limits) for number, limits in zip(row, ranges, strict=True)
+        )
         for row in given
     ]
     return tuple(sorted(rows))
@@ -290,11 +292,11 @@ class Tir:
         if key not in self.values:
             return None
         text, line = self.values[key]
-        found = _finite(text)
-        if found is None:
+        value = _finite(text)
+        if value is None:
             told = f"{key} = {text} is not a number{_hint(text)}" if text else f"{key} has no value"
             raise InputError(f"{self.path}, line {line}: {told}")
-        return found
+        return value
 
     def unit(self, key: str) -> str | None:
         """The unit as written if it is not that of SI."""
@@ -305,10 +307,10 @@ class Tir:
 def _finite(text: str) -> float | None:
     """A number as C or Fortran writes it; None if it is none or not finite."""
     try:
-        found = float(text.replace("D", "e").replace("d", "e"))
+        value = float(text.replace("D", "e").replace("d", "e"))
     except ValueError:
         return None
-    return found if math.isfinite(found) else None
+    return value if math.isfinite(value) else None
 
 
 def _hint(text: str) -> str:
@@ -385,7 +387,7 @@ def _curve(tir: Tir, nominal: float | None, notes: list[str]) -> list[list[float
     points: list[list[float]] = []
     for text, line in tir.tables.get(_CURVE, []):
         fields = re.split(r"[\s;]+", text)
-        pair = [one for one in map(_finite, fields) if one is not None]
+        pair = [number for number in map(_finite, fields) if number is not None]
         if len(fields) != 2 or len(pair) != 2:
             raise InputError(
                 f"{tir.path}, line {line}: [{_CURVE}] has lines of a deflection and a load, not {text[:40]!r}{_hint(text)}"
@@ -426,10 +428,10 @@ def _of_tir(text: str, path: Path, notes: list[str], sized: bool) -> dict[str, A
         )
     values: dict[str, float] = {}
     for key, kind in KINDS.items():
-        found = value(kind.tir) if kind.tir else None
-        if found is None or (found == 0 and key != "mass"):
+        stated = value(kind.tir) if kind.tir else None
+        if stated is None or (stated == 0 and key != "mass"):
             continue
-        values[key] = _checked(path, key, found)
+        values[key] = _checked(path, key, stated)
     load, radius, stiffness = (
         value("FNOMIN"),
         value("UNLOADED_RADIUS"),
@@ -442,7 +444,7 @@ def _of_tir(text: str, path: Path, notes: list[str], sized: bool) -> dict[str, A
             "footprint_length": 2 * radius * (q[1] * x + q[0] * math.sqrt(x)),
             "footprint_width": 2 * (value("WIDTH") or 0.0) * (q[3] * x + q[2] * np.cbrt(x)),
         }
-        values |= {key: _checked(path, key, float(one)) for key, one in sizes.items() if one > 0}
+        values |= {key: _checked(path, key, float(size)) for key, size in sizes.items() if size > 0}
     loads = _curve(tir, load, notes)
     table: dict[str, Any] = values | {"size": named} | ({"load": load} if load else {})
     table |= {"loads": loads} if loads else {}
@@ -485,10 +487,10 @@ def _size(path: Path, value: Callable[[str], float | None]) -> tuple[str, float]
     across = 10 * round((1e3 * width - 5) / 10) + 5
     named = f"{across}/{5 * round(20 * ratio)} R{round(2 * rim / 0.0254)}"
     try:
-        made = size(named)
+        size_found = size(named)
     except InputError as error:
         raise InputError(f"{path}: {str(error).removeprefix('tire.')}") from None
-    return named, (made.rim + made.height) / radius - 1 if radius else 0.0
+    return named, (size_found.rim + size_found.height) / radius - 1 if radius else 0.0
 
 
 @dataclass(frozen=True)
@@ -528,11 +530,11 @@ class Model:
         """Mass, frequencies and damping ratios of the inflated tire on its rim."""
         tire = construction(self.figures.size, factors, self.figures.rim_width)
         ring = InflatedRing(tire, ELEMENTS, ORDER, self.figures.inflation)
-        found = {"mass": ring.weight}
+        values = {"mass": ring.weight}
         for mode in ring.rigid_modes():
-            found[f"{mode.name}_frequency"] = mode.frequency
-            found[f"{mode.name}_damping"] = mode.damping
-        return found
+            values[f"{mode.name}_frequency"] = mode.frequency
+            values[f"{mode.name}_damping"] = mode.damping
+        return values
 
     def pressed(
         self, factors: Mapping[str, float], mesh: tuple[int, int] | None
@@ -548,7 +550,9 @@ class Model:
 
     def _scene(self, factors: Mapping[str, float], mesh: tuple[int, int] | None) -> str:
         of_static_state = {
-            one.name: factors.get(one.name, 1.0) for one in PARAMETERS if one.on_road
+            parameter.name: factors.get(parameter.name, 1.0)
+            for parameter in PARAMETERS
+            if parameter.on_road
         }
         text = tire_table(self.figures, of_static_state)
         if mesh:
@@ -578,42 +582,42 @@ class Model:
             }
         with h5py.File(out / "static.h5") as file:
             deflection = float(file.attrs["deflection"])
-        found = {f"{name}_stiffness": value for name, value in own.items()}
+        values = {f"{name}_stiffness": value for name, value in own.items()}
         apart = np.abs(curve["deflection"] - deflection) > 0.02 * deflection
         points = {0.0: 0.0, deflection: self.figures.load}
         points |= dict(zip(curve["deflection"][apart], curve["load"][apart], strict=True))
         moved, load = np.array(sorted(points.items())).T
         at = PchipInterpolator(moved, load, extrapolate=True)
         for there, _ in self.figures.loads:
-            found[_load_name(there)] = float(at(there))
+            values[_load_name(there)] = float(at(there))
         loads = np.sort(curve["load"])
         for name in ("length", "width"):
             sizes = curve[f"footprint_{name}"][np.argsort(curve["load"])]
             over = PchipInterpolator(np.append(0.0, loads), np.append(0.0, sizes), extrapolate=True)
-            found[f"footprint_{name}"] = float(over(self.figures.load))
+            values[f"footprint_{name}"] = float(over(self.figures.load))
             for there, *_ in self.figures.footprints:
-                found[_print_name(name, there)] = float(over(there))
-        return found
+                values[_print_name(name, there)] = float(over(there))
+        return values
 
     def all(self, factors: Mapping[str, float]) -> dict[str, float]:
         """Every figure; those on the road by the coarse mesh times what is known of its error."""
-        found = self.free(factors)
+        values = self.free(factors)
         if self.figures.pressed:
             for name, value in self.pressed(factors, COARSE).items():
-                found[name] = value * self.ratios.get(name, 1.0)
-        return found
+                values[name] = value * self.ratios.get(name, 1.0)
+        return values
 
     def correct(self, factors: Mapping[str, float]) -> None:
         """Take the ratios of the default to the coarse mesh from the tire with these factors."""
         coarse, fine = (self.pressed(factors, mesh) for mesh in (COARSE, None))
         self.ratios = {name: value / coarse[name] for name, value in fine.items()}
 
-    def residuals(self, found: Mapping[str, float]) -> np.ndarray:
+    def residuals(self, reached: Mapping[str, float]) -> np.ndarray:
         """Logarithms of ratios to the targets over the tolerances."""
         targets = self.figures.targets
         return np.array(
             [
-                np.log(found[name] / targets[name]) / self.figures.tolerance(name)
+                np.log(reached[name] / targets[name]) / self.figures.tolerance(name)
                 for name in self.names
             ]
         )
@@ -684,8 +688,8 @@ class _Place:
     def on_default_mesh(self, model: Model) -> _Place:
         """The same factors with the figures of the default mesh."""
         factors = _factors(self.place)
-        found = model.free(factors) | model.pressed(factors, None)
-        return replace(self, found=found, rest=model.residuals(found))
+        values = model.free(factors) | model.pressed(factors, None)
+        return replace(self, found=values, rest=model.residuals(values))
 
 
 def _least(model: Model, start: np.ndarray) -> _Place:
@@ -732,8 +736,8 @@ def _step(here: _Place, radius: float) -> np.ndarray:
     for _ in range(_REWEIGHTED):
         weight = _weights(here.rest + here.jacobian @ step)
         matrix = np.vstack([weight[:, None] * here.jacobian, drawn])
-        wanted = np.concatenate([-weight * here.rest, -drawn @ here.place])
-        last, step = step, lsq_linear(matrix, wanted, bounds=bounds).x
+        target = np.concatenate([-weight * here.rest, -drawn @ here.place])
+        last, step = step, lsq_linear(matrix, target, bounds=bounds).x
         if np.abs(step - last).max() < _SETTLED:
             break
     return step
@@ -742,13 +746,13 @@ def _step(here: _Place, radius: float) -> np.ndarray:
 def _moved(model: Model, here: _Place, step: np.ndarray) -> _Place:
     """The place a step further; of figures on the road with the Jacobian that explains what was seen (Broyden)."""
     place = np.clip(here.place + step, *_ranges())
-    found = model.all(_factors(place))
-    rest = model.residuals(found)
+    values = model.all(_factors(place))
+    rest = model.residuals(values)
     jacobian = here.jacobian + np.outer(rest - here.rest - here.jacobian @ step, step) / (
         step @ step
     )
-    jacobian[~model.on_road] = _free_rows(model, place, found, rest)
-    return _Place(place, found, rest, jacobian)
+    jacobian[~model.on_road] = _free_rows(model, place, values, rest)
+    return _Place(place, values, rest, jacobian)
 
 
 def _differentiated(model: Model, place: np.ndarray) -> _Place:
@@ -756,33 +760,33 @@ def _differentiated(model: Model, place: np.ndarray) -> _Place:
 
     These are nearer to the tire as built in one factor each.
     """
-    found = model.all(_factors(place))
-    rest = model.residuals(found)
+    values = model.all(_factors(place))
+    rest = model.residuals(values)
     jacobian = np.zeros((len(rest), len(place)))
     beside = []
-    for k, one in enumerate(PARAMETERS):
+    for k, parameter in enumerate(PARAMETERS):
         by = -_ROAD_STEP if place[k] > 0 else _ROAD_STEP
         moved = place + by * (np.arange(len(place)) == k)
         there = model.all(_factors(moved))
         jacobian[:, k] = (model.residuals(there) - rest) / by
         beside.append(_Place(moved, there, model.residuals(there), jacobian))
-        console.say(f"  sensitivity to {one.name}: {one.doc}")
+        console.say(f"  sensitivity to {parameter.name}: {parameter.doc}")
     least = _ENOUGH + _SHARE * _misfit(rest, place)
-    best = min(beside, key=lambda one: one.misfit)
+    best = min(beside, key=lambda trial: trial.misfit)
     if best.misfit > _misfit(rest, place) - least:
-        best = _Place(place, found, rest, jacobian)
+        best = _Place(place, values, rest, jacobian)
     jacobian[~model.on_road] = _free_rows(model, best.place, best.found, best.rest)
     return best
 
 
 def _free_rows(
-    model: Model, place: np.ndarray, found: Mapping[str, float], rest: np.ndarray
+    model: Model, place: np.ndarray, reached: Mapping[str, float], rest: np.ndarray
 ) -> np.ndarray:
     """Rows of the Jacobian that are those of the free tire; a second each."""
     columns = []
     for k in range(len(place)):
         factors = _factors(place + _STEP * (np.arange(len(place)) == k))
-        there = model.residuals(dict(found) | model.free(factors))
+        there = model.residuals(dict(reached) | model.free(factors))
         columns.append((there - rest)[~model.on_road] / _STEP)
     return np.array(columns).T
 
@@ -803,29 +807,35 @@ def _left(jacobian: np.ndarray) -> dict[str, float]:
     """Standard deviation of each parameter's logarithm with the figures, over that without them."""
     spread = np.linalg.inv(jacobian.T @ jacobian + np.diag(_deviations() ** -2.0))
     shares = np.sqrt(np.diag(spread)) / _deviations()
-    return {one.name: float(share) for one, share in zip(PARAMETERS, shares, strict=True)}
+    return {
+        parameter.name: float(share) for parameter, share in zip(PARAMETERS, shares, strict=True)
+    }
 
 
 def _deviations() -> np.ndarray:
-    return np.array([one.deviation for one in PARAMETERS])
+    return np.array([parameter.deviation for parameter in PARAMETERS])
 
 
 def _ranges() -> tuple[np.ndarray, np.ndarray]:
     """Least and largest logarithm of each factor."""
-    low, high = (np.log([getattr(one, end) for one in PARAMETERS]) for end in ("least", "most"))
+    low, high = (
+        np.log([getattr(parameter, end) for parameter in PARAMETERS]) for end in ("least", "most")
+    )
     return low, high
 
 
 def _factors(place: np.ndarray) -> dict[str, float]:
-    return {one.name: float(np.exp(p)) for one, p in zip(PARAMETERS, place, strict=True)}
+    return {
+        parameter.name: float(np.exp(p)) for parameter, p in zip(PARAMETERS, place, strict=True)
+    }
 
 
-def _worst(model: Model, found: Mapping[str, float]) -> str:
+def _worst(model: Model, reached: Mapping[str, float]) -> str:
     """The figure that is farthest off."""
     if not model.names:
         return "only damping ratios are asked for"
     targets = model.figures.targets
-    off = {name: found[name] / targets[name] - 1 for name in model.names}
+    off = {name: reached[name] / targets[name] - 1 for name in model.names}
     name = max(off, key=lambda one: abs(off[one]) / model.figures.tolerance(one))
     return f"{name} {100 * off[name]:+.1f} %, farthest off of {len(off)} figures"
 
@@ -839,14 +849,14 @@ def _losses(figures: FitFigures, factors: Mapping[str, float]) -> dict[str, floa
     columns = []
     for which in _LOSSES:
         alone = {f"{other} loss": 1.0 if other == which else 0.0 for other in _LOSSES}
-        found = model.free(dict(factors) | alone)
+        values = model.free(dict(factors) | alone)
         columns.append(
-            [found[name] / figures.values[name] / KINDS[name].tolerance for name in names]
+            [values[name] / figures.values[name] / KINDS[name].tolerance for name in names]
         )
     matrix = np.vstack([np.array(columns).T, np.eye(2) / _LOSS_SPREAD])
     asked = [1 / KINDS[name].tolerance for name in names]
-    wanted = np.concatenate([asked, np.ones(2) / _LOSS_SPREAD])
-    best = lsq_linear(matrix, wanted, bounds=_LOSS).x
+    target = np.concatenate([asked, np.ones(2) / _LOSS_SPREAD])
+    best = lsq_linear(matrix, target, bounds=_LOSS).x
     return {f"{which} loss": float(value) for which, value in zip(_LOSSES, best, strict=True)}
 
 
@@ -864,24 +874,24 @@ def tire_table(figures: FitFigures, factors: Mapping[str, float]) -> str:
     return "\n".join([*lines, *(["", "[tire.scale]", *scale] if scale else [])]) + "\n"
 
 
-def report(found: Fitted) -> str:
+def report(fitted: Fitted) -> str:
     """The figures beside those reached, the factors, and what cannot be reached."""
-    figures = found.figures
+    figures = fitted.figures
     rows = [("figure", "asked", "as built", "fitted", "off")]
     missed = []
     for name in figures.targets:
-        wanted, before, reached = found.row(name)
-        off = reached / wanted - 1
-        values = (f"{wanted:.5g}", f"{before:.5g}", f"{reached:.5g}", f"{100 * off:+.1f} %")
+        asked, before, reached = fitted.row(name)
+        off = reached / asked - 1
+        values = (f"{asked:.5g}", f"{before:.5g}", f"{reached:.5g}", f"{100 * off:+.1f} %")
         rows.append((f"{name}, {_unit(name)}", *values))
         if abs(off) > 2 * figures.tolerance(name):
             missed.append(f"{name} ({100 * off:+.1f} %)")
     lines = _aligned(rows)
     lines += ["", "factors of the built-in tire's values:"]
-    lines += _aligned([_factor_row(found, name) for name in found.factors])
-    strange = [name for name, value in found.factors.items() if _implausible(value)]
+    lines += _aligned([_factor_row(fitted, name) for name in fitted.factors])
+    strange = [name for name, value in fitted.factors.items() if _implausible(value)]
     if strange:
-        named = ", ".join(f"{name} x {found.factors[name]:.2f}" for name in strange)
+        named = ", ".join(f"{name} x {fitted.factors[name]:.2f}" for name in strange)
         lines.append(
             f"outside the plausible range, {1 / PLAUSIBLE:.2f} to {PLAUSIBLE:g}: {named}: look whether such a tire is "
             "built, and whether the figures are all of one tire and of the same conditions"
@@ -911,24 +921,26 @@ def _implausible(factor: float) -> bool:
     return max(factor, 1 / factor) > PLAUSIBLE
 
 
-def _factor_row(found: Fitted, name: str) -> tuple[str, ...]:
+def _factor_row(fitted: Fitted, name: str) -> tuple[str, ...]:
     """Name, value, what is known of it, and what it multiplies."""
-    one = next((one for one in PARAMETERS if one.name == name), None)
-    value = found.factors[name]
-    if one is None:
+    parameter = next((one for one in PARAMETERS if one.name == name), None)
+    value = fitted.factors[name]
+    if parameter is None:
         return f"  {name}", f"{value:.3f}", "", "of loss factors"
-    left = found.left.get(name, 1.0)
-    stays = left > _STAYS and abs(math.log(value)) < (1 - _STAYS) * one.deviation
-    known = "no figure determines it" if stays else f"± {100 * left * one.deviation:.0f} %"
-    at_end = min(value / one.least, one.most / value) < 1.001
-    ending = f" (at the end of its range, {one.least:g} to {one.most:g})" if at_end else ""
-    return f"  {name}", f"{value:.3f}", known, f"{one.doc}{ending}"
+    left = fitted.left.get(name, 1.0)
+    stays = left > _STAYS and abs(math.log(value)) < (1 - _STAYS) * parameter.deviation
+    known = "no figure determines it" if stays else f"± {100 * left * parameter.deviation:.0f} %"
+    at_end = min(value / parameter.least, parameter.most / value) < 1.001
+    ending = (
+        f" (at the end of its range, {parameter.least:g} to {parameter.most:g})" if at_end else ""
+    )
+    return f"  {name}", f"{value:.3f}", known, f"{parameter.doc}{ending}"
 
 
 def read_of(figures: FitFigures, path: Path, changes: Sequence[str] = ()) -> list[files.Row]:
     """Rows of the table of a run's files: what was read of a file of figures as what."""
     tir = path.suffix.lower() == ".tir"
-    found: list[tuple[str, str, str, str]] = [
+    listed: list[tuple[str, str, str, str]] = [
         ("size", "[DIMENSION]" if tir else "size", "", figures.size),
         (
             "inflation",
@@ -940,17 +952,17 @@ def read_of(figures: FitFigures, path: Path, changes: Sequence[str] = ()) -> lis
     ]
     for name, value in figures.values.items():
         key = (KINDS[name].tir or "Q_RA1 to Q_RB2, FNOMIN, VERTICAL_STIFFNESS") if tir else name
-        found.append((name, key, KINDS[name].unit, f"{value:g}"))
+        listed.append((name, key, KINDS[name].unit, f"{value:g}"))
     for name, rows, unit in (
         ("loads", figures.loads, "m, N"),
         ("footprints", figures.footprints, "N, m, m"),
     ):
         if rows:
-            found.append((name, f"[{_CURVE}]" if tir else name, unit, f"{len(rows)} rows"))
-    given = {change.partition("=")[0].strip() for change in changes}
+            listed.append((name, f"[{_CURVE}]" if tir else name, unit, f"{len(rows)} rows"))
+    changed = {change.partition("=")[0].strip() for change in changes}
     rows_of = [
-        (path.name, name, "--set" if name in given else key, unit, text)
-        for name, key, unit, text in found
+        (path.name, name, "--set" if name in changed else key, unit, text)
+        for name, key, unit, text in listed
     ]
     return [*rows_of, *((path.name, "remark", "", "", note) for note in figures.notes)]
 
@@ -961,17 +973,17 @@ def command(path: Path, out: Path, changes: Sequence[str] = ()) -> str:
     for line in files.table(read_of(figures, path, changes)):
         console.say(line)
     try:
-        found = fit(figures)
+        fitted = fit(figures)
     except ConvergenceError as error:
         raise ConvergenceError(f"{path}: {error}") from None
     out.mkdir(parents=True, exist_ok=True)
-    text = report(found)
+    text = report(fitted)
     scene = [
         f"# {figures.size} fitted to {path.name}:",
         *(f"#   {line}".rstrip() for line in text.splitlines()),
         f'name = "{scene_name(out.name)}"',
         "",
-        tire_table(figures, found.factors),
+        tire_table(figures, fitted.factors),
         "[static]",
         f"inflation = {figures.inflation:.6g}",
         f"load = {figures.load:.6g}",

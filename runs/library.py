@@ -141,9 +141,9 @@ def typed(function: Callable[P, T]) -> Callable[P, T]:
                 )
         for name, kind in kinds().items():
             if name in arguments and not isinstance(arguments[name], kind):
-                found = type(arguments[name]).__name__
+                name_of = type(arguments[name]).__name__
                 raise InputError(
-                    f"{function.__name__}: {name} is of the type {found}: take what {_maker(kind)} returns"
+                    f"{function.__name__}: {name} is of the type {name_of}: take what {_maker(kind)} returns"
                 )
         try:
             return function(*bound.args, **bound.kwargs)
@@ -156,7 +156,7 @@ def typed(function: Callable[P, T]) -> Callable[P, T]:
 
 def _maker(hint: Any) -> str | None:
     """The function that makes the class of an annotation, which may also allow None."""
-    names = [getattr(one, "__name__", "") for one in (hint, *get_args(hint))]
+    names = [getattr(kind, "__name__", "") for kind in (hint, *get_args(hint))]
     return next((_MADE_BY[name] for name in names if name in _MADE_BY), None)
 
 
@@ -240,11 +240,11 @@ def radial(
         section="radial", shape=shape, segments=segments, order=2, footprint_size=footprint_size
     )
     try:
-        made = scaled(tire, shape.scale or {})
+        scaled_tire = scaled(tire, shape.scale or {})
     except InputError as problem:
         raise InputError(in_arguments(f"radial: {problem}")) from None
     wlf(temperature)
-    return make_tire(comm, made, temperature)
+    return make_tire(comm, scaled_tire, temperature)
 
 
 def _check_ranges(torus: Torus) -> None:
@@ -379,10 +379,10 @@ def modes(
 
 def _check_state(tire: TireModel, static: StaticState) -> None:
     """Raise InputError if a static state is not that of the tire. Collective."""
-    lattice, found = tire.lattice, len(static.displacement)
+    lattice, nodes = tire.lattice, len(static.displacement)
     why = ""
-    if found != lattice.size:
-        why = f"it has {found} nodes, and the tire {lattice.size}"
+    if nodes != lattice.size:
+        why = f"it has {nodes} nodes, and the tire {lattice.size}"
     elif not np.allclose(static.points, lattice.points(lattice.face), rtol=0, atol=1e-9):
         why = "its nodes lie elsewhere"
     elif static.materials and static.materials != tire.body.materials:
@@ -701,13 +701,13 @@ def _pitches(spacing: float | tuple[float, float] | None) -> tuple[float, float]
     return float(along), float(across)
 
 
-def _check_pitches(pitches: tuple[float, float], found: Footprint) -> None:
+def _check_pitches(pitches: tuple[float, float], footprint: Footprint) -> None:
     """InputError if fewer than two points fit along or across the footprint at rest."""
-    extents = found.length, found.width
+    extents = footprint.length, footprint.width
     if any(0 < extent < pitch for extent, pitch in zip(extents, pitches, strict=True)):
         raise InputError(
             f"drive: spacing = {pitches[0]:g} m along, {pitches[1]:g} m across leaves less than two points in a "
-            f"footprint of {found.length:.3g} m x {found.width:.3g} m: take {min(extents) / 8:.1g} m, for example"
+            f"footprint of {footprint.length:.3g} m x {footprint.width:.3g} m: take {min(extents) / 8:.1g} m, for example"
         )
 
 
@@ -715,11 +715,11 @@ def _blocks(
     spec: ContactSpec, setup: ContactSetup, response: Response, chosen: Steps, comm: MPI.Comm
 ) -> list[Block]:
     """Run the time loop with the integration scheme that suits the contact. Collective."""
-    kept = response.resolved(chosen.size)
+    resolved = response.resolved(chosen.size)
     scheme = choose(
-        oscillation(spec, setup.patch, kept, chosen.size, bristles(spec, setup.patch))
+        oscillation(spec, setup.patch, resolved, chosen.size, bristles(spec, setup.patch))
     ).scheme
-    recursion = Recursion(response=kept, step=chosen.size, scheme=scheme, comm=comm)
+    recursion = Recursion(response=resolved, step=chosen.size, scheme=scheme, comm=comm)
     loop = make_loop(spec, setup, recursion, chosen.size)
     return list(loop.roll(setup.drive, chosen.size, chosen.count))
 

@@ -53,12 +53,12 @@ def finished(
     """
     results = run if isinstance(run, RunResults) else RunResults(run)  # type: ignore[arg-type]
     scene = load(results.directory / "scene.toml")
-    given = {"microphones": microphones, "temperature": temperature, "up_to": up_to}
+    settings = {"microphones": microphones, "temperature": temperature, "up_to": up_to}
     table = SoundTable(
         **{
-            item.name: _read(item, given[item.name])
+            item.name: _read(item, settings[item.name])
             for item in fields(SoundTable)
-            if item.name in given
+            if item.name in settings
         },
         air=scene.sound.air if scene.sound else None,
         road=_layer(road),

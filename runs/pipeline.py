@@ -88,9 +88,9 @@ def share(surface: RoadKind, comm: MPI.Comm) -> None:
             road = made(surface)
         except InputError as told:
             error = told
-    failed = [one for one in comm.allgather(error) if one is not None]
-    if not failed and (found := _sent(road, node)) is not None:
-        keep(surface, found)
+    failed = [failure for failure in comm.allgather(error) if failure is not None]
+    if not failed and (shared := _sent(road, node)) is not None:
+        keep(surface, shared)
     node.Free()
     if failed:
         raise failed[0]
@@ -179,14 +179,14 @@ def run_scene(
         for kind in PARTS:
             with failure_recorded(kind.name, summary, comm):
                 if issubclass(kind, Stage) and kind.name in reasons:
-                    found = _skipped(kind, job, done, reasons[kind.name], summary)
+                    result = _skipped(kind, job, done, reasons[kind.name], summary)
                 else:
-                    found = _made(kind, job, done, summary)
-                if found is not None:
-                    done[kind.name] = found
+                    result = _made(kind, job, done, summary)
+                if result is not None:
+                    done[kind.name] = result
                 job.settle(done)
-                if found is not None and kind is Setup and "contact" not in reasons:
-                    _ = found.product  # a road narrower than the footprint is refused before modes
+                if result is not None and kind is Setup and "contact" not in reasons:
+                    _ = result.product  # a road narrower than the footprint is refused before modes
     stages = on_root(comm, lambda: summary.data["stages"])
     _check_options(petsc_options, [k for k, stage in stages.items() if stage["status"] == "reused"])
     peak = largest_memory(comm)
@@ -215,10 +215,10 @@ def _begun(job: Job, until: str | None) -> tuple[Summary, float, bool]:
         on_root(comm, lambda: summary.note_files(read))
         for line in files.table(read):
             console.say(line)
-    wanted = on_root(comm, lambda: estimate(scene, until))  # may read the road's file
-    on_disk = on_root(comm, lambda: out_of_core(wanted, comm.size))
-    each = 1e-9 * sum(memory_of(wanted, comm.size, on_disk).values()) / comm.size
-    _say_demand(wanted, each, directory, comm)
+    demand = on_root(comm, lambda: estimate(scene, until))  # may read the road's file
+    on_disk = on_root(comm, lambda: out_of_core(demand, comm.size))
+    each = 1e-9 * sum(memory_of(demand, comm.size, on_disk).values()) / comm.size
+    _say_demand(demand, each, directory, comm)
     on_root(comm, summary.begin)  # not before: a scene that is refused replaces nothing
     return summary, each, on_disk
 
@@ -250,17 +250,17 @@ def _factors(on_disk: bool, directory: Path, comm: MPI.Comm) -> Iterator[None]:
     on_root(comm, lambda: remove_factors(directory))
 
 
-def _say_demand(wanted: Estimate, each: float, directory: Path, comm: MPI.Comm) -> None:
+def _say_demand(demand: Estimate, each: float, directory: Path, comm: MPI.Comm) -> None:
     """Announce the estimated demand, `each` process in GB.
 
     Raises InputError if the machine has far too little. Collective.
     """
-    for text in on_root(comm, lambda: check_demand(wanted, directory, comm.size)):
+    for text in on_root(comm, lambda: check_demand(demand, directory, comm.size)):
         console.warn(text)
     console.say(
         f"estimated: {each:.2g} GB a process, "
-        f"{sum(wanted.disk.values()) / 1e9:.2g} GB of disk, "
-        f"{duration(sum(wanted.seconds.values()))} of one core"
+        f"{sum(demand.disk.values()) / 1e9:.2g} GB of disk, "
+        f"{duration(sum(demand.seconds.values()))} of one core"
     )
 
 
@@ -282,8 +282,8 @@ def _check_options(petsc_options: list[str], reused: Sequence[str] = ()) -> None
     """Warn of options that PETSc never read: misspelt, or of a stage that was `reused`."""
     unused = [o for o in petsc_options if o.startswith("-") and not _was_read(o.lstrip("-"))]
     if unused:
-        kept = f"; reused stages read none ({', '.join(reused)}): --fresh" if reused else ""
-        console.warn(f"PETSc options that nothing read: {' '.join(unused)}{kept}")
+        reused_text = f"; reused stages read none ({', '.join(reused)}): --fresh" if reused else ""
+        console.warn(f"PETSc options that nothing read: {' '.join(unused)}{reused_text}")
 
 
 def _was_read(name: str) -> bool:

@@ -66,11 +66,11 @@ def freedom(centre: Array, spacing: float, held: Sequence[int] = (1,)) -> Array:
     """
     count, several = np.array(held, float), np.array(held) > 1
     within, between = count.sum(), (count - 1)[several].sum()
-    found = []
+    degrees = []
     for middle in np.atleast_1d(centre):
         own, next_ = _variances(float(middle), spacing)
-        found.append(2 * within**2 / (within * own + 2 * between * next_))
-    return np.array(found)
+        degrees.append(2 * within**2 / (within * own + 2 * between * next_))
+    return np.array(degrees)
 
 
 def _variances(centre: float, spacing: float) -> tuple[float, float]:
@@ -88,10 +88,10 @@ def _variances(centre: float, spacing: float) -> tuple[float, float]:
 def _correlations() -> tuple[Array, Array]:
     """r_0(d) and r_1(d), d = 0 ... 15, beyond which they are below 1e-7."""
     weight = np.sin(np.pi * np.arange(_STEPS) / _STEPS) ** 2
-    kept, half = 16, _STEPS // 2
+    lags, half = 16, _STEPS // 2
     products = weight**2, np.concatenate([weight[half:] * weight[:half], np.zeros(half)])
     own, next_ = (
-        np.abs(np.fft.fft(product)[:kept]) ** 2 / (weight @ weight) ** 2 for product in products
+        np.abs(np.fft.fft(product)[:lags]) ** 2 / (weight @ weight) ** 2 for product in products
     )
     return own, next_
 
@@ -107,21 +107,21 @@ def largest(degrees: Array) -> float:
     return float(np.abs(confidence(degrees)).max(initial=0.0))
 
 
-def planned(centre: Array, spacing: float, wanted: float) -> StretchPlan:
-    """As few stretches as bring the levels at `centre` (b,) Hz within `wanted` dB of those of the process, in 95 %.
+def planned(centre: Array, spacing: float, decibels: float) -> StretchPlan:
+    """As few stretches as bring the levels at `centre` (b,) Hz within `decibels` dB of those of the process, in 95 %.
 
     `spacing` (Hz): of the lines of the run's own record. A longer stretch is cheaper than several: it has one run-in, and
     overlapping windows. There are two at least, for two processes, and a power of two beyond `MOST_WINDOWS` windows each,
     whatever the number of processes, so that results do not depend on it.
     """
-    if not len(centre) or largest(freedom(centre, spacing)) <= wanted:
+    if not len(centre) or largest(freedom(centre, spacing)) <= decibels:
         return StretchPlan(0, 0)
     count = 2
     while count < MOST_STRETCHES:
         for each in range(1, MOST_WINDOWS + 1):
-            found = StretchPlan(count, each)
-            if largest(freedom(centre, spacing, found.all_windows)) <= wanted:
-                return found
+            plan = StretchPlan(count, each)
+            if largest(freedom(centre, spacing, plan.all_windows)) <= decibels:
+                return plan
         count *= 2
     return StretchPlan(MOST_STRETCHES, MOST_WINDOWS)
 

@@ -115,9 +115,9 @@ def measured(
     """
     centre, level = third_octaves(force, step, limit)
     if bands is not None:
-        own, found = np.nonzero(np.isclose(bands[:, None], centre))
+        own, band = np.nonzero(np.isclose(bands[:, None], centre))
         resolved, level, centre = level, np.full((len(bands), 3), np.nan), bands
-        level[own] = resolved[found]
+        level[own] = resolved[band]
     mean, duration = force.mean(axis=0), len(force) * step
     lines = low_part(force - mean, duration, limit)
     off = deviation(force, step, limit)

@@ -272,10 +272,10 @@ def density(
     if rate:
         power = power * (2 * np.pi * frequency[:, None]) ** 2
     independent = averages.sum() ** 2 / (averages + (averages - 1) / 18).sum()
-    kept = frequency <= up_to
+    below_limit = frequency <= up_to
     return Density(
-        frequency[kept],
-        power[kept],
+        frequency[below_limit],
+        power[below_limit],
         width * step,
         int(averages.sum()),
         confidence(np.array(2 * independent)),
@@ -291,12 +291,12 @@ class Distance:
 
 
 def distance(
-    reference: np.ndarray, found: np.ndarray, duration: float, band: float = BAND
+    reference: np.ndarray, history: np.ndarray, duration: float, band: float = BAND
 ) -> Distance:
     """Fourier coefficients of windowed values (n, k) at t = h ... duration, up to `band` Hz."""
     rest = reference.mean(axis=0)
     exact = low_part(reference - rest, duration, band)
-    off = low_part(found - rest, duration, band) - exact
+    off = low_part(history - rest, duration, band) - exact
     # Back in time, at the same number of instants for both.
     seen = [np.fft.irfft(part, 8 * len(exact), axis=0) for part in (off, exact)]
     worst, most = (np.abs(part).max() for part in seen)
@@ -356,9 +356,9 @@ def limits(*, step: float, highest: float, pitch: float, speed: float) -> tuple[
     return tuple(found)
 
 
-def lowest(found: Iterable[Limit]) -> Limit:
+def lowest(limits: Iterable[Limit]) -> Limit:
     """The lowest limit, which counts."""
-    return min(found, key=lambda limit: limit.frequency)
+    return min(limits, key=lambda limit: limit.frequency)
 
 
 def pitch(patch: Patch) -> float:

@@ -112,9 +112,9 @@ def squeezed(
 def _cubic(at: float) -> Array:
     """Weights (4,) of values at -1, 0, 1, 2 for the cubic through them at a place between 0 and 1."""
     apart = at - _NODES
-    found = np.ones(4)
+    coefficients = np.ones(4)
     for k in range(4):
         for j in range(4):
             if j != k:
-                found[k] *= apart[j] / (_NODES[k] - _NODES[j])
-    return found
+                coefficients[k] *= apart[j] / (_NODES[k] - _NODES[j])
+    return coefficients

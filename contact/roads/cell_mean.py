@@ -146,12 +146,12 @@ def _distinct(values: Array, apart: float) -> tuple[Array, NDArray[np.intp]]:
 def _across(offset: Array, within: NDArray[np.bool_]) -> Array:
     """Weights (4, m, r) of strips at offsets (m, r) m: of the mean `within` the width, of the slope by least
     squares there, and of both over twice the width."""
-    found = []
+    cells = []
     for used in (within, np.ones(len(within), dtype=bool)):
         inside = np.where(used[:, None], offset, 0.0)
         mean = np.broadcast_to(used[:, None] / used.sum(), offset.shape)
-        found += [mean, inside / (inside**2).sum(axis=0)]
-    return np.stack(found)
+        cells += [mean, inside / (inside**2).sum(axis=0)]
+    return np.stack(cells)
 
 
 def _parts(offset: Array, step: float, half: Array) -> Array:

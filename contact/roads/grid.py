@@ -316,8 +316,8 @@ class Window:
 
     def _by_pieces(self, i: NDArray[np.intp], s: Array, j: NDArray[np.intp], t: Array) -> Array:
         out, piece = np.empty(i.shape), i // (self._most - 1)
-        for one in np.unique(piece):
-            here = piece == one
+        for number in np.unique(piece):
+            here = piece == number
             out[here] = self.bilinear(i[here], s[here], j[here], t[here])
         return out
 

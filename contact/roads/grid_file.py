@@ -238,7 +238,10 @@ class _Meaning:
         of = self.codes[whose or "z"]
         of_z = whose == "z" or plain.startswith(("z_", "height"))
         if _MISSING_NAME.fullmatch(plain):
-            of["missing"] = (*of.get("missing", ()), *(float(one) for one in numbers if one == one))
+            of["missing"] = (
+                *of.get("missing", ()),
+                *(float(number) for number in numbers if number == number),
+            )
         elif plain == "scale_factor":
             of["scale"] = of.get("scale", 1.0) * float(numbers[0])
         elif plain == "add_offset":
@@ -333,18 +336,18 @@ class _Meaning:
 
     def coding(self, role: str) -> Coding:
         """How the numbers of x, y or z are coded."""
-        one = Coding(**self.codes[role])
+        coding = Coding(**self.codes[role])
         if role == "z" and self.down:
-            return replace(one, scale=-one.scale, offset=-one.offset)
-        return one
+            return replace(coding, scale=-coding.scale, offset=-coding.offset)
+        return coding
 
 
 def _texts_of(value: Any) -> list[str]:
     """The text of an attribute, or its few texts; empty where it is none."""
-    one = np.asarray(value)
-    if not 0 < one.size <= 9 or one.dtype.kind not in "USO":
+    array = np.asarray(value)
+    if not 0 < array.size <= 9 or array.dtype.kind not in "USO":
         return []
-    items = one.ravel().tolist()
+    items = array.ravel().tolist()
     return [
         item.decode("utf-8", "replace") if isinstance(item, bytes) else str(item) for item in items
     ]
@@ -456,12 +459,12 @@ def _mask(archive: zipfile.ZipFile, name: str, shape: tuple[int, int], source: s
     if info.file_size > 8 * shape[0] * shape[1] + 20_000:
         raise InputError(f"{source}: {name} is larger than z")
     with archive.open(info) as stream:
-        found = np.lib.format.read_array(stream, allow_pickle=False)
-    if found.shape == ():  # no height is masked
-        found = np.full(shape, bool(found))
-    if found.shape != shape or found.dtype.kind not in "biu":
-        raise InputError(f"{source}: {name} is {found.dtype} of shape {found.shape}, z has {shape}")
-    return ArrayRows(found)
+        mask = np.lib.format.read_array(stream, allow_pickle=False)
+    if mask.shape == ():  # no height is masked
+        mask = np.full(shape, bool(mask))
+    if mask.shape != shape or mask.dtype.kind not in "biu":
+        raise InputError(f"{source}: {name} is {mask.dtype} of shape {mask.shape}, z has {shape}")
+    return ArrayRows(mask)
 
 
 def _rows(file: Path, archive: zipfile.ZipFile, name: str) -> Rows:
@@ -552,7 +555,7 @@ def read_hdf5(file: Path, keys: Keys) -> Found:
         if isinstance(store.get(name, getlink=True), h5py.ExternalLink):
             raise InputError(f"{source}: {name} is a link to another file; copy it into this")
         datasets[role] = store.get(name)
-    missing = [name for name, found in datasets.items() if not isinstance(found, h5py.Dataset)]
+    missing = [name for name, array in datasets.items() if not isinstance(array, h5py.Dataset)]
     if missing:
         raise InputError(f"{source}: no dataset {', '.join(missing)}; x, y and z are needed")
     meaning = _Meaning()
@@ -566,9 +569,9 @@ def read_hdf5(file: Path, keys: Keys) -> Found:
             and np.asarray(value).dtype.kind in "iuf"
         ]
     beside = {
-        name: found[()]
-        for name, found in store.items()
-        if _is_small(found) and found not in datasets.values()
+        name: array[()]
+        for name, array in store.items()
+        if _is_small(array) and array not in datasets.values()
     }
     for name, value in {**store.attrs, **beside}.items():
         meaning.take("", name, value, source)
@@ -595,11 +598,11 @@ def read_hdf5(file: Path, keys: Keys) -> Found:
     return _found(x, y, Hdf5Rows(z, turned), meaning, keys, source, notes, mask)
 
 
-def _is_small(found: Any) -> bool:
+def _is_small(item: Any) -> bool:
     """Whether an object of an HDF5 file is a dataset of a few entries."""
     import h5py
 
-    return isinstance(found, h5py.Dataset) and found.shape is not None and found.size <= 9
+    return isinstance(item, h5py.Dataset) and item.shape is not None and item.size <= 9
 
 
 def _turned(z: h5py.Dataset, shape: tuple[int, int]) -> tuple[bool, tuple[str, ...]]:
@@ -721,28 +724,28 @@ def read_grid(
         if unit is not None and unit not in UNITS:
             raise InputError(f'road: {key} = "{unit}" is unknown: take one of {", ".join(UNITS)}')
     try:
-        found = reader(file, Keys(length_unit, height_unit, missing))
-        grid = _grid(found, holes, end, missing, source)
+        content = reader(file, Keys(length_unit, height_unit, missing))
+        grid = _grid(content, holes, end, missing, source)
     except UNREADABLE as error:
         raise InputError(f"{source}: cannot be read ({error}); is it complete?") from error
     return grid
 
 
 def _grid(
-    found: Found, holes: str, end: str, missing: tuple[float, ...] | None, source: str
+    content: Found, holes: str, end: str, missing: tuple[float, ...] | None, source: str
 ) -> Grid:
     """The road of what was found in a file."""
-    along, across, up = found.scales
+    along, across, up = content.scales
     pairs = [(along, across, "x", "length_unit"), (across, along, "y", "length_unit")]
     pairs += [(up, along, "the heights", "height_unit"), (up, across, "the heights", "height_unit")]
-    pairs += [(along, up, "x", "length_unit")] if found.text else []
+    pairs += [(along, up, "x", "length_unit")] if content.text else []
     for mine, other, name, key in pairs:
         if mine is None and other is not None and other.stated:
             raise InputError(
                 f"{source}: a unit stands beside others, {other.text}, and not beside {name}: say road.{key}"
             )
     height = up or (along and replace(along, text=f"{along.text}, as x"))
-    for name, axis, scale in (("x", found.x, along), ("y", found.y, across)):
+    for name, axis, scale in (("x", content.x, along), ("y", content.y, across)):
         if scale is None and counted(axis):
             raise InputError(
                 f"{source}: {name} is {axis[0]:g}, {axis[1]:g}, {axis[2]:g}, … {axis[-1]:g}, which may count the heights: if it "
@@ -750,15 +753,15 @@ def _grid(
             )
     lengths = [scale.metres if scale else 1.0 for scale in (along, across)]
     metre = height.metres if height else 1.0
-    coding = replace(found.coding, unit=metre, missing=_all_missing(found.coding, missing))
-    rows: Rows = found.rows
-    if coding != Coding() or found.mask is not None:
-        rows = Decoded(rows, coding, found.mask)
+    coding = replace(content.coding, unit=metre, missing=_all_missing(content.coding, missing))
+    rows: Rows = content.rows
+    if coding != Coding() or content.mask is not None:
+        rows = Decoded(rows, coding, content.mask)
     grid = Grid(
-        lengths[0] * found.x, lengths[1] * found.y, rows, holes=holes, end=end, source=source
+        lengths[0] * content.x, lengths[1] * content.y, rows, holes=holes, end=end, source=source
     )
     if missing is None or len(missing):
-        if odd := [one for one in found.odd if one not in coding.missing]:
+        if odd := [line for line in content.odd if line not in coding.missing]:
             raise refused(odd, 0, "written with other decimals than the heights", source)
         grid.search = CodeSearch(source, metre, coding.scale or 1.0, coding.offset)
         grid.look_for_codes()
@@ -775,7 +778,7 @@ def _grid(
         ReadAs(name, place, scale.text if scale else assumed, remark)
         for name, place, scale, remark in zip(
             ("x", "y", "height"),
-            found.places,
+            content.places,
             (along, across, height),
             (
                 "",
@@ -787,7 +790,7 @@ def _grid(
     )
     unsaid = [name for name, scale in (("x and y", along), ("heights", height)) if scale is None]
     grid.notes = (
-        *found.notes,
+        *content.notes,
         *([f"{' and '.join(unsaid)} in {ASSUMED}: assumed"] if unsaid else []),
     )
     return grid
@@ -795,7 +798,7 @@ def _grid(
 
 def _gaps(rows: Rows, missing: tuple[float, ...]) -> str:
     """How many heights are missing, where they are few enough to be counted, and the numbers that say so."""
-    named = f"no height: {', '.join(f'{one:g}' for one in missing)}" if missing else ""
+    named = f"no height: {', '.join(f'{code:g}' for code in missing)}" if missing else ""
     total = rows.shape[0] * rows.shape[1]
     if total > COUNTED:
         return named
@@ -815,7 +818,7 @@ def counted(axis: Array) -> bool:
 
 def _all_missing(coding: Coding, missing: tuple[float, ...] | None) -> tuple[float, ...]:
     """Numbers of the file that it or the scene calls missing."""
-    given = missing or ()
+    codes = missing or ()
     if (coding.scale, coding.offset) != (1.0, 0.0):
-        given = (*given, *((one - coding.offset) / coding.scale for one in given))
-    return (*coding.missing, *given)
+        codes = (*codes, *((code - coding.offset) / coding.scale for code in codes))
+    return (*coding.missing, *codes)

@@ -191,7 +191,7 @@ def _list(file: Path, head: list[Line], lines: Iterator[Line], layout: Layout, k
         else ("three columns without headings: x, y, height assumed",)
     )
     others = [
-        f'column {k + 1} "{one.title}"' for k, one in enumerate(layout.columns) if k not in at
+        f'column {k + 1} "{column.title}"' for k, column in enumerate(layout.columns) if k not in at
     ]
     if others:
         notes = (*notes, f"not used of the file: {', '.join(others)}")
@@ -210,20 +210,20 @@ def _list(file: Path, head: list[Line], lines: Iterator[Line], layout: Layout, k
 
 def _headed(layout: Layout, source: str) -> list[int]:
     """The columns of x, y and z by their headings; one of them may be named by what is left over."""
-    found = {role: layout.of(role) for role in "xyz"}
-    for role, columns in found.items():
+    by_role = {role: layout.of(role) for role in "xyz"}
+    for role, columns in by_role.items():
         if not columns and len(layout.of("")) == 1:
-            found[role] = layout.of("")
+            by_role[role] = layout.of("")
     if (
-        any(len(columns) != 1 for columns in found.values())
-        or len({k for one in found.values() for k in one}) < 3
+        any(len(columns) != 1 for columns in by_role.values())
+        or len({k for column in by_role.values() for k in column}) < 3
     ):
-        titles = ", ".join(repr(one.title) for one in layout.columns)
+        titles = ", ".join(repr(column.title) for column in layout.columns)
         raise InputError(
             f"{source}: the headings {titles} do not name one column each for x, y and the height: call them x, y, z; x and heights "
             'alone are a profile, kind = "laser"'
         )
-    return [found[role][0] for role in "xyz"]
+    return [by_role[role][0] for role in "xyz"]
 
 
 def _forms(layout: Layout, notes: tuple[str, ...]) -> tuple[str, ...]:
@@ -235,7 +235,9 @@ def _matrix(
 ) -> Found:
     """The grid of a matrix: the first line holds y, the first column x."""
     source = f"road.file {file}"
-    if odd := next((one for one in layout.columns[1:] if one.unit or one.unclear), None):
+    if odd := next(
+        (column for column in layout.columns[1:] if column.unit or column.unclear), None
+    ):
         raise InputError(
             f"{source}: {odd.said} states a unit above the columns of a matrix: say road.length_unit and road.height_unit, and take "
             "the line out"
@@ -299,7 +301,7 @@ def _across(
     # Of the lines above the numbers the last that has y in it; else the first of the numbers.
     for line in (
         *reversed(above),
-        *(one for one in head if one.number >= layout.first and not one.comment),
+        *(column for column in head if column.number >= layout.first and not column.comment),
     ):
         fields = form.fields(line.text)
         values = [form.number(text) for text in fields]
@@ -333,9 +335,9 @@ def _across(
 
 def _corner(text: str, keys: Keys, stated: Stated, source: str) -> tuple[Column, Column, Column]:
     """x, y and z by the corner of a matrix: x [mm], x/y [m], ... InputError for a unit of which it does not say whose it is."""
-    one = column_of(text)
+    corner = column_of(text)
     units = [unit for word in re.split(r"[\s/\\,;|()\[\]{}]+", text) if (unit := unit_of(word))]
-    if len({unit.metres for unit in units}) > 1 or (one.unit and one.unclear):
+    if len({unit.metres for unit in units}) > 1 or (corner.unit and corner.unclear):
         raise InputError(
             f'{source}: the corner "{text}" has more than one unit: say road.length_unit and road.height_unit, and leave it empty'
         )
@@ -349,7 +351,7 @@ def _corner(text: str, keys: Keys, stated: Stated, source: str) -> tuple[Column,
             f'{source}: by the corner "{text}" the first column is y: it must hold x, the first line y; transpose the matrix, or '
             "write x/y"
         )
-    if one.role == "time" or named[:1] == ["time"]:
+    if corner.role == "time" or named[:1] == ["time"]:
         raise InputError(
             f'{source}: by the corner "{text}" the first column is a time: it must hold x'
         )
@@ -365,13 +367,17 @@ def _corner(text: str, keys: Keys, stated: Stated, source: str) -> tuple[Column,
             f'{source}: the corner "{text}" may hold a unit, and "{odd[0]}" is not known: say road.length_unit and '
             "road.height_unit, or leave the corner empty"
         )
-    if one.unit is None and not (bracketed and one.unclear) and not unit_of(text.strip("[](){} ")):
+    if (
+        corner.unit is None
+        and not (bracketed and corner.unclear)
+        and not unit_of(text.strip("[](){} "))
+    ):
         return Column(), Column(), Column()
     said = f'corner "{text}"'
-    unit = one.unit or unit_of(text.strip("[](){} "))
-    heights = Column(unit=unit, unclear=one.unclear, said=said)
+    unit = corner.unit or unit_of(text.strip("[](){} "))
+    heights = Column(unit=unit, unclear=corner.unclear, said=said)
     letters = set(re.findall(r"(?<![a-z])[xyz](?![a-z])", _BRACKETS.sub(" ", text.lower())))
-    role = one.role if one.role in ("x", "y", "z") else ""
+    role = corner.role if corner.role in ("x", "y", "z") else ""
     letters |= {role} if role else set()
     if not letters and (keys.length_unit is None or keys.height_unit is None):
         raise InputError(

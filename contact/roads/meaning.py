@@ -181,7 +181,7 @@ _FLAGS = re.compile(
 
 def _without_accents(text: str) -> str:
     return "".join(
-        one for one in unicodedata.normalize("NFD", text) if not unicodedata.combining(one)
+        letter for letter in unicodedata.normalize("NFD", text) if not unicodedata.combining(letter)
     )
 
 
@@ -302,7 +302,7 @@ def column_of(title: str, where: str = "") -> Column:
 def _unit_words(name: str) -> list[str]:
     """Words of a heading that are units of length, where none stands in a unit's place: mm Profile, Profile.mm, ProfileMM."""
     words = _WORDS.findall(name)
-    found = [word for word in words if _lengths_in(word)] or [
+    lengths = [word for word in words if _lengths_in(word)] or [
         word for word in words[1:] if word == "m"
     ]
     spelled = re.search(
@@ -312,15 +312,15 @@ def _unit_words(name: str) -> list[str]:
     )
     spelled = spelled or re.search(r"(?<=[a-zà-ÿ])[mcdnkμ]m\.?$", name)
     first = re.match(r"(?:m|in|ft)\b\.?\s+\w", name, re.IGNORECASE)
-    return found or [match[0] for match in (spelled, first) if match]
+    return lengths or [match[0] for match in (spelled, first) if match]
 
 
 def _without_unit(plain: str) -> tuple[str, list[Unit], list[str]]:
     """A heading without brackets, parted into name and unit, and what stands in the unit's place and is none."""
     for match in (_JOINED.match(plain), _CAMEL.match(plain)):
         name, unit = [part for part in match.groups() if part] if match else ("", "")
-        if (found := unit_of(unit)) and found.metres:
-            return name, [found], []
+        if (length := unit_of(unit)) and length.metres:
+            return name, [length], []
     odd: list[str] = []
     for mark in _PARTED.finditer(plain):
         name, tail = plain[: mark.start()], plain[mark.end() :]
@@ -373,7 +373,7 @@ class Layout:
 
     def of(self, *roles: str) -> list[int]:
         """Columns whose headings name one of the roles."""
-        return [k for k, one in enumerate(self.columns) if one.role in roles]
+        return [k for k, column in enumerate(self.columns) if column.role in roles]
 
     @property
     def headed(self) -> bool:
@@ -397,14 +397,14 @@ def layout_of(head: Sequence[Line], source: str, fewest: int = 3) -> Layout | No
     first = rows[begin]
     before = tuple(line for line in head if line.number < first.number)
     columns, used = _headings(before, form, width)
-    across = next((one.number for one in reversed(before) if _is_axis(one, form, width)), None)
+    across = next((line.number for line in reversed(before) if _is_axis(line, form, width)), None)
     rest = [line for line in before if line.number not in {*used, across}]
     titles = max(used, default=0)
-    for one in rest if width > 1 else ():
-        nearer = not one.comment and one.number > titles
-        if (nearer or not any(column.headed for column in columns)) and _names_columns(one):
+    for row in rest if width > 1 else ():
+        nearer = not row.comment and row.number > titles
+        if (nearer or not any(column.headed for column in columns)) and _names_columns(row):
             raise InputError(
-                f"{source}, line {one.number}: {one.text[:60]!r} may name the columns, and cannot be parted into {width} names: "
+                f"{source}, line {row.number}: {row.text[:60]!r} may name the columns, and cannot be parted into {width} names: "
                 "separate them as the numbers are"
             )
     stated = _stated(rest, columns, width, used)
@@ -428,8 +428,8 @@ def _is_axis(line: Line, form: Form, width: int) -> bool:
     if line.comment or len(fields) != width or width < 3:
         return False
     values = [form.number(text) for text in fields[1 + (form.number(fields[1]) is None) :]]
-    found = [value for value in values if value is not None]
-    return len(found) == len(values) > 1 and bool(np.all(np.diff(found) > 0))
+    numbers = [value for value in values if value is not None]
+    return len(numbers) == len(values) > 1 and bool(np.all(np.diff(numbers) > 0))
 
 
 def _splits(text: str, form: Form, width: int) -> Iterator[list[str]]:
@@ -503,9 +503,9 @@ def _headings(
                 ]
                 used.add(line.number)
                 break
-            found = [column_of(text) for text in named]
-            if _are_titles(found, line, width):
-                columns = found
+            titles = [column_of(text) for text in named]
+            if _are_titles(titles, line, width):
+                columns = titles
                 used.add(line.number)
                 break
         else:
@@ -516,20 +516,24 @@ def _headings(
     for k, (unit, text, where) in enumerate(units):
         if unit is None:
             continue
-        one = columns[k]
-        if one.unit is not None and one.unit.metres != unit.metres:
-            text = f"{one.unit.text} and {text}"
-            columns[k] = replace(one, unit=None, unclear=text)
-        elif one.unit is None:
-            role = "time" if unit.time and one.role in ("", "x", "y") else one.role
-            columns[k] = replace(one, unit=unit, said=where, role=role, unclear="")
+        column = columns[k]
+        if column.unit is not None and column.unit.metres != unit.metres:
+            text = f"{column.unit.text} and {text}"
+            columns[k] = replace(column, unit=None, unclear=text)
+        elif column.unit is None:
+            role = "time" if unit.time and column.role in ("", "x", "y") else column.role
+            columns[k] = replace(column, unit=unit, said=where, role=role, unclear="")
     return tuple(columns), used
 
 
 def _with_odd_tails(columns: list[Column]) -> list[Column]:
     """The columns; a last word that titles have in common, and that is no name, may be a unit: it is unclear."""
-    plain = [one for one in columns if one.role in ("x", "y", "z") and one.unit is None]
-    tails = [re.split(r"[\s_]+", one.title)[-1] for one in plain if re.search(r"[\s_]", one.title)]
+    plain = [column for column in columns if column.role in ("x", "y", "z") and column.unit is None]
+    tails = [
+        re.split(r"[\s_]+", column.title)[-1]
+        for column in plain
+        if re.search(r"[\s_]", column.title)
+    ]
     if len(tails) < 2 or len(set(tails)) > 1 or role_of(tails[0]) or _HARMLESS.fullmatch(tails[0]):
         return columns
     known = re.compile(
@@ -538,51 +542,51 @@ def _with_odd_tails(columns: list[Column]) -> list[Column]:
     if known.fullmatch(tails[0]):
         return columns
     return [
-        replace(one, unclear=tails[0]) if one in plain and not one.unclear else one
-        for one in columns
+        replace(column, unclear=tails[0]) if column in plain and not column.unclear else column
+        for column in columns
     ]
 
 
-def _are_titles(found: Sequence[Column], line: Line, width: int) -> bool:
+def _are_titles(columns: Sequence[Column], line: Line, width: int) -> bool:
     """Whether a line above the numbers can be their headings."""
-    titles = [column.name or column.title for column in found if column.role != "count"] or [""]
+    titles = [column.name or column.title for column in columns if column.role != "count"] or [""]
     if any(
         re.search(r"[:=]\s*[-+]?\d|\b\d+(?:[.,]\d+)?\s*[a-zμ]+$", title, re.I) for title in titles
     ):
         return False  # Length 12 m, Speed: 30
     if any(NUMBER.fullmatch(title) for title in titles) and titles[0]:
         return False  # Position;12.5
-    if any(column.title in _WITHIN or column.title.endswith((":", "=")) for column in found):
+    if any(column.title in _WITHIN or column.title.endswith((":", "=")) for column in columns):
         return False  # x in mm and z in um; date: 2021-05-03
     if _UNIT_WORD.search(line.text) and not _BRACKETED.search(line.text):
         return False
     if _STEP.search(line.text) or _SCALE.search(line.text) or _code_in(line.text) is not None:
         return False  # Sampling interval 0.25 mm
-    known = [column.role for column in found if column.role in ("x", "y", "z", "time")]
+    known = [column.role for column in columns if column.role in ("x", "y", "z", "time")]
     if width == 1:
-        if re.search(r"\s\d+(?:[.,]\d+)?\s*[a-zμ]+$", found[0].title, re.I):
+        if re.search(r"\s\d+(?:[.,]\d+)?\s*[a-zμ]+$", columns[0].title, re.I):
             return False  # Start 100 m
-        if ":" in found[0].title and found[0].unit is None and not found[0].unclear:
+        if ":" in columns[0].title and columns[0].unit is None and not columns[0].unclear:
             return False  # Coordinate system: local
         # A sentence is no heading of a single column.
         return len(line.text.split()) <= 4 and (
-            bool(known) or found[0].unit is not None or bool(found[0].unclear)
+            bool(known) or columns[0].unit is not None or bool(columns[0].unclear)
         )
     if known:
-        return not line.comment or all(len(column.title.split()) <= 5 for column in found)
-    return not line.comment and any(column.title for column in found) and width <= 20
+        return not line.comment or all(len(column.title.split()) <= 5 for column in columns)
+    return not line.comment and any(column.title for column in columns) and width <= 20
 
 
 def _numbered_titles(before: Sequence[Line], width: int) -> list[Column] | None:
     """Titles in lines such as `Column 1: Distance [mm]`."""
-    found = {
+    titles = {
         int(match[1]): column_of(match[2])
         for line in before
         if (match := _NUMBERED.match(line.text))
     }
-    least = min(found, default=1)
-    if sorted(found) == list(range(least, least + width)):
-        return [found[least + k] for k in range(width)]
+    least = min(titles, default=1)
+    if sorted(titles) == list(range(least, least + width)):
+        return [titles[least + k] for k in range(width)]
     return None
 
 
@@ -624,11 +628,11 @@ def _stated(
             missing.append(code)
             continue
         if match := _STEP.search(text):
-            found = unit_of(match["before"] or match["after"] or "")
+            unit_read = unit_of(match["before"] or match["after"] or "")
             value = float(match["value"].replace(",", "."))
-            if found is not None and found.metres:
-                pitch = value * found.metres, f"line {line.number}"
-            elif found is None:
+            if unit_read is not None and unit_read.metres:
+                pitch = value * unit_read.metres, f"line {line.number}"
+            elif unit_read is None:
                 unclear_pitch = unclear_pitch or f"line {line.number}: {text[:60]!r}"
             continue
         if (factor := _factor_in(text)) is not None:
@@ -644,7 +648,7 @@ def _stated(
         if _UNIT_WORD.search(text):
             parsed = _units_in(text, width)
             if not parsed or (
-                heard and any(not role and one.metres not in heard for role, one in parsed)
+                heard and any(not role and unit.metres not in heard for role, unit in parsed)
             ):
                 unclear = unclear or f"line {line.number}: {text[:60]!r}"
             for role, unit in parsed:
@@ -689,19 +693,19 @@ def _factor_in(text: str) -> float | None:
 
 def _pairs(text: str) -> list[tuple[str, Unit]]:
     """(role, unit) of a line that is nothing but these: z: um; x [mm], z [um]; vertical / um."""
-    found = []
+    pairs = []
     for part in re.split(r"[,;\t]\s*|\s+(?=[xyz]\b)", text.strip()):
-        one = column_of(
+        column = column_of(
             re.sub(r"[:=]", " ", re.sub(r"^\W*(?:col(?:umn)?s?\s*\d*\s*[:=.])?", "", part))
         )
         if (
-            one.unit is None
-            or not one.unit.metres
-            or re.search(r"\d|unit", one.name + one.unit.text)
+            column.unit is None
+            or not column.unit.metres
+            or re.search(r"\d|unit", column.name + column.unit.text)
         ):
             return []  # Length: 1 m
-        found.append((_UPRIGHT.get(one.name.lower(), one.role), one.unit))
-    return found if all(role in ("x", "y", "z") for role, _ in found) else []
+        pairs.append((_UPRIGHT.get(column.name.lower(), column.role), column.unit))
+    return pairs if all(role in ("x", "y", "z") for role, _ in pairs) else []
 
 
 def mentions_unit(text: str) -> bool:
@@ -787,7 +791,7 @@ def _units_in(text: str, width: int) -> list[tuple[str, Unit]]:
         if role in ("x", "y", "z") and unit:
             return [(role, unit)]
     parts = [part.strip() for part in re.split(r"[;,\t]|\band\b|\bund\b", rest) if part.strip()]
-    found: list[tuple[str, Unit]] = []
+    units: list[tuple[str, Unit]] = []
     plain = [unit_of(re.sub(r"[\[\](){}]", "", part)) for part in parts]
     if all(plain):
         same = {unit.metres for unit in plain if unit}
@@ -804,8 +808,8 @@ def _units_in(text: str, width: int) -> list[tuple[str, Unit]]:
         role, unit = (role_of(match["what"]), unit_of(match["unit"])) if match else ("", None)
         if unit is None or role not in ("x", "y", "z"):
             return []
-        found.append((role, unit))
-    return found
+        units.append((role, unit))
+    return units
 
 
 def late_statement(line: Line) -> bool:

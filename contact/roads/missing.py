@@ -39,13 +39,13 @@ _LARGE = 1e6  # and more: 1e10, 1.70141e38, 9.96921e36
 def _usual_codes() -> Array:
     """0, -1, nines and other repeated digits as in -9999, 99.99 or 888.8, powers of ten, and limits of integers."""
     scaled = {"9" * count for count in range(2, 8)} | {"32767", "32768", "65535", "65536"}
-    whole = {one * count for one in "12345678" for count in range(3, 7)}
+    whole = {digit * count for digit in "12345678" for count in range(3, 7)}
     whole |= {"127", "128", "255", "256", "1000", "10000", "100000"}
-    found = [float(one) for one in whole]
-    found += [float(one) / 10 for one in whole if len(set(one)) == 1]
-    found += [999.25, 9999.25]  # of well logs
-    found += [float(f"{one}e-{k}") for one in scaled for k in range(5) if k < len(one)]
-    return np.unique([0.0, -1.0, *found, *(-one for one in found)])
+    numbers = [float(number) for number in whole]
+    numbers += [float(number) / 10 for number in whole if len(set(number)) == 1]
+    numbers += [999.25, 9999.25]  # of well logs
+    numbers += [float(f"{number}e-{k}") for number in scaled for k in range(5) if k < len(number)]
+    return np.unique([0.0, -1.0, *numbers, *(-number for number in numbers)])
 
 
 _CODES = _usual_codes()
@@ -64,19 +64,21 @@ def codes(z: Array, metre: float, *, single: bool = False) -> list[float]:
     """
     known = np.isfinite(z)
     values, counts = np.unique(z[known], return_counts=True)
-    found: list[float] = []
+    found_codes: list[float] = []
     while counts.sum() >= _FEWEST and len(values) > 1:
         more = _far(values, counts, metre, 0 if single else 1)
         if not more:
             break
-        found += more
-        kept = ~np.isin(values, more)
-        values, counts = values[kept], counts[kept]
+        found_codes += more
+        rest = ~np.isin(values, more)
+        values, counts = values[rest], counts[rest]
     if counts.sum() >= _FEWEST and len(values) > 2:
-        others = np.where(known & ~np.isin(z, found), z, np.nan)
+        others = np.where(known & ~np.isin(z, found_codes), z, np.nan)
         more = _in_runs(others, values, counts)
-        found += more or _repeated(others, values, counts) or _repeated(others.T, values, counts)
-    return sorted(one + 0.0 for one in found)  # no -0
+        found_codes += (
+            more or _repeated(others, values, counts) or _repeated(others.T, values, counts)
+        )
+    return sorted(code + 0.0 for code in found_codes)  # no -0
 
 
 def _far(values: Array, counts: NDArray[np.intp], metre: float, spike: int) -> list[float]:
@@ -146,14 +148,14 @@ def _in_runs(z: Array, values: Array, counts: NDArray[np.intp]) -> list[float]:
     pairs = np.zeros(len(values))
     which, often = np.unique(z[:, 1:][same], return_counts=True)
     pairs[np.searchsorted(values, which)] = often
-    found = []
+    starts = []
     for k in np.flatnonzero(some & (pairs >= 3)):
-        one, marked = float(values[k]), bool(special(values[k]))
-        runs, beside, inside = _runs(z, one)
+        value, marked = float(values[k]), bool(special(values[k]))
+        runs, beside, inside = _runs(z, value)
         long = runs > 1
         if not len(beside):
             continue
-        apart = float(np.median(np.abs(beside - one)))
+        apart = float(np.median(np.abs(beside - value)))
         irregular = len(inside) and np.ptp(inside) > max(1, 0.1 * inside.max())
         total = counts.sum()
         others = (pairs.sum() - pairs[k] + 1) / max(total - counts[k], 1)
@@ -165,8 +167,8 @@ def _in_runs(z: Array, values: Array, counts: NDArray[np.intp]) -> list[float]:
         by_no_chance = pairs[k] > max(_CHANCE * (expected + 0.1), 0.3 * counts[k])
         tapered = apart <= max(_TAPER * quantum, _FADING * usual)  # heights that fade out to it
         if between_jumps or (marked and by_no_chance and not tapered):
-            found.append(one)
-    return found if len(found) <= _MOST else []
+            starts.append(value)
+    return starts if len(starts) <= _MOST else []
 
 
 def _repeated(z: Array, values: Array, counts: NDArray[np.intp]) -> list[float]:
@@ -178,7 +180,7 @@ def _repeated(z: Array, values: Array, counts: NDArray[np.intp]) -> list[float]:
     if not moves.size or not inner.any():
         return []
     usual, quantum = float(np.median(moves)), _quantum(values)
-    found = []
+    repeated = []
     for k in np.flatnonzero(inner):
         near = np.r_[max(0, k - _NEAR) : k, k + 1 : min(k + 1 + _NEAR, len(values))]
         expected = counts[near].sum() * quantum / (values[near[-1]] - values[near[0]])
@@ -193,8 +195,8 @@ def _repeated(z: Array, values: Array, counts: NDArray[np.intp]) -> list[float]:
         runs = (inside > 1).sum() > 1 and count > _OFTEN * counts[near].max()
         least = _IN_RUNS if runs else _STANDS_OUT
         if improbable and np.median(np.abs(beside - values[k])) > least * usual:
-            found.append(float(values[k]))
-    return found
+            repeated.append(float(values[k]))
+    return repeated
 
 
 def _unlikely(count: int, expected: float, usual: int) -> bool:
@@ -221,12 +223,12 @@ def _leads_up(values: Array, k: int) -> bool:
     return bool(steps[0] <= _GAP * np.median(steps[1:20]))
 
 
-def _runs(z: Array, one: float) -> tuple[NDArray[np.intp], Array, NDArray[np.intp]]:
+def _runs(z: Array, value: float) -> tuple[NDArray[np.intp], Array, NDArray[np.intp]]:
     """Lengths of the runs of a value along the rows of z, the heights beside them, and lengths of those inside."""
-    rows = np.flatnonzero((z == one).any(axis=1))
+    rows = np.flatnonzero((z == value).any(axis=1))
     lengths, beside, inside = [], [], []
     for row in z[rows]:
-        at = np.concatenate([[False], row == one, [False]])
+        at = np.concatenate([[False], row == value, [False]])
         change = np.diff(at.astype(np.int8))
         begin, end = np.flatnonzero(change == 1), np.flatnonzero(change == -1)
         lengths.append(end - begin)
@@ -237,9 +239,9 @@ def _runs(z: Array, one: float) -> tuple[NDArray[np.intp], Array, NDArray[np.int
     return np.concatenate(lengths), near[np.isfinite(near)], np.concatenate(inside)
 
 
-def refused(found: list[float], count: int, where: str, source: str) -> InputError:
+def refused(codes: list[float], count: int, where: str, source: str) -> InputError:
     """The error for values that look like codes; `count` heights have them (0: not counted), the first is at `where`."""
-    shown = ", ".join(f"{code:.10g}" for code in found)
+    shown = ", ".join(f"{code:.10g}" for code in codes)
     many = f"{count}, the first {where}" if count else where
     return InputError(
         f"{source}: heights of exactly {shown} ({many}) stand apart from the others: if they mean that there is none, say "
@@ -267,8 +269,8 @@ class CodeSearch:
             part = np.round(
                 (heights - self.offset) / self.scale, 9 if self.scale == 1.0 else 5
             )  # as written
-            if found := codes(part, self.metre * abs(self.scale), single=True):
-                at = np.isin(part, found)
+            if repeated := codes(part, self.metre * abs(self.scale), single=True):
+                at = np.isin(part, repeated)
                 i, j = np.argwhere(at)[0]
                 where = f"at x = {x[first + i]:.6g} m, y = {y[j]:.4g} m"
-                raise refused(found, int(at.sum()), where, self.source)
+                raise refused(repeated, int(at.sum()), where, self.source)

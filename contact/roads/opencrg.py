@@ -184,10 +184,10 @@ def _read_text(payload: Payload) -> Rows:
     count = _lines(payload)
     rows = count // per_row
     if count % per_row or (payload.rows is not None and rows != payload.rows):
-        wanted = f"{payload.rows} rows" if payload.rows is not None else "whole rows"
+        size = f"{payload.rows} rows" if payload.rows is not None else "whole rows"
         raise InputError(
             f"{payload.file}: {count} records of data from line {payload.line} on, "
-            f"{wanted} of {per_row} records expected: the file is truncated or damaged"
+            f"{size} of {per_row} records expected: the file is truncated or damaged"
         )
     spool = Spool()
     with payload.file.open("rb") as stream:
@@ -273,11 +273,11 @@ def read_opencrg(
     `holes` and `end` as in Grid, `missing` as in `read_grid`. InputError names the file, and the line or byte, of what
     is missing, damaged or not supported.
     """
-    given = Path(file)
-    if not given.is_file():
-        raise InputError(f"road.file {given}: no such file")
+    path = Path(file)
+    if not path.is_file():
+        raise InputError(f"road.file {path}: no such file")
     try:
-        file, blocks, start, line, followed = _followed(given)
+        file, blocks, start, line, followed = _followed(path)
         unused = _refuse_blocks(file, blocks)
         scales = _scales(file, blocks)
         parameters = key_values(file, blocks.get("ROAD_CRG", []))
@@ -286,7 +286,7 @@ def read_opencrg(
         payload = Payload(file, code, start, line, len(channels), rows)
         table = read_payload(payload)
     except OSError as error:
-        raise InputError(f"road.file {given}: cannot be read ({error})") from error
+        raise InputError(f"road.file {path}: cannot be read ({error})") from error
     count = table.shape[0]
     if count < 2:
         raise InputError(f"{file}: {count} cross sections, at least 2 are needed")
@@ -294,7 +294,7 @@ def read_opencrg(
     _check_line(file, channels, parameters, table, step)
     v, columns = _sections(file, channels, parameters)
     u = step * np.arange(count, dtype=float)
-    source = f"road.file {given}"
+    source = f"road.file {path}"
     z: Rows = GridColumns(table, columns)
     factor = scales["SCALE_Z_GRID"]
     coding = Coding(unit=factor, missing=missing or ())
@@ -314,7 +314,7 @@ def read_opencrg(
             f"not used, as they act beyond the road or where it has holes: {', '.join(unused)}",
         )
     times = f"m times {factor:g}" if factor != 1.0 else "m"
-    gone = f"no height: {', '.join(f'{one:g}' for one in missing)}" if missing else ""
+    gone = f"no height: {', '.join(f'{code:g}' for code in missing)}" if missing else ""
     road.readings = (
         ReadAs("x", "reference line u", "m", f"every {step:g} m"),
         ReadAs("y", f"{len(v)} long sections", "m"),
@@ -325,17 +325,17 @@ def read_opencrg(
 
 def referred(file: Path) -> tuple[Path, ...]:
     """The file, and those that it refers to as far as they are there."""
-    found = [file]
-    while len(found) <= DEEPEST and found[-1].is_file():
+    files = [file]
+    while len(files) <= DEEPEST and files[-1].is_file():
         try:
-            lines = read_header(found[-1])[0].get("ROAD_CRG_FILE", [])
+            lines = read_header(files[-1])[0].get("ROAD_CRG_FILE", [])
         except (InputError, OSError):
             break
         names = [text for _, text in lines if text]
-        if not names or (target := _target(found[-1], names[0])) in found:
+        if not names or (target := _target(files[-1], names[0])) in files:
             break
-        found.append(target)
-    return tuple(found)
+        files.append(target)
+    return tuple(files)
 
 
 def _target(file: Path, name: str) -> Path:
@@ -396,12 +396,12 @@ def _merged(file: Path, blocks: Blocks, over: Blocks) -> Blocks:
 
 def _scales(file: Path, blocks: Blocks) -> dict[str, float]:
     """Factors of heights, length and width among the modifiers. InputError for one that leaves no road."""
-    given = key_values(file, blocks.get("ROAD_CRG_MODS", []))
-    found = {key: given.get(key, 1.0) for key in SCALES}
+    values = key_values(file, blocks.get("ROAD_CRG_MODS", []))
+    scales = {key: values.get(key, 1.0) for key in SCALES}
     for key in ("SCALE_LENGTH", "SCALE_WIDTH"):
-        if not 0.0 < found[key] < LONGEST_STEP:
-            raise InputError(f"{file}: {key} = {found[key]:g} leaves no road: it must be positive")
-    return found
+        if not 0.0 < scales[key] < LONGEST_STEP:
+            raise InputError(f"{file}: {key} = {scales[key]:g} leaves no road: it must be positive")
+    return scales
 
 
 def _refuse_blocks(file: Path, blocks: Blocks) -> list[str]:

@@ -76,7 +76,7 @@ class Profile:
 
 
 @dataclass(frozen=True)
-class Given:
+class ProfileKeys:
     """Keys of a scene that describe the file: units, values that mean "no height" (None: to be looked for), distance of heights m."""
 
     length_unit: str | None = None
@@ -85,7 +85,7 @@ class Given:
     pitch: float | None = None
 
 
-def read_profile(path: Path, source: str, given: Given = Given()) -> Profile:
+def read_profile(path: Path, source: str, keys: ProfileKeys = ProfileKeys()) -> Profile:
     """The profile in a text file. InputError where it is none, and where its meaning is not certain."""
     with opened(path, source) as stream:
         lines = lines_of(stream, source)
@@ -106,7 +106,7 @@ def read_profile(path: Path, source: str, given: Given = Given()) -> Profile:
         table, numbers, decimals = _table(path, data, layout, source)
     if len(table) < _FEWEST:
         raise InputError(f"{source}: only {len(table)} heights: too few for a road")
-    return _profile(table, numbers, decimals, layout, rows, given, source)
+    return _profile(table, numbers, decimals, layout, rows, keys, source)
 
 
 def _no_rows(rows: Sequence[Line]) -> str:
@@ -133,8 +133,8 @@ def _table(
     numbers: list[int] = []
     while some := list(islice(data, _BLOCK)):
         blocks.append(numbers_of(some, layout.form, layout.width, source))
-        for k, one in enumerate(decimals[:_MOST_COLUMNS]):
-            one.count(some, layout.form, blocks[-1], [k])
+        for k, count in enumerate(decimals[:_MOST_COLUMNS]):
+            count.count(some, layout.form, blocks[-1], [k])
         numbers += [line.number for line in some]
         check_count(path, len(numbers))
     if not blocks:
@@ -148,39 +148,41 @@ def _profile(
     decimals: list[Decimals],
     layout: Layout,
     rows: list[Line],
-    given: Given,
+    keys: ProfileKeys,
     source: str,
 ) -> Profile:
     """Columns, units and missing heights of a table."""
-    at, z, notes = _columns(table, layout, given, source)
+    at, z, notes = _columns(table, layout, keys, source)
     for k in layout.of("other"):
         check_flags(layout.columns[k], table[:, k], source)
     decimals[z].check(source)
     notes += downwards_note(layout.columns[z].title)
     stated = layout.stated
-    height = scale_of("z", layout.columns[z], stated, ("height_unit", given.height_unit), source)
+    height = scale_of("z", layout.columns[z], stated, ("height_unit", keys.height_unit), source)
     length = None
     if at is not None:
         length = scale_of(
-            "x", layout.columns[at], stated, ("length_unit", given.length_unit), source
+            "x", layout.columns[at], stated, ("length_unit", keys.length_unit), source
         )
         height, length = _together(height, length, source)
     up = height or Scale(1e-3, f"{HEIGHTS}: assumed", assumed=True)
     heights = table[:, z].copy()
-    declared = (*(given.missing or ()), *stated.missing)
+    declared = (*(keys.missing or ()), *stated.missing)
     gone = np.zeros(len(heights), dtype=bool)
     for code in declared:
         gone |= np.isclose(heights, code, rtol=1e-9, atol=1e-12)
     heights[gone] = np.nan
-    if given.missing is None or len(given.missing):
-        found = codes(heights[None, :], up.metres)
-        found += [
-            code for code in decimals[z].codes() if code not in found and (heights == code).any()
+    if keys.missing is None or len(keys.missing):
+        missing_codes = codes(heights[None, :], up.metres)
+        missing_codes += [
+            code
+            for code in decimals[z].codes()
+            if code not in missing_codes and (heights == code).any()
         ]
-        if found:
-            same = np.isin(heights, found)
+        if missing_codes:
+            same = np.isin(heights, missing_codes)
             where = f"in line {numbers[np.flatnonzero(same)[0]]}"
-            raise refused(found, int(same.sum()), where, source)
+            raise refused(missing_codes, int(same.sum()), where, source)
     named = f"{int(np.isnan(heights).sum())} missing" + (
         f", of these {int(gone.sum())} as {', '.join(f'{code:g}' for code in declared)}"
         if declared
@@ -197,10 +199,10 @@ def _profile(
         notes += more
         x, rounding = along.metres * place, along.metres * rounding
         step = (place[-1] - place[0]) / max(len(place) - 1, 1)
-        if given.pitch and abs(along.metres * step / given.pitch - 1) > _SAME:
+        if keys.pitch and abs(along.metres * step / keys.pitch - 1) > _SAME:
             raise InputError(
                 f"{source}: heights are every {1e3 * along.metres * step:.4g} mm by {_place(layout, at)}, in {along.text}, and "
-                f"road.pitch = {given.pitch:g} m: take the key out, or say road.length_unit"
+                f"road.pitch = {keys.pitch:g} m: take the key out, or say road.length_unit"
             )
         readings.append(
             ReadAs("x", _place(layout, at), along.text, f"every {step:.4g} of the file")
@@ -213,7 +215,7 @@ def _profile(
         notes.append(f"heights in {HEIGHTS}: assumed")
     if others := [_place(layout, k) for k in range(layout.width) if k not in (at, z)]:
         notes.append(f"not used of the file: {', '.join(others)}")
-    pitch = _stated_pitch(layout, given, at, source)
+    pitch = _stated_pitch(layout, keys, at, source)
     if layout.form.comma:
         notes.append("decimal commas")
     return Profile(
@@ -249,16 +251,16 @@ def _place(layout: Layout, k: int) -> str:
     return f'column {k + 1} "{title}"' if title else f"column {k + 1}"
 
 
-def _stated_pitch(layout: Layout, given: Given, x: int | None, source: str) -> float | None:
+def _stated_pitch(layout: Layout, keys: ProfileKeys, x: int | None, source: str) -> float | None:
     """The distance of heights (m) that the file states, where it has no x. InputError where the scene says another."""
     stated = layout.stated
-    if x is not None or given.pitch is not None and stated.pitch is None:
+    if x is not None or keys.pitch is not None and stated.pitch is None:
         return None
     if stated.pitch is not None:
         pitch, where = stated.pitch
-        if given.pitch is not None and abs(given.pitch / pitch - 1) > 1e-6:
+        if keys.pitch is not None and abs(keys.pitch / pitch - 1) > 1e-6:
             raise InputError(
-                f"{source}: heights are every {1e3 * pitch:.6g} mm by {where}, and road.pitch = {given.pitch:g} m: take the "
+                f"{source}: heights are every {1e3 * pitch:.6g} mm by {where}, and road.pitch = {keys.pitch:g} m: take the "
                 "key out, or correct the file"
             )
         return pitch
@@ -285,18 +287,18 @@ def _consecutive(values: Array) -> bool:
 
 
 def _columns(
-    table: Array, layout: Layout, given: Given, source: str
+    table: Array, layout: Layout, keys: ProfileKeys, source: str
 ) -> tuple[int | None, int, list[str]]:
     """The columns of x (None where there is none) and of the heights."""
     width, columns = layout.width, layout.columns
     if layout.headed:
-        return _by_headings(table, layout, given, source)
+        return _by_headings(table, layout, keys, source)
     if width == 1:
         return None, 0, []
     if width == 3 and _is_count(table[:, 0]):
         return _ordered(table, columns, (1, 2), ["the first column counts the lines"])
-    unsaid = not given.length_unit and not layout.stated.units
-    if width == 2 and given.pitch and unsaid and _consecutive(table[:, 0]):
+    unsaid = not keys.length_unit and not layout.stated.units
+    if width == 2 and keys.pitch and unsaid and _consecutive(table[:, 0]):
         return None, 1, ["the first column counts the heights"]
     if width == 2:
         return _ordered(table, columns, (0, 1), [])
@@ -331,7 +333,7 @@ def _many(table: Array, titles: str, source: str) -> InputError:
 
 
 def _by_headings(
-    table: Array, layout: Layout, given: Given, source: str
+    table: Array, layout: Layout, keys: ProfileKeys, source: str
 ) -> tuple[int | None, int, list[str]]:
     """x and heights by the headings; one of two columns may be named by what is left over."""
     width, columns = layout.width, layout.columns
@@ -366,7 +368,7 @@ def _by_headings(
         )
     if not x and len(z or unknown) == 1 and counts and width == 2:
         one = (z or unknown)[0]
-        if given.pitch is None and layout.stated.pitch is None:
+        if keys.pitch is None and layout.stated.pitch is None:
             raise InputError(
                 f"{source}: {columns[counts[0]].title!r} counts the heights, and nothing says how far apart they are: say "
                 "road.pitch (m)"

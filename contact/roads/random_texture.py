@@ -75,8 +75,8 @@ def surface_density(edges: Array, power: Array) -> Array:
 
     matrix = profile_power(edges)
     unit = power / np.diag(matrix)  # of C in each band, to remove the scale
-    found, _ = nnls(matrix * unit / power.max(), power / power.max())
-    return found * unit
+    weights, _ = nnls(matrix * unit / power.max(), power / power.max())
+    return weights * unit
 
 
 def filter_of(edges: Array, density: Array, wave: Array) -> Array:
@@ -156,8 +156,8 @@ class Tiles:
             qy = fft.rfftfreq(self._shape[1], self._pitch)[None, :]
             q = np.hypot(qx, qy)
             shortest, longest = self._band
-            kept = (q >= 1.0 / longest) & (q <= 1.0 / shortest)
-            self._filter = np.where(kept, self._amplitude(np.where(kept, q, 1.0)), 0.0)
+            inside = (q >= 1.0 / longest) & (q <= 1.0 / shortest)
+            self._filter = np.where(inside, self._amplitude(np.where(inside, q, 1.0)), 0.0)
         # Python's remainder: tiles before the beginning have distinct numbers too.
         rng = np.random.default_rng([*self._seed, number % 2**64])
         z = fft.irfft2(fft.rfft2(rng.standard_normal(self._shape)) * self._filter, self._shape)
@@ -173,8 +173,8 @@ class Tiles:
 
     def _half(self, number: int) -> Array:
         """Heights over the overlap of tiles number - 1 and number, with the following row."""
-        found = self._halves.pop(number, None)
-        self._halves[number] = self._blended(number) if found is None else found
+        half = self._halves.pop(number, None)
+        self._halves[number] = self._blended(number) if half is None else half
         # With short waves a footprint covers several halves: if fewer were kept, each step would
         # draw all of them again.
         while len(self._halves) > max(KEPT[0], KEPT[1] // self._halves[number].size):
@@ -200,8 +200,8 @@ class Tiles:
         if number.size and number.min() == number.max():
             return self._within(int(number.flat[0]), u, v)
         out = np.empty(u.shape)
-        for one in np.unique(number):
-            out[number == one] = self._within(int(one), u[number == one], v[number == one])
+        for index in np.unique(number):
+            out[number == index] = self._within(int(index), u[number == index], v[number == index])
         return out
 
     def _within(self, number: int, u: Array, v: Array) -> Array:
@@ -225,12 +225,12 @@ class Tiles:
         j, t = floor % self._shape[1], v - floor
         next_j = (j + 1) % self._shape[1]
         out = np.empty((len(u), len(v)))
-        for one in np.unique(number).tolist():
-            here = number == one
-            local = u[here] - one * half
+        for index in np.unique(number).tolist():
+            here = number == index
+            local = u[here] - index * half
             i = np.minimum(local.astype(np.int64), half - 1)
             rows, place = np.unique(np.concatenate([i, i + 1]), return_inverse=True)
-            z = self._half(one)[rows]
+            z = self._half(index)[rows]
             left = z.take(j, axis=1)
             left += t * (z.take(next_j, axis=1) - left)
             near, far = left[place[: len(i)]], left[place[len(i) :]]

@@ -133,8 +133,8 @@ def make_road(spec: Any = None, /, **keys: Any) -> RoadUnderTire:
             'make_road(kind="sine", wavelength=0.2)'
         )
     if spec is None or not hasattr(spec, "surface"):
-        given = keys if spec is None else vars(spec)
-        placement, surface = _read({k: v for k, v in given.items() if v is not None})
+        values = keys if spec is None else vars(spec)
+        placement, surface = _read({k: v for k, v in values.items() if v is not None})
     else:
         placement = Placement(**{item.name: getattr(spec, item.name) for item in fields(Placement)})
         surface = spec.surface
@@ -151,15 +151,15 @@ def placed(road: Road, surface: RoadKind, placement: Placement) -> RoadUnderTire
     )
 
 
-def _read(given: dict[str, Any]) -> tuple[Placement, RoadKind]:
+def _read(values: dict[str, Any]) -> tuple[Placement, RoadKind]:
     """Placement and surface from keys; InputError for keys of neither."""
-    if "kind" not in given:
+    if "kind" not in values:
         raise InputError("road: kind is missing")
-    kind = ROADS[given["kind"]]
+    kind = ROADS[values["kind"]]
     placed = {item.name for item in fields(Placement)}
     own = {item.name for item in fields(kind)}
-    for key in given:
+    for key in values:
         if key not in placed | own | {"kind"}:
-            raise ParameterError(key, f"does not belong to kind = {given['kind']}", "road")
-    placement = Placement(**{k: v for k, v in given.items() if k in placed})
-    return placement, kind(**{k: v for k, v in given.items() if k in own})
+            raise ParameterError(key, f"does not belong to kind = {values['kind']}", "road")
+    placement = Placement(**{k: v for k, v in values.items() if k in placed})
+    return placement, kind(**{k: v for k, v in values.items() if k in own})

@@ -68,20 +68,20 @@ class Form:
 
     def numbers(self, line: str, n: int, source: str) -> list[float]:
         """The numbers of line n. InputError for a field that is none."""
-        found = []
+        numbers = []
         for text in self.fields(line):
             value = self.number(text)
             if value is None:
                 raise InputError(
                     f"{source}, line {n}: {text[:40]!r} is not a number: {line[:60]!r}"
                 )
-            found.append(value)
-        return found
+            numbers.append(value)
+        return numbers
 
     def row(self, line: str) -> list[float] | None:
         """The numbers of a line, None where one field is none."""
-        found = [self.number(text) for text in self.fields(line)]
-        return None if None in found else found  # type: ignore[return-value]
+        numbers = [self.number(text) for text in self.fields(line)]
+        return None if None in numbers else numbers  # type: ignore[return-value]
 
 
 _FORMS = (
@@ -193,21 +193,21 @@ def quoted(text: str, separator: str) -> list[str]:
 
 def head_of(lines: Iterator[Line]) -> list[Line]:
     """The first lines, by which the layout is found."""
-    found: list[Line] = []
+    head: list[Line] = []
     size = 0
     for line in lines:
-        found.append(line)
+        head.append(line)
         size += len(line.text)
-        if len(found) >= HEAD_LINES or (size > HEAD_CHARACTERS and len(found) > 8):
+        if len(head) >= HEAD_LINES or (size > HEAD_CHARACTERS and len(head) > 8):
             break
-    return found
+    return head
 
 
 def form_of(rows: Sequence[Line], head: Sequence[Line], source: str) -> Form:
     """The form by which most of the later lines are rows of numbers of one width."""
     sample = [line.text for line in rows[len(rows) // 2 :][:_SAMPLE]]
     sample = [line for line in sample if re.search(r"\d", line)] or sample
-    found: list[tuple[float, int, Form]] = []
+    forms: list[tuple[float, int, Form]] = []
     for form in _FORMS:
         if form.separator and not any(form.separator in line for line in sample):
             continue
@@ -218,13 +218,13 @@ def form_of(rows: Sequence[Line], head: Sequence[Line], source: str) -> Form:
             continue
         widths = [len(row) for row in read]
         usual = max(set(widths), key=widths.count)
-        found.append((widths.count(usual) / len(sample), usual, form))
-    if not found:
+        forms.append((widths.count(usual) / len(sample), usual, form))
+    if not forms:
         return Form("," if any("," in line for line in sample) else "", False)
-    best = max(share for share, *_ in found)
-    good = [(width, form) for share, width, form in found if share > 0.95 * best]
+    best = max(share for share, *_ in forms)
+    good = [(width, form) for share, width, form in forms if share > 0.95 * best]
     width, form = good[0]
-    alone = next((one for count, one in good if one == Form("", True) and count == 1), None)
+    alone = next((form for count, form in good if form == Form("", True) and count == 1), None)
     if form == Form(",", False) and width == 2 and alone is not None:
         return _one_or_two(sample, head, form, alone, source)
     return form

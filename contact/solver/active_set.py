@@ -165,9 +165,9 @@ class ActiveSet:
 def guarded(work: Callable[..., int], raised: list[BaseException]) -> Callable[..., int]:
     """`work` for a kernel to call: what it raises is appended to `raised`, for the caller of the kernel to raise."""
 
-    def run(*given: Any) -> int:
+    def run(*arguments: Any) -> int:
         try:
-            return int(work(*given))
+            return int(work(*arguments))
         except BaseException as error:  # carried over the kernel
             raised.append(error)
             return int(_C.REFUSED)
@@ -347,9 +347,9 @@ class UsualSet:
         pivot = self._pivot
         if pivot is None:
             return {}
-        kept = {"active": self.active, "share": self._share, "lost": np.array(self._lost)}
-        kept |= {"taken": pivot.taken, "base": pivot.base, "pressed": self._pressed}
-        return kept | {"exchanged": pivot.exchanged.factorised}
+        state = {"active": self.active, "share": self._share, "lost": np.array(self._lost)}
+        state |= {"taken": pivot.taken, "base": pivot.base, "pressed": self._pressed}
+        return state | {"exchanged": pivot.exchanged.factorised}
 
     def set_state(self, state: dict[str, Array | Mask]) -> None:
         """Continue from `state`."""

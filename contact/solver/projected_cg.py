@@ -189,9 +189,9 @@ class ProjectedCG:
             scale = float(largest + (diagonal * force).max())
             self.residual = complementarity_residual(force, gap, diagonal, scale)
             if self.residual <= TARGET:
-                found = np.zeros(len(self.diagonal))
-                found[index] = force
-                return found, largest
+                forces = np.zeros(len(self.diagonal))
+                forces[index] = force
+                return forces, largest
             self.iterations += 1
             defect = np.where(touching, -gap, 0.0)
             raised = np.where(touching, inner.precondition(defect), 0.0)
@@ -222,8 +222,12 @@ class ProjectedCG:
 
     def state(self) -> dict[str, Array]:
         """The state from which the next solve starts."""
-        kept = {"last": self._last, "before": self._before, "box": np.array(self._box, dtype=float)}
-        return {name: value for name, value in kept.items() if value is not None}
+        state = {
+            "last": self._last,
+            "before": self._before,
+            "box": np.array(self._box, dtype=float),
+        }
+        return {name: value for name, value in state.items() if value is not None}
 
     def set_state(self, state: dict[str, Array]) -> None:
         """Continue from `state`."""

@@ -38,9 +38,9 @@ class Product:
     def matrix(self) -> PETSc.Mat:
         """The PETSc matrix, on this process."""
         size = len(self._index)
-        made = PETSc.Mat().createPython((size, size), self, comm=PETSc.COMM_SELF)
-        made.setUp()
-        return made
+        shell = PETSc.Mat().createPython((size, size), self, comm=PETSc.COMM_SELF)
+        shell.setUp()
+        return shell
 
     def reset(self) -> None:
         """Remove the scaling, back to A."""

@@ -67,8 +67,8 @@ def on_nodes(patch: Patch, node_area: Array, wall: Influence) -> Array:
     pressed = (patch.weights.multiply(patch.area[:, None])).T.tocsr()
     moved = np.array([compliance.apply(row.toarray().ravel()) for row in pressed])
     area = node_area[patch.index]
-    found = (pressed @ moved.T) / np.outer(area, area)
-    return (found + found.T) / 2
+    product = (pressed @ moved.T) / np.outer(area, area)
+    return (product + product.T) / 2
 
 
 def before_equilibrium(patch: Patch, known: Array, nodal_force: Array) -> Patch:

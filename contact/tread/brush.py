@@ -98,8 +98,8 @@ class Brush:
 def next_ahead(x: Array, line: Array) -> tuple[NDArray[np.intp], Array]:
     """Next point ahead of each on its line (c,) and its distance (m); the first has itself, 0."""
     ahead, pitch = np.arange(len(x)), np.zeros(len(x))
-    for one in np.unique(line):
-        members = np.flatnonzero(line == one)
+    for number in np.unique(line):
+        members = np.flatnonzero(line == number)
         members = members[np.argsort(x[members], kind="stable")]
         ahead[members[:-1]], pitch[members[:-1]] = members[1:], np.diff(x[members])
     return ahead, pitch
@@ -108,8 +108,8 @@ def next_ahead(x: Array, line: Array) -> tuple[NDArray[np.intp], Array]:
 def upstream(x: Array, line: Array, way: float) -> sparse.csr_matrix:
     """Linear interpolation (c, c) at x + way (m) on each point's line; none beyond its end."""
     rows, columns, values = [], [], []
-    for one in np.unique(line):
-        members = np.flatnonzero(line == one)
+    for number in np.unique(line):
+        members = np.flatnonzero(line == number)
         members = members[np.argsort(x[members], kind="stable")]
         place = x[members] + way
         right = np.searchsorted(x[members], place, side="left")

@@ -130,8 +130,8 @@ class TreadMemory:
         """Displacements (1 or 3, c) m at the end of the next step without a new force."""
         offset = self._offset + self._way
         jump = int(offset)
-        kept = _each(self._decay) * self._kept + _each(self._old) * self._force
-        self._ahead, self._next = _shifted(kept, jump), offset - jump
+        relaxed = _each(self._decay) * self._kept + _each(self._old) * self._force
+        self._ahead, self._next = _shifted(relaxed, jump), offset - jump
         field = np.asarray(np.tensordot(self._size, self._ahead, 1), dtype=float)
         here = (1.0 - self._next) * field + self._next * _shifted(field, 1)
         return self._moved(here.reshape(len(here), -1)).take(self._place, axis=1)  # in rows

@@ -241,7 +241,7 @@ class SectionReader:
                 f"more than {_SINGLE} elements have a *REBAR of their own: name sets of elements"
             )
         sort = scope, layer.material, layer.area, layer.position, layer.cut is None
-        open_lines = [one for one in self._lines if one[0] == sort and element not in one[2]]
+        open_lines = [line for line in self._lines if line[0] == sort and element not in line[2]]
         if not open_lines:
             open_lines = [(sort, f"LINE {len(self._lines) + 1} OF *REBAR", set())]
             self._lines += open_lines
@@ -304,13 +304,13 @@ class SectionReader:
 
     def place(self, of: dict[str, Orientation], placement: InstancePlacement) -> None:
         """Bring the orientations `of` an instance to where it is placed."""
-        for name, one in of.items():
-            points = np.array(one.points).reshape(2, 3)
-            if one.system in ("RECTANGULAR", "R"):  # two directions
+        for name, part in of.items():
+            points = np.array(part.points).reshape(2, 3)
+            if part.system in ("RECTANGULAR", "R"):  # two directions
                 points = turned(points, placement.axis, placement.angle)
             else:
                 points = placement.of(points)
-            self.orientations[name] = replace(one, points=tuple(points.ravel().tolist()))
+            self.orientations[name] = replace(part, points=tuple(points.ravel().tolist()))
 
     def _rigid(self, card: Card, lines: list[Data], scope: int) -> None:
         for key in ("TIE NSET", "PIN NSET"):

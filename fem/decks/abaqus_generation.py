@@ -281,16 +281,16 @@ class SetReader:
     def resolved_surfaces(self, elements: np.ndarray) -> dict[str, np.ndarray]:
         """name -> (k, 2) of (element, face). Raises InputError for an unknown set."""
         sets = Sets("element set", self.element_sets, elements)
-        found: dict[str, np.ndarray | None] = {}  # None: being resolved
+        resolved: dict[str, np.ndarray | None] = {}  # None: being resolved
 
         def rows(name: str) -> np.ndarray | None:
-            if name not in found:
-                found[name] = None
+            if name not in resolved:
+                resolved[name] = None
                 parts = [self._rows(part, sets, rows) for part in self.surfaces[name]]
-                found[name] = np.unique(
+                resolved[name] = np.unique(
                     np.concatenate([np.empty((0, 2), np.int64), *parts]), axis=0
                 )
-            return found[name]
+            return resolved[name]
 
         return {name: every for name in self.surfaces if (every := rows(name)) is not None}
 
@@ -307,32 +307,32 @@ class SetReader:
             every = rows(part.surface)
             assert every is not None, "a surface is not made of what is in its instances"
             return every[every[:, 0] // SCOPE == part.scope]
-        made: np.ndarray | None = None
+        matrix: np.ndarray | None = None
         for name in part.surfaces:
             other = rows(name)
             if other is None:
                 raise part.place.error(f"surface {name} is made of itself")
-            made = other if made is None else _COMBINED[part.how](made, other)
-        assert made is not None, "a combination of no surface is refused when it is read"
-        return made
+            matrix = other if matrix is None else _COMBINED[part.how](matrix, other)
+        assert matrix is not None, "a combination of no surface is refused when it is read"
+        return matrix
 
     def _side(self, part: _Side, sets: Sets) -> np.ndarray:
-        given = (
+        sides = (
             sets.labels(part.of, part.place)
             if _NAME.search(part.of) or part.of in sets
             else np.array([label(part.of, part.place) + part.offset])
         )
-        given = given[np.isin(given, sets.known)]
-        if part.face >= 0 and any(np.isin(given, turned).any() for turned in self.reflected):
+        sides = sides[np.isin(sides, sets.known)]
+        if part.face >= 0 and any(np.isin(sides, turned).any() for turned in self.reflected):
             raise part.place.error(
                 "the faces of elements copied with REFLECT have no known numbers: "
                 "name the surface by a node set, or leave the face out"
             )
-        faces = np.full(len(given), part.face)
+        faces = np.full(len(sides), part.face)
         if self.turned_over and part.face >= 0:
-            over = np.array([self.turned_over.get(one, 0) for one in given.tolist()], np.int64)
+            over = np.array([self.turned_over.get(side, 0) for side in sides.tolist()], np.int64)
             faces = np.where(over > 0, over - 1 - faces, faces)
-        return np.column_stack([given, faces])
+        return np.column_stack([sides, faces])
 
 
 @dataclass(frozen=True)
@@ -417,13 +417,13 @@ class KnownNodes:
         """Positions (n, 3) of nodes. InputError for a node not yet defined at `asked`."""
         if len(self._new) > _FEW:
             self.table(asked.file)
-        found = np.full((len(labels), 3), np.nan)
+        places = np.full((len(labels), 3), np.nan)
         for some, points in ((self._labels, self._points), *self._new):
-            _look_up(some, points, labels, found)
-        missing = np.isnan(found[:, 0])
+            _look_up(some, points, labels, places)
+        missing = np.isnan(places[:, 0])
         if missing.any():
             raise asked.error(f"node {labels[missing][0] % SCOPE} is not defined before this line")
-        return found
+        return places
 
     def move(self, scope: int, placement: InstancePlacement, file: str) -> None:
         """Bring the nodes of a scope to where their instance is placed."""
@@ -504,7 +504,7 @@ class KnownElements:
 
         A section seen from behind runs clockwise; face k becomes face n - 1 - k.
         """
-        found: dict[int, int] = {}
+        turned: dict[int, int] = {}
         for k, block in enumerate(self.blocks):
             mine = block.labels // SCOPE == scope
             if block.kind.dimension != 2 or not mine.any():
@@ -518,8 +518,8 @@ class KnownElements:
             nodes[mine] = nodes[mine][:, order]
             self.blocks[k] = CardBlock(block.type, block.kind, block.labels, nodes, block.place)
             if block.kind.role == "solid":
-                found |= dict.fromkeys(block.labels[mine].tolist(), block.kind.corners)
-        return found
+                turned |= dict.fromkeys(block.labels[mine].tolist(), block.kind.corners)
+        return turned
 
     def check_once(self) -> None:
         """Raise InputError for an element defined twice."""
@@ -547,9 +547,9 @@ def along_arc(
     radius = np.linalg.norm(start)
     if not radius or abs(np.linalg.norm(end) - radius) > _SAME * radius:
         raise place.error("*NGEN, LINE=C: the two ends are not equally far from the centre")
-    given = bool(normal.any())
-    axis = normal if given else np.cross(start, end)
-    if np.linalg.norm(axis) < _SAME * (1 if given else radius**2):
+    has_normal = bool(normal.any())
+    axis = normal if has_normal else np.cross(start, end)
+    if np.linalg.norm(axis) < _SAME * (1 if has_normal else radius**2):
         raise place.error("*NGEN, LINE=C: an arc of 180 degrees or more needs its normal")
     axis = axis / np.linalg.norm(axis)
     angle = np.arctan2(axis @ np.cross(start, end), start @ end)
@@ -716,12 +716,12 @@ class Generator:
     ) -> None:
         """Copies of a master element, which is the first of them."""
         master += scope * SCOPE
-        one = self._elements.one(master, place)
-        if one is None:
+        element = self._elements.one(master, place)
+        if element is None:
             self._sets.add_elements(card, np.empty(0, np.int64), scope)
             return
-        arguments = master + elements[1:], one.nodes + nodes[1:, None]
-        self._elements.add(CardBlock(one.type, one.kind, *arguments, place))
+        arguments = master + elements[1:], element.nodes + nodes[1:, None]
+        self._elements.add(CardBlock(element.type, element.kind, *arguments, place))
         self._sets.add_elements(card, master + elements, scope)
 
     def _elcopy(self, card: Card, lines: list[Data], scope: int) -> None:

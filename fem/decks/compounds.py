@@ -137,7 +137,7 @@ class _Law:
         if self.model == "neo-hookean":
             return self.values["shear"]
         law = MATERIALS[self.model]
-        known = {one.name: self.values.get(one.name, 0.0) for one in fields(law)}
+        known = {item.name: self.values.get(item.name, 0.0) for item in fields(law)}
         modulus = cast("property", law.shear).fget
         assert modulus is not None
         return modulus(SimpleNamespace(**known))  # the law itself has limits in SI
@@ -187,17 +187,17 @@ def rubber(compound: DeckCompound, units: Units) -> Rubber:
         )
     series = _series(parts, notes)
     instant = options.get("MODULI", "LONG TERM").upper() == "INSTANTANEOUS"
-    kept = series if instant else replace(series, shear=1.0, bulk=1.0)
+    series_kept = series if instant else replace(series, shear=1.0, bulk=1.0)
     if not law.shear > 0:
         raise place.error(
             f"material {compound.name}: its modulus of shear at zero strain, {law.shear:.4g}, must be > 0{_by_fit(law)}"
         )
-    values, held = law.si(kept, units.stress)
+    values, held = law.si(series_kept, units.stress)
     if held:
         notes.append(
             f"{compound.name}: incompressible in the deck, taken with ν = {INCOMPRESSIBLE}"
         )
-    _check_modulus(3 * law.shear * kept.shear * units.stress, units, place, compound.name)
+    _check_modulus(3 * law.shear * series_kept.shear * units.stress, units, place, compound.name)
     try:
         MATERIALS.make(law.model, **values)
     except InputError as error:
@@ -301,7 +301,7 @@ def _simplest(values: dict[str, float], bulk: float, place: Place, compound: Dec
     if used <= {"c10"}:
         return _Law("neo-hookean", {"shear": 2 * values["c10"]}, bulk)
     for model in ("mooney-rivlin", "yeoh", "polynomial", "reduced-polynomial"):
-        names = {one.name for one in fields(MATERIALS[model])} - {"bulk_modulus"}
+        names = {item.name for item in fields(MATERIALS[model])} - {"bulk_modulus"}
         if used <= names and not (model == "mooney-rivlin" and values.get("c01", 0.0) < 0):
             return _Law(model, {name: values.get(name, 0.0) for name in sorted(names)}, bulk)
     raise place.error(

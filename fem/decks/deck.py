@@ -230,7 +230,7 @@ def _beside(name: str, place: Place, reading: _Reading) -> Path:
         return own.resolve()
     path = (reading.folder / plain).resolve()
     if not path.is_file() and path.parent.is_dir():  # Windows does not tell capitals apart
-        alike = [one for one in path.parent.iterdir() if one.name.lower() == path.name.lower()]
+        alike = [file for file in path.parent.iterdir() if file.name.lower() == path.name.lower()]
         path = alike[0] if len(alike) == 1 else path
     if not path.is_relative_to(reading.folder):
         raise place.error(f"{name} lies outside the deck's folder; only files in it are included")
@@ -288,7 +288,7 @@ def _regular(text: bytes, lines: list[bytes], width: int, least: int) -> np.ndar
 
 def _ragged(lines: list[bytes], width: int, least: int) -> np.ndarray | None:
     """The table of lines of unequal length; None if one has more than plain numbers and blanks."""
-    found = []
+    ragged = []
     for line in lines:
         if not line.strip():
             continue
@@ -299,8 +299,8 @@ def _ragged(lines: list[bytes], width: int, least: int) -> np.ndarray | None:
             values = [float(part) for part in parts[:width]]
         except ValueError:
             return None
-        found.append(values + [0.0] * (width - len(values)))
-    return np.array(found).reshape(-1, width)
+        ragged.append(values + [0.0] * (width - len(values)))
+    return np.array(ragged).reshape(-1, width)
 
 
 def _slow(part: Data, width: int, least: int) -> Iterator[list[float]]:
@@ -308,12 +308,12 @@ def _slow(part: Data, width: int, least: int) -> Iterator[list[float]]:
         if not line.strip():
             continue
         place = Place(part.place.file, _first_line(part) + offset)
-        found = [number(field, place) for field in fields(line)]
-        if not least <= len(found) <= width:
+        values = [number(field, place) for field in fields(line)]
+        if not least <= len(values) <= width:
             raise place.error(
-                f"{len(found)} numbers; {least} to {width} belong here: {shown(line)}"
+                f"{len(values)} numbers; {least} to {width} belong here: {shown(line)}"
             )
-        yield found + [0.0] * (width - len(found))
+        yield values + [0.0] * (width - len(values))
 
 
 def _first_line(part: Data) -> int:
@@ -374,7 +374,7 @@ def _whole(flat: np.ndarray) -> bool:
 
 def _slow_records(data: list[Data], width: int) -> Iterator[np.ndarray]:
     begun: list[int] = []
-    found: list[list[int]] = []
+    records: list[list[int]] = []
     where = Place("", 0)  # of the first line of the current record
     for part in data:
         for offset, line in enumerate(part.text.split(b"\n")):
@@ -386,13 +386,13 @@ def _slow_records(data: list[Data], width: int) -> Iterator[np.ndarray]:
             if len(begun) > width:
                 raise where.error(f"{len(begun)} numbers, but an element of this type has {width}")
             if len(begun) == width:
-                found.append(begun)
+                records.append(begun)
                 begun = []
     if begun:
         raise where.error(
             f"{len(begun)} numbers, but an element of this type has {width}: is the deck cut short?"
         )
-    yield np.array(found, np.int64).reshape(-1, width)
+    yield np.array(records, np.int64).reshape(-1, width)
 
 
 def labels(part: Data) -> np.ndarray | None:
@@ -483,9 +483,9 @@ def kind(name: str) -> ElementShape | None:
 
 def used_kind(name: str) -> ElementShape:
     """The shape of a type known to be used."""
-    found = kind(name)
-    assert found is not None, f"{name} is not among the types that are used"
-    return found
+    kind_used = kind(name)
+    assert kind_used is not None, f"{name} is not among the types that are used"
+    return kind_used
 
 
 @dataclass(frozen=True)
@@ -543,8 +543,8 @@ class Sets:
             return labels
         if members.names:
             raise asked.error(f"{self.sort} {name} is UNSORTED and made of other sets: not read")
-        given = np.concatenate([*members.labels, *(self._range(*r) for r in members.ranges)])
-        return given[np.sort(np.unique(given, return_index=True)[1])]
+        own = np.concatenate([*members.labels, *(self._range(*r) for r in members.ranges)])
+        return own[np.sort(np.unique(own, return_index=True)[1])]
 
     def _resolved(self, name: str, asked: Place | None, done: dict) -> np.ndarray:
         if name in done:
@@ -574,7 +574,7 @@ def missing(sort: str, name: str, names: Iterable[str]) -> str:
     """Message that a set does not exist, with the nearest name and the existing ones."""
     every = list(names)
     # An instance's own, INSTANCE.NAME, is there for every NAME of a part.
-    known = [one for one in every if one.partition(".")[2] not in every or "." in name]
+    known = [label for label in every if label.partition(".")[2] not in every or "." in name]
     near = difflib.get_close_matches(name.upper(), [k.upper() for k in known], 1, 0.6)
     hint = f"did you mean {near[0]}? " if near else ""
     shown = ", ".join(known[:30]) + (", …" if len(known) > 30 else "")

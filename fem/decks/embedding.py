@@ -95,10 +95,10 @@ def locate(quads: Quads, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np
     order = np.lexsort((beyond, owner))
     there, first = np.unique(owner[order], return_index=True)
     best = order[first]
-    found = np.full(len(points), -1), np.zeros((len(points), 2)), np.full(len(points), np.inf)
-    for into, value in zip(found, (cells, where, beyond), strict=True):
+    places = np.full(len(points), -1), np.zeros((len(points), 2)), np.full(len(points), np.inf)
+    for into, value in zip(places, (cells, where, beyond), strict=True):
         into[there] = value[best]
-    return found
+    return places
 
 
 class Origins:
@@ -354,7 +354,7 @@ def _stations(quads: Quads, line: HostedLine, reach: tuple[float, float]) -> lis
         node = low[number, 0] if t < SNAP else low[number, 2] if t > 1 - SNAP else -1
         station = _Station(s, int(node), int(low[number, 1]), t)
         stations.setdefault(("node", node) if node >= 0 else ("side", station.side), station)
-    return sorted(stations.values(), key=lambda one: one.s)
+    return sorted(stations.values(), key=lambda station: station.s)
 
 
 def _candidates(sides: np.ndarray, line: HostedLine) -> Iterator[tuple[int, float]]:
@@ -373,8 +373,8 @@ def _candidates(sides: np.ndarray, line: HostedLine) -> Iterator[tuple[int, floa
         u = (off[:, 0] * d[:, 1] - off[:, 1] * d[:, 0]) / safe
         over = 0.1 if 0 < k < len(s) - 2 else 3.0  # the ends may extend a little
         near = ok & (t > -0.1) & (t < 1.1) & (u > -over) & (u < 1 + over)
-        for one in np.flatnonzero(near):
-            yield one // 2, s[k] + u[one] * (s[k + 1] - s[k])
+        for candidate in np.flatnonzero(near):
+            yield candidate // 2, s[k] + u[candidate] * (s[k + 1] - s[k])
 
 
 def _meet(side: np.ndarray, line: HostedLine, s: float) -> tuple[float, float] | None:
@@ -411,7 +411,7 @@ def _follow(
     path: dict[int, tuple[_Station, _Station]] = {}
     whole: list[int] = []
     for a, b in zip(stations[:-1], stations[1:], strict=True):
-        names = [one.node if one.node >= 0 else one.side for one in (a, b)]
+        names = [end.node if end.node >= 0 else end.side for end in (a, b)]
         shared = at[names[0]] & at[names[1]]
         if not shared:
             raise line.fail(_slant(line, a, b))
@@ -419,7 +419,7 @@ def _follow(
             whole.append(_between(quads, shared, a.node, b.node, line, a, b))
         else:
             cell = _opposite(quads, shared, names, a, b, line)
-            marks |= {one.side: one.t for one in (a, b)}
+            marks |= {end.side: end.t for end in (a, b)}
             path[cell] = (a, b)
     return marks, _half_way(quads, path, line), whole
 
@@ -460,17 +460,17 @@ def _half_way(quads: Quads, path: dict, line: HostedLine) -> dict[int, float]:
     cells = np.array(list(path), np.int64)
     middle = line.at(np.array([(a.s + b.s) / 2 for a, b in path.values()]))
     places = inverse(quads.points[quads.cells[cells]], middle)[0] if len(cells) else cells
-    found = {}
+    halves = {}
     for cell, (a, b), where in zip(path, path.values(), places, strict=True):
         sides = quads.sides_of(cell)
-        at = {sides[:, 1].tolist().index(one.side): one for one in (a, b)}
+        at = {sides[:, 1].tolist().index(end.side): end for end in (a, b)}
         first, last = (oriented(sides[k], at[k].t) for k in sorted(at))
         along, across = where if min(at) == 0 else where[::-1]
         bulge = 0.0
         if 0.2 < along < 0.8:
             bulge = (across - first - (last - first) * along) / (4 * along * (1 - along))
-        found[cell] = (first + last) / 2 + bulge
-    return found
+        halves[cell] = (first + last) / 2 + bulge
+    return halves
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -521,21 +521,21 @@ def plies(
     """The plies of one cord layer: one per unbroken line, more if the angle varies along it."""
     sides = with_origin(quads, laid.numbers)
     sides = sides[laid.corded[laid.nearest(quads.points[ends(quads, sides)].mean(axis=1))]]
-    found, branches = strings(ends(quads, sides))
+    runs, branches = strings(ends(quads, sides))
     if branches:
         r, y = quads.points[branches[0]]
         raise layer.place.error(
             f"the membranes of {layer.elements} branch at r = {r:.5g}, z = {y:.5g}: make a set of each line"
         )
-    made = []
-    for line in found:
+    plies = []
+    for line in runs:
         chain = forward(quads, sides[line])
         sense = _sense(quads, chain, laid, layer)
         for part in [chain] if layer.geometry == "CONSTANT" else np.split(chain, len(chain)):
-            made.append(_ply(quads, part, layer, material, length, sense))
-    if len(made) > 1:
-        made = [replace(one, name=f"{one.name} ({n + 1})") for n, one in enumerate(made)]
-    return made
+            plies.append(_ply(quads, part, layer, material, length, sense))
+    if len(plies) > 1:
+        plies = [replace(ply, name=f"{ply.name} ({n + 1})") for n, ply in enumerate(plies)]
+    return plies
 
 
 def _ply(
@@ -623,16 +623,16 @@ def lay_all(
         if (numbers < 0).any():
             quads, numbers = _embed(deck, quads, layer, ends, points, labels, origins)
         done[whole] = numbers, points, labels
-    found = {}
+    laid = {}
     for layer in deck.layers:
         numbers, points, labels = done[layer.line or layer.elements]
-        found[layer.elements] = LaidMembranes(
+        laid[layer.elements] = LaidMembranes(
             origins.with_parts(numbers),
             points[:, 1],
             points[:, 2] - points[:, 0],
             np.isin(labels, deck.element_sets.labels(layer.elements, layer.place)),
         )
-    return quads, found
+    return quads, laid
 
 
 def _elements(deck: Deck, layer: CordLayer, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

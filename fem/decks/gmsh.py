@@ -75,7 +75,7 @@ class Part:
 
 def parts(data: bytes, name: str) -> dict[str, Part]:
     """The parts of a file by name, the first of each. InputError for a part without end."""
-    found: dict[str, Part] = {}
+    parts: dict[str, Part] = {}
     at, line = 0, 1
     while match := _BEGIN.search(data, at):
         line += data.count(b"\n", at, match.end())
@@ -83,10 +83,10 @@ def parts(data: bytes, name: str) -> dict[str, Part]:
         end = data.find(b"$End" + match[1], match.end())
         if end < 0:
             raise Place(name, line).error(f"${title} has no $End{title}: is the file cut short?")
-        found.setdefault(title, Part(data[match.end() : end], Place(name, line)))
+        parts.setdefault(title, Part(data[match.end() : end], Place(name, line)))
         line += data.count(b"\n", match.end(), end)
         at = end + 1
-    return found
+    return parts
 
 
 class _Numbers:
@@ -195,32 +195,32 @@ def read(path: Path) -> Deck:
         size = path.stat().st_size
         if size > LARGEST:
             raise InputError(f"{path}: larger than {LARGEST >> 20} MB")
-        found = parts(path.read_bytes(), path.name)
+        by_name = parts(path.read_bytes(), path.name)
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror or error}") from None
-    version, binary = _format(found, path)
+    version, binary = _format(by_name, path)
     needed = ("Nodes", "Elements") + (("Entities",) if version == "4.1" else ())
-    if "ParametricNodes" in found and "Nodes" not in found:
-        found["Nodes"] = _plain_nodes(found["ParametricNodes"], binary)
+    if "ParametricNodes" in by_name and "Nodes" not in by_name:
+        by_name["Nodes"] = _plain_nodes(by_name["ParametricNodes"], binary)
     for name in needed:
-        if name not in found:
+        if name not in by_name:
             raise InputError(f"{path.name}: no ${name} in it: is the file cut short?")
     numbers = BinaryNumbers if binary else TextNumbers
-    names = _names(found.get("PhysicalNames"))
+    names = _names(by_name.get("PhysicalNames"))
     if version == "4.1":
-        groups = _entities(numbers(found["Entities"]))
-        if "PartitionedEntities" in found:
-            groups |= _partitioned(numbers(found["PartitionedEntities"]))
-        labels, points = _nodes_4(numbers(found["Nodes"]))
-        elements = _elements_4(numbers(found["Elements"]), groups)
+        groups = _entities(numbers(by_name["Entities"]))
+        if "PartitionedEntities" in by_name:
+            groups |= _partitioned(numbers(by_name["PartitionedEntities"]))
+        labels, points = _nodes_4(numbers(by_name["Nodes"]))
+        elements = _elements_4(numbers(by_name["Elements"]), groups)
     else:
-        labels, points = _nodes_2(numbers(found["Nodes"]))
-        elements = _elements_2(numbers(found["Elements"]), binary)
-    return _deck(path, labels, points, elements, names, found["Elements"])
+        labels, points = _nodes_2(numbers(by_name["Nodes"]))
+        elements = _elements_2(numbers(by_name["Elements"]), binary)
+    return _deck(path, labels, points, elements, names, by_name["Elements"])
 
 
-def _format(found: dict[str, Part], path: Path) -> tuple[str, bool]:
-    part = found.get("MeshFormat")
+def _format(parts: dict[str, Part], path: Path) -> tuple[str, bool]:
+    part = parts.get("MeshFormat")
     if part is None:
         raise InputError(f"{path}: no $MeshFormat: this is not a Gmsh mesh")
     words = part.text.split(None, 3)[:3]
@@ -299,15 +299,15 @@ def _nodes_4(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
 def _elements_4(numbers: Numbers, groups: Groups) -> Elements:
     blocks, total, *_ = numbers.sizes(4)
     numbers.fits(total, 8)
-    found: Elements = []
+    elements: Elements = []
     for _ in range(numbers.fits(blocks, 4)):
         dimension, tag, sort = (int(value) for value in numbers.ints(3))
         count = numbers.fits(numbers.sizes(1)[0], 8)
         width = 1 + _nodes_of(sort, numbers)
         table = numbers.sizes(count * width).reshape(count, width)
         group = groups.get((dimension, tag), ())
-        found += [(sort, group, int(row[0]), row[1:]) for row in table]
-    return found
+        elements += [(sort, group, int(row[0]), row[1:]) for row in table]
+    return elements
 
 
 def _nodes_of(sort: int, numbers: Numbers) -> int:
@@ -338,8 +338,8 @@ def _nodes_2(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
 def _elements_2(numbers: Numbers, binary: bool) -> Elements:
     (count,) = numbers.ints(1)
     numbers.fits(count, 4)
-    found: Elements = []
-    while len(found) < count:
+    elements: Elements = []
+    while len(elements) < count:
         if binary:
             sort, many, tags = (int(value) for value in numbers.ints(3))
         else:
@@ -352,18 +352,18 @@ def _elements_2(numbers: Numbers, binary: bool) -> Elements:
         if not binary:
             table = np.insert(table, 0, label, axis=1)
         group = table[:, 1] if tags else np.zeros(many, np.int64)
-        found += [
+        elements += [
             (sort, (int(g),) if g else (), int(row[0]), row[1 + tags :])
             for g, row in zip(group, table, strict=True)
         ]
-    return _once(found)
+    return _once(elements)
 
 
-def _once(found: Elements) -> Elements:
+def _once(elements: Elements) -> Elements:
     """Elements that format 2.2 writes once for each of their groups, as one."""
     first: dict[tuple[int, bytes], int] = {}
     single: Elements = []
-    for sort, groups, label, nodes in found:
+    for sort, groups, label, nodes in elements:
         at = first.setdefault((sort, nodes.tobytes()), len(single))
         if at == len(single):
             single.append((sort, groups, label, nodes))
@@ -451,7 +451,7 @@ def _groups(
         labels = np.array([e[2] for e in those], np.int64)
         nodes = np.array([e[3] for e in those], np.int64)[:, list(take)]
         blocks.append(CardBlock(name, used_kind(name), labels, nodes, part.place))
-        for number in sorted({one for e in those for one in e[1] or (0,)}):
+        for number in sorted({tag for e in those for tag in e[1] or (0,)}):
             title = names.get((own, number), f"{'group' if number else 'no group'} {number}")
             mine = np.array([e[2] for e in those if number in (e[1] or (0,))], np.int64)
             if own == dimension:

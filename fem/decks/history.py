@@ -35,22 +35,22 @@ class DeckHistory:
 
 def history(path: Path) -> DeckHistory:
     """Read the history of a deck from its keywords; unreadable numbers among them are left out. InputError for no deck."""
-    found = DeckHistory()
+    history = DeckHistory()
     card: Card | None = None
     lines: list[Data] = []
     for item in cards(path):
         if isinstance(item, Card):
-            _take(found, card, lines)
+            _take(history, card, lines)
             card, lines = item, []
-            found.has_mesh |= item.keyword in ("ELEMENT", "ELGEN")
-            found.has_steps |= item.keyword in ("STEP", "SYMMETRIC MODEL GENERATION")
+            history.has_mesh |= item.keyword in ("ELEMENT", "ELGEN")
+            history.has_steps |= item.keyword in ("STEP", "SYMMETRIC MODEL GENERATION")
         elif card is not None and card.keyword in _TAKEN:
             lines.append(item)
-    _take(found, card, lines)
-    return found
+    _take(history, card, lines)
+    return history
 
 
-def _take(found: DeckHistory, card: Card | None, lines: list[Data]) -> None:
+def _take(history: DeckHistory, card: Card | None, lines: list[Data]) -> None:
     if card is None or card.keyword not in _TAKEN:
         return
     try:
@@ -58,7 +58,7 @@ def _take(found: DeckHistory, card: Card | None, lines: list[Data]) -> None:
         values = [[_number(part, card) for part in parts] for parts in table]
     except InputError:
         return
-    _TAKEN[card.keyword](found, card, table, values)
+    _TAKEN[card.keyword](history, card, table, values)
 
 
 def _number(text: str, card: Card) -> float | None:
@@ -69,7 +69,7 @@ def _number(text: str, card: Card) -> float | None:
         return None
 
 
-def _revolve(found: DeckHistory, card: Card, _: _Table, values: _Values) -> None:
+def _revolve(history: DeckHistory, card: Card, _: _Table, values: _Values) -> None:
     """Two lines of the axis, then angle and number of elements of each sector, degrees."""
     if "REVOLVE" not in card.options:
         return
@@ -77,34 +77,34 @@ def _revolve(found: DeckHistory, card: Card, _: _Table, values: _Values) -> None
     angle = sum(one for one, many in sectors if one and many)
     count = sum(many for one, many in sectors if one and many)
     if 0 < angle <= 360.001 and count:
-        found.angle, found.segments = float(angle), round(count * 360 / angle)
+        history.angle, history.segments = float(angle), round(count * 360 / angle)
 
 
-def _pressed(found: DeckHistory, _: Card, table: _Table, values: _Values) -> None:
+def _pressed(history: DeckHistory, _: Card, table: _Table, values: _Values) -> None:
     for parts, row in zip(table, values, strict=True):
         if len(parts) > 2 and parts[1].upper() == "P" and row[2]:
-            found.pressure = abs(row[2])
+            history.pressure = abs(row[2])
 
 
-def _loaded(found: DeckHistory, _: Card, __: _Table, values: _Values) -> None:
+def _loaded(history: DeckHistory, _: Card, __: _Table, values: _Values) -> None:
     for row in values:
         if len(row) > 2 and row[1] in (1, 2, 3) and row[2]:
-            found.load = max(found.load or 0.0, abs(row[2]))
+            history.load = max(history.load or 0.0, abs(row[2]))
 
 
-def _rolling(found: DeckHistory, _: Card, __: _Table, values: _Values) -> None:
+def _rolling(history: DeckHistory, _: Card, __: _Table, values: _Values) -> None:
     speeds = [abs(row[1]) for row in values if len(row) > 1 and row[1]]
-    found.speed = max(speeds, default=found.speed)
+    history.speed = max(speeds, default=history.speed)
 
 
-def _friction(found: DeckHistory, _: Card, __: _Table, values: _Values) -> None:
+def _friction(history: DeckHistory, _: Card, __: _Table, values: _Values) -> None:
     if values and values[0] and values[0][0] and 0 < values[0][0] < 3:
-        found.friction = max(found.friction or 0.0, values[0][0])
+        history.friction = max(history.friction or 0.0, values[0][0])
 
 
-def _modes(found: DeckHistory, _: Card, __: _Table, values: _Values) -> None:
+def _modes(history: DeckHistory, _: Card, __: _Table, values: _Values) -> None:
     if values and values[0] and values[0][0] and values[0][0] >= 1:
-        found.modes = int(values[0][0])
+        history.modes = int(values[0][0])
 
 
 _TAKEN = {

@@ -217,9 +217,9 @@ class DeckEdges:
         size = max(self.ends.max(initial=0), pairs.max(initial=0)) + 1
         keys = self.ends[:, 0] * size + self.ends[:, 1]
         low = np.sort(pairs, axis=1)
-        wanted = low[:, 0] * size + low[:, 1]
-        at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-        return np.where(keys[at] == wanted, at, -1)
+        numbers = low[:, 0] * size + low[:, 1]
+        at = np.minimum(np.searchsorted(keys, numbers), len(keys) - 1)
+        return np.where(keys[at] == numbers, at, -1)
 
 
 def build(deck: Deck, region_of: dict[int, int]) -> tuple[Quads, DeckEdges, bool]:
@@ -299,9 +299,9 @@ def _middles(
     middles = nodes[ends].mean(axis=1)
     node = np.full(len(ends), -1)
     for edge, raw in parts:
-        given = raw.middles >= 0
-        node[edge[given]] = raw.middles[given]
-        other = given & (node[edge] != raw.middles)
+        has_middle = raw.middles >= 0
+        node[edge[has_middle]] = raw.middles[has_middle]
+        other = has_middle & (node[edge] != raw.middles)
         if other.any():
             label = raw.labels[other.any(axis=1)][0] % SCOPE
             raise blocks[0].place.error(
@@ -350,12 +350,12 @@ def strings(pairs: np.ndarray) -> tuple[list[np.ndarray], list[int]]:
         for node in pair:
             at[node].append(number)
     left = set(range(len(pairs)))
-    found = []
+    strings = []
     for start in sorted(node for node, there in at.items() if len(there) != 2) + sorted(at):
         for number in at[start]:
             if number in left:
-                found.append(np.array(_follow(start, number, pairs, at, left)))
-    return found, [node for node, there in at.items() if len(there) > 2]
+                strings.append(np.array(_follow(start, number, pairs, at, left)))
+    return strings, [node for node, there in at.items() if len(there) > 2]
 
 
 def _follow(node: int, number: int, pairs: np.ndarray, at: dict, left: set) -> list[int]:
@@ -451,7 +451,7 @@ def _closed(
     faces, uses = np.unique(ends(quads, inner), return_counts=True)
     loose = np.setdiff1d(faces[uses == 1], ends(quads, rim))
     whole = _length(quads, inner)
-    found = [inner]
+    line_found = [inner]
     for line in lines:
         nodes, uses = np.unique(ends(quads, line), return_counts=True)
         tips = nodes[uses == 1]
@@ -459,8 +459,8 @@ def _closed(
             len(tips) == 2 and np.isin(tips, loose).any() and np.isin(tips, ends(quads, rim)).any()
         )
         if joins and _length(quads, line) <= _BASE * whole:
-            found.append(line)
-    return np.concatenate(found), sum(len(line) for line in found[1:])
+            line_found.append(line)
+    return np.concatenate(line_found), sum(len(line) for line in line_found[1:])
 
 
 def _length(quads: Quads, sides: np.ndarray) -> float:
@@ -470,9 +470,9 @@ def _length(quads: Quads, sides: np.ndarray) -> float:
 
 def _lines(quads: Quads, sides: np.ndarray) -> list[np.ndarray]:
     """Unbroken lines of an outline's sides, the one that reaches farthest from the axle first."""
-    found, _ = strings(ends(quads, sides)) if len(sides) else ([], [])
-    reach = [-quads.points[ends(quads, sides[line]).ravel(), 0].max() for line in found]
-    return [sides[found[n]] for n in np.argsort(reach, kind="stable")]
+    lines, _ = strings(ends(quads, sides)) if len(sides) else ([], [])
+    reach = [-quads.points[ends(quads, sides[line]).ravel(), 0].max() for line in lines]
+    return [sides[lines[n]] for n in np.argsort(reach, kind="stable")]
 
 
 def _without(quads: Quads, sides: np.ndarray, others: np.ndarray) -> np.ndarray:

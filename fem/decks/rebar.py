@@ -51,8 +51,8 @@ _TOUCHING = 1e-6  # of the deck's size: nearer ends of two lines are one
 
 def option(card: Card, name: str) -> str:
     """The value of an option that may be written in short (GEOM=); "" if it is not there."""
-    found = [key for key in card.options if name.startswith(key) and len(key) >= 4]
-    return card.options[found[0]] if found else ""
+    options = [key for key in card.options if name.startswith(key) and len(key) >= 4]
+    return card.options[options[0]] if options else ""
 
 
 def layers(card: Card, lines: list[Data]) -> Iterator[CordLayer]:
@@ -82,35 +82,35 @@ def layers(card: Card, lines: list[Data]) -> Iterator[CordLayer]:
             )
         numbers = [number(part, place) for part in parts[1 : 3 + len(columns)]]
         area, spacing, *rest = numbers + [0.0] * (2 + len(columns) - len(numbers))
-        given = dict(zip(columns, rest, strict=True))
-        layer = _layer(card, parts[0], area, spacing or 1.0, given, place)
+        values = dict(zip(columns, rest, strict=True))
+        layer = _layer(card, parts[0], area, spacing or 1.0, values, place)
         if pairs:
             second = rows[n + 1][1] if n + 1 < len(rows) else []
             layer = replace(layer, cut=_skew(second, place))
         elif element == "CONTINUUM":
-            layer = replace(layer, edge=0, cut=_parallel(given["edge"], given["fraction"], place))
+            layer = replace(layer, edge=0, cut=_parallel(values["edge"], values["fraction"], place))
         yield layer
 
 
 def _layer(
-    card: Card, of: str, area: float, spacing: float, given: dict[str, float], place: Place
+    card: Card, of: str, area: float, spacing: float, values: dict[str, float], place: Place
 ) -> CordLayer:
-    name, edge = card.options.get("NAME", "REBAR").upper(), given.get("edge", 0.0)
+    name, edge = card.options.get("NAME", "REBAR").upper(), values.get("edge", 0.0)
     if area <= 0 or spacing <= 0:
         raise place.error(f"cords of layer {name}: area and spacing must be > 0")
-    if "edge" in given and edge not in range(1, _SIDES + 1):
+    if "edge" in values and edge not in range(1, _SIDES + 1):
         raise place.error(f"cords of layer {name}: edge {edge:g} is not one of 1 to 4")
-    angular = given.get("radius", 0.0) > 0  # as many cords at every radius
+    angular = values.get("radius", 0.0) > 0  # as many cords at every radius
     return CordLayer(
         name=name,
         elements=of,
         area=area,
-        spacing=float(np.degrees(spacing / given["radius"])) if angular else spacing,
+        spacing=float(np.degrees(spacing / values["radius"])) if angular else spacing,
         material=card.options["MATERIAL"].upper(),
-        angle=given.get("angle", 0.0),
-        geometry="ANGULAR" if angular else "EDGE" if edge and "angle" not in given else "CONSTANT",
+        angle=values.get("angle", 0.0),
+        geometry="ANGULAR" if angular else "EDGE" if edge and "angle" not in values else "CONSTANT",
         orientation=card.options.get("ORIENTATION", ""),
-        position=given.get("position", 0.0),
+        position=values.get("position", 0.0),
         edge=int(edge),
         place=place,
     )
@@ -127,12 +127,12 @@ def _parallel(edge: float, fraction: float, place: Place) -> tuple:
 def _skew(parts: list[str], place: Place) -> tuple:
     """The cut between points of two edges, at fractions of the way along them."""
     along = ([number(part, place) for part in parts] + [0.0] * _SIDES)[:_SIDES]
-    given = [(k, f) for k, f in enumerate(along) if f]
-    if len(given) != 2 or not all(0 < f <= 1 for _, f in given):
+    factors = [(k, f) for k, f in enumerate(along) if f]
+    if len(factors) != 2 or not all(0 < f <= 1 for _, f in factors):
         raise place.error(
             "skew cords in solids need a second line with two fractions from 0 to 1 of four edges"
         )
-    ends = [((f, 0.0), (1.0, f), (1.0 - f, 1.0), (0.0, 1.0 - f))[k] for k, f in given]
+    ends = [((f, 0.0), (1.0, f), (1.0 - f, 1.0), (0.0, 1.0 - f))[k] for k, f in factors]
     first, last = np.array(ends)
     step = last - first
     backwards = step[np.argmax(abs(step))] < 0
@@ -213,7 +213,7 @@ class _Lines:
 
     def _new(self, layer: CordLayer, labels: np.ndarray, number: int) -> list[_Line]:
         """The membranes of a layer, from the elements of its line."""
-        found = []
+        fresh = []
         for block in self._deck.blocks:
             mine = np.isin(block.labels, labels)
             if not mine.any():
@@ -237,12 +237,12 @@ class _Lines:
                         f"cords {layer.name}: triangular shells {block.type} with cords are not read"
                     )
                 points = _moved(points, nodes, shape.dimension, layer.position)
-            found.append(_Line(block.labels[mine] + self._shift(number), points, layer.place))
-        if not found:
+            fresh.append(_Line(block.labels[mine] + self._shift(number), points, layer.place))
+        if not fresh:
             raise layer.place.error(
                 f"no element of {layer.elements} can carry the cords {layer.name}"
             )
-        return found
+        return fresh
 
     def deck(self, layers: tuple[CordLayer, ...]) -> Deck:
         """The deck with all of them."""

@@ -104,8 +104,8 @@ def meridian_layers(deck: Deck, senses: dict[int, int], rings: Rings) -> tuple[C
 
 def _layer(deck: Deck, layer: CordLayer, senses: dict[int, int], rings: Rings) -> CordLayer:
     labels = deck.element_sets.labels(layer.elements, layer.place).tolist()
-    found = {senses[label] for label in labels if label in senses}
-    if not found:
+    sides = {senses[label] for label in labels if label in senses}
+    if not sides:
         return layer
     if layer.geometry == "EDGE":
         around = _runs_around(deck, layer, rings)
@@ -113,12 +113,12 @@ def _layer(deck: Deck, layer: CordLayer, senses: dict[int, int], rings: Rings) -
     circumferential = _from_circumference(deck, layer, rings.axis)
     angle = np.radians(layer.angle)
     slanted = abs(np.sin(2 * angle)) > 1e-9
-    if len(found) > 1 and slanted:
+    if len(sides) > 1 and slanted:
         raise layer.place.error(
             f"the normals of the membranes of {layer.elements} do not all point to one side, so the angle of "
             f"{layer.name} is not clear"
         )
-    sense = found.pop()
+    sense = sides.pop()
     if circumferential:
         angle = np.arctan2(
             circumferential * np.cos(angle), -sense * np.sin(angle) * circumferential
@@ -131,19 +131,19 @@ def _layer(deck: Deck, layer: CordLayer, senses: dict[int, int], rings: Rings) -
 def _runs_around(deck: Deck, layer: CordLayer, rings: Rings) -> bool:
     """Whether the edge to which a layer's cords are parallel runs around the axle, not along the meridian."""
     labels = deck.element_sets.labels(layer.elements, layer.place)
-    found: set[bool] = set()
+    senses: set[bool] = set()
     for block in deck.blocks:
         mine = np.isin(block.labels, labels)
         if block.kind.role == "membrane" and mine.any():
             rows = deck.rows(block.nodes[mine][:, :4], block.place)
             first, last = rings.ring[rows[:, layer.edge - 1]], rings.ring[rows[:, layer.edge % 4]]
-            found |= set((first == last).tolist())
-    if len(found) != 1:
+            senses |= set((first == last).tolist())
+    if len(senses) != 1:
         raise layer.place.error(
             f"cords {layer.name}: edge {layer.edge} of their elements runs around the axle in some and along "
             "the meridian in others"
         )
-    return found.pop()
+    return senses.pop()
 
 
 def _from_circumference(deck: Deck, layer: CordLayer, axis: int) -> int:
@@ -276,20 +276,20 @@ def _meridian_faces(
     rings: Rings, faces: Sequence[tuple[int, ...]], rows: np.ndarray, block: CardBlock
 ) -> np.ndarray:
     """For each solid the index of its first face with one angle and distinct rings."""
-    found = np.full(len(rows), -1)
+    row_of = np.full(len(rows), -1)
     for number in reversed(range(len(faces))):
         angle, ring = rings.angle[rows[:, faces[number]]], rings.ring[rows[:, faces[number]]]
         flat = (angle == angle[:, :1]).all(axis=1)
         apart = (np.diff(np.sort(ring, axis=1), axis=1) > 0).all(axis=1)
-        found[flat & apart] = number
+        row_of[flat & apart] = number
     spans = np.array([len(np.unique(angle)) for angle in rings.angle[rows]])
-    wrong = np.flatnonzero((found < 0) | (spans != 2))
+    wrong = np.flatnonzero((row_of < 0) | (spans != 2))
     if len(wrong):
         raise block.place.error(
             f"element {block.labels[wrong[0]] % SCOPE} does not reach from one meridian plane to the next: "
             "the body is not its section revolved"
         )
-    return found
+    return row_of
 
 
 def _middles(shape: ElementShape) -> dict[frozenset, int]:
@@ -373,22 +373,22 @@ def _element_sets(deck: Deck, owner: dict) -> Sets:
     members = {}
     for name in deck.element_sets.names:
         labels = deck.element_sets.labels(name).tolist()
-        kept = sorted({owner[label] for label in labels if label in owner})
-        members[name] = Members([np.array(kept, np.int64)])
+        owners = sorted({owner[label] for label in labels if label in owner})
+        members[name] = Members([np.array(owners, np.int64)])
     return Sets("element set", members, np.unique(np.array(list(owner.values()), np.int64)))
 
 
 def _surface(rows: np.ndarray, section: _Section) -> np.ndarray:
     """(section label, face of its cell) of faces around the axis; membranes unchanged."""
-    found = set()
+    faces = set()
     for label, face in rows.tolist():
         cell = section.owner.get(label)
         if cell is None:
             continue
         if label not in section.faces or face < 0:
-            found.add((cell, face))
+            faces.add((cell, face))
         elif face < len(section.faces[label]):
             ends, corners = section.faces[label][face], section.corners[cell]
             pairs = [{a, b} for a, b in zip(corners, corners[1:] + corners[:1], strict=True)]
-            found |= {(cell, k) for k, pair in enumerate(pairs) if pair == ends}
-    return np.array(sorted(found), np.int64).reshape(-1, 2)
+            faces |= {(cell, k) for k, pair in enumerate(pairs) if pair == ends}
+    return np.array(sorted(faces), np.int64).reshape(-1, 2)

@@ -73,8 +73,8 @@ class _Points:
 
     def power(self, alpha: float) -> np.ndarray:
         """Nominal stress (n,) of a term of Ogden's law with mu = 1."""
-        one, _, three = self.stretches.T
-        return 2 / alpha * (one ** (alpha - 1) - three**alpha / one)
+        first, _, three = self.stretches.T
+        return 2 / alpha * (first ** (alpha - 1) - three**alpha / first)
 
 
 def fitted(
@@ -97,13 +97,13 @@ def fitted(
     error = float(np.linalg.norm(stress(points) - points.stress) / size) if size else np.inf
     if not (np.isfinite(error) and error < 1):
         raise refuse("no coefficients follow its test data: are stress and strain in this order?")
-    made = []
+    fits = []
     for test, (stretches, given) in curves.items():
         ends = min(stretches[:, 0].min(), 1.0), max(stretches[:, 0].max(), 1.0)
         along = np.linspace(*ends, 60)
         line = _Points(_stretches(test, along), np.zeros(60))
-        made.append(Curve(test, stretches[:, 0], given, along, stress(line)))
-    return Fit(name, values, error, tuple(made))
+        fits.append(Curve(test, stretches[:, 0], given, along, stress(line)))
+    return Fit(name, values, error, tuple(fits))
 
 
 def _stretches(test: str, first: np.ndarray) -> np.ndarray:
@@ -149,9 +149,9 @@ def _terms(points: _Points, names: tuple[str, ...]) -> list[np.ndarray]:
 
 
 def _polynomial(points: _Points, model: str, names: tuple[str, ...]) -> _Found:
-    found = _linear(_terms(points, names), points.stress)
-    values = dict(zip(names, found.tolist(), strict=True))
-    return model, values, lambda at: np.array(_terms(at, names)).T @ found
+    coefficients = _linear(_terms(points, names), points.stress)
+    values = dict(zip(names, coefficients.tolist(), strict=True))
+    return model, values, lambda at: np.array(_terms(at, names)).T @ coefficients
 
 
 def _reduced(points: _Points, order: int) -> _Found:
@@ -161,11 +161,11 @@ def _reduced(points: _Points, order: int) -> _Found:
 def _marlow(points: _Points, _: int) -> _Found:
     """A function of I1 alone, by the lowest order of (I1 - 3) that follows the test."""
     for order in range(1, min(6, len(points.stress)) + 1):
-        found = _reduced(points, order)
-        off = np.linalg.norm(found[2](points) - points.stress)
+        table = _reduced(points, order)
+        off = np.linalg.norm(table[2](points) - points.stress)
         if off <= _ENOUGH * np.linalg.norm(points.stress):
             break
-    return found
+    return table
 
 
 def _chains(points: _Points, _: int) -> _Found:
@@ -177,8 +177,8 @@ def _chains(points: _Points, _: int) -> _Found:
         return at.of(np.sum(terms, axis=0))
 
     def off(logarithm: float) -> float:
-        one = column(points, np.exp(logarithm))
-        return float(np.linalg.norm(points.stress - one * _linear([one], points.stress)))
+        residual = column(points, np.exp(logarithm))
+        return float(np.linalg.norm(points.stress - residual * _linear([residual], points.stress)))
 
     starts = np.log(np.geomspace(1.02, 50, 30))
     best = int(np.argmin([off(s) for s in starts]))
@@ -204,8 +204,13 @@ def _ogden(points: _Points, order: int) -> _Found:
         return (np.array(table).T @ _linear(table, points.stress) - points.stress) / scale
 
     scale = np.linalg.norm(points.stress) or 1.0
-    given = np.array([2.0, -2.0, 5.0, -4.0, 8.0, -6.0])
-    starts = [given[:order], 0.5 * given[:order], -given[:order], 1.0 + np.arange(order)]
+    exponents = np.array([2.0, -2.0, 5.0, -4.0, 8.0, -6.0])
+    starts = [
+        exponents[:order],
+        0.5 * exponents[:order],
+        -exponents[:order],
+        1.0 + np.arange(order),
+    ]
     results = [least_squares(off, start, bounds=(-9, 12)) for start in starts]
     powers = min(results, key=lambda result: result.cost).x
     powers[np.abs(powers) <= 1e-3] = 1e-3

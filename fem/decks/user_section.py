@@ -81,12 +81,12 @@ def _of_surface(deck: Deck, edges: DeckEdges, rows: np.ndarray) -> np.ndarray:
     at = order[np.minimum(at, len(order) - 1)]
     solid = edges.labels[at] == rows[:, 0]
     one = solid & (rows[:, 1] >= 0) & (rows[:, 1] < 4)
-    found = [edges.faces[at[one], rows[one, 1]]]
+    edges_found = [edges.faces[at[one], rows[one, 1]]]
     every = solid & (rows[:, 1] == ALL_FACES)
-    found.append(edges.faces[at[every]].ravel())
+    edges_found.append(edges.faces[at[every]].ravel())
     membranes = rows[~solid & np.isin(rows[:, 1], (ALL_FACES, BOTH_SIDES)), 0]
-    found.append(membrane_edges(deck, edges, membranes))
-    numbers = np.concatenate(found)
+    edges_found.append(membrane_edges(deck, edges, membranes))
+    numbers = np.concatenate(edges_found)
     return np.unique(numbers[numbers >= 0])
 
 
@@ -300,7 +300,7 @@ def _section(deck: Deck, ring_angles: np.ndarray | None, wishes: Wishes) -> OwnS
         for key, names in _names(deck, wishes).items()
     }
     quads = _both_halves(quads, wishes)
-    laid = {name: one.mirrored() if wishes.mirror else one for name, one in laid.items()}
+    laid = {name: layer.mirrored() if wishes.mirror else layer for name, layer in laid.items()}
     rim, inner, tread = (_sides(quads, named[key], key) for key in ("rim", "inner", "tread"))
     assert rim is not None, "_names() refuses a deck without a rim"
     shape = faces(quads, rim, inner, tread)
@@ -389,7 +389,7 @@ def _sides(quads: Quads, numbers: list[np.ndarray], key: str) -> np.ndarray | No
 
 
 def _cords(deck: Deck, quads: Quads, laid: dict[str, LaidMembranes], units: Units) -> list[Ply]:
-    made: list[Ply] = []
+    laid_plies: list[Ply] = []
     for layer in deck.layers:
         if layer.elements not in laid:
             continue
@@ -397,17 +397,17 @@ def _cords(deck: Deck, quads: Quads, laid: dict[str, LaidMembranes], units: Unit
             known = ", ".join(deck.materials) or "none"
             raise layer.place.error(f"there is no material {layer.material}; there are: {known}")
         material = cord(deck.materials[layer.material], units)
-        found = plies(quads, laid[layer.elements], layer, material, units.length)
+        lines = plies(quads, laid[layer.elements], layer, material, units.length)
         itself = _mass_per_area(deck, layer, units)
         # Carried by the cords, whose mass per area is density A / s.
-        made += [
-            replace(ply, density=ply.density + itself * ply.spacing / ply.area) for ply in found
+        laid_plies += [
+            replace(ply, density=ply.density + itself * ply.spacing / ply.area) for ply in lines
         ]
-    made = [replace(ply, name=ply.name.replace("/", "-")) for ply in made]
-    names = [ply.name for ply in made]
+    laid_plies = [replace(ply, name=ply.name.replace("/", "-")) for ply in laid_plies]
+    names = [ply.name for ply in laid_plies]
     return [
         replace(ply, name=f"{ply.name} [{n + 1}]") if names.count(ply.name) > 1 else ply
-        for n, ply in enumerate(made)
+        for n, ply in enumerate(laid_plies)
     ]
 
 
@@ -437,11 +437,11 @@ def _lines(deck: Deck, quads: Quads, edges: DeckEdges, origins: Origins, wishes:
     return lines
 
 
-def _rubbers(deck: Deck, found: Regions, units: Units, wishes: Wishes) -> list[Rubber | None]:
-    given = {name.upper() for name in wishes.materials}
+def _rubbers(deck: Deck, named: Regions, units: Units, wishes: Wishes) -> list[Rubber | None]:
+    stated = {name.upper() for name in wishes.materials}
     compounds: list[Rubber | None] = []
-    for name, material, place in zip(found.names, found.materials, found.places, strict=True):
-        if material is None or name.upper() in given or material.upper() in given:
+    for name, material, place in zip(named.names, named.materials, named.places, strict=True):
+        if material is None or name.upper() in stated or material.upper() in stated:
             compounds.append(None)
         elif material not in deck.materials:
             known = ", ".join(deck.materials) or "none"

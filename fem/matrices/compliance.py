@@ -111,9 +111,9 @@ def _solve(factor: PETSc.Mat, stiffness: PETSc.Mat, loads: np.ndarray) -> np.nda
     # Sums of the solutions with random signs: the expected square of their residual is that of all
     # columns together.
     signs = np.random.default_rng(0).choice((-1.0, 1.0), (loads.shape[1], _SUMS))
-    given = loads @ signs
-    comm, defect = stiffness.comm.tompi4py(), multiply(stiffness, out @ signs) - given
-    worst, scale = comm.allreduce(np.array([(defect**2).sum(), (given**2).sum()]))
+    products = loads @ signs
+    comm, defect = stiffness.comm.tompi4py(), multiply(stiffness, out @ signs) - products
+    worst, scale = comm.allreduce(np.array([(defect**2).sum(), (products**2).sum()]))
     if not worst <= (RESIDUAL_TOLERANCE**2) * max(scale, np.finfo(float).tiny):
         raise NearlySingular(
             f"greens: a static or harmonic solution has a relative residual of {np.sqrt(worst / scale):.1e}: the "
@@ -125,11 +125,11 @@ def _solve(factor: PETSc.Mat, stiffness: PETSc.Mat, loads: np.ndarray) -> np.nda
 
 def multiply(matrix: PETSc.Mat, columns: np.ndarray) -> np.ndarray:
     """Own rows of matrix @ columns. Collective."""
-    given = _dense(columns, matrix.comm)
-    product = matrix.matMult(given)
+    right = _dense(columns, matrix.comm)
+    product = matrix.matMult(right)
     out = product.getDenseArray().copy()
     product.destroy()
-    given.destroy()
+    right.destroy()
     return out
 
 
@@ -194,16 +194,16 @@ def relieved(operators: Operators, loads: sparse.csr_matrix) -> np.ndarray:
     if not rigid.shape[1]:
         return solve_all(stiffness, loads)
     weighted = operators.mass[:, None] * rigid
-    given = loads.toarray()
-    balanced = defect = given - weighted @ summed(comm, rigid.T @ given)
+    dense = loads.toarray()
+    balanced = defect = dense - weighted @ summed(comm, rigid.T @ dense)
     held, supported = _determinate(operators, rigid)
-    factor, answer = factorise(supported), np.zeros_like(given)
+    factor, answer = factorise(supported), np.zeros_like(dense)
     for _ in range(_PASSES):
         forces = defect.copy()
         forces[held] = 0.0
         answer += solve_columns(factor, supported, forces)
         answer -= rigid @ summed(comm, weighted.T @ answer)
-        defect = given - multiply(stiffness, answer)
+        defect = dense - multiply(stiffness, answer)
         defect -= weighted @ summed(comm, rigid.T @ defect)
         worst, size = comm.allreduce(np.array([(defect**2).sum(), (balanced**2).sum()]))
         if worst <= RESIDUAL_TOLERANCE**2 * size:

@@ -145,11 +145,13 @@ class Unknowns:
         own = nodal[self.free]
         if self.rim is None:
             return own
-        taken = summed(self._body.comm, self.rim.shape.T @ nodal[self.rim.dofs].toarray())
+        rim_loads = summed(self._body.comm, self.rim.shape.T @ nodal[self.rim.dofs].toarray())
         if on_rim is not None:
-            taken = taken + self.rim.coordinates.T @ on_rim
+            rim_loads = rim_loads + self.rim.coordinates.T @ on_rim
         return (
-            sparse.vstack([own, sparse.csr_matrix(taken)], format="csr") if self.rim.mine else own
+            sparse.vstack([own, sparse.csr_matrix(rim_loads)], format="csr")
+            if self.rim.mine
+            else own
         )
 
 
@@ -465,9 +467,9 @@ def _assembled(body: Body, form: ufl.Form) -> np.ndarray:
     """Own rows (nodes, 3) of a linear form. Collective."""
     out = fem.petsc.assemble_vector(compat.form(form))
     out.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-    found = out.array_r.reshape(-1, 3).copy()
+    forces = out.array_r.reshape(-1, 3).copy()
     out.destroy()
-    return found
+    return forces
 
 
 def _turning(body: Body, motions: np.ndarray) -> dict[str, np.ndarray]:

@@ -65,9 +65,9 @@ class Outline:
 
     def at(self, s: np.ndarray) -> np.ndarray:
         """(r, y) (k, 2) m at signed lengths (k,) m from the crown."""
-        found = self._place(np.abs(s))
-        found[:, 1] *= np.sign(s)
-        return found
+        points = self._place(np.abs(s))
+        points[:, 1] *= np.sign(s)
+        return points
 
     def inwards(self, s: np.ndarray) -> np.ndarray:
         """Unit normals (k, 2) towards the air inside."""
@@ -81,10 +81,10 @@ def arcs(through: npt.ArrayLike) -> np.ndarray:
     points = np.asarray(through, float)
     if points.ndim != 2 or len(points) < 3 or len(points) % 2 == 0:
         raise InputError("section: arcs are a start and two points (on the way, end) for each arc")
-    found = [points[:1]]
+    pieces = [points[:1]]
     for start, middle, end in zip(points[:-2:2], points[1:-1:2], points[2::2], strict=True):
-        found.append(_arc(start, middle, end)[1:])
-    return np.concatenate(found)
+        pieces.append(_arc(start, middle, end)[1:])
+    return np.concatenate(pieces)
 
 
 def _arc(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
@@ -210,7 +210,9 @@ class Construction:
                     raise InputError(
                         f"section: {kind} of layer {name!r}; there are {', '.join(names)}"
                     )
-        for compound in [one.compound for one in self.layers] + [p.compound for p in self.parts]:
+        for compound in [layer.compound for layer in self.layers] + [
+            p.compound for p in self.parts
+        ]:
             if compound not in self.compounds:
                 known = ", ".join(self.compounds)
                 raise InputError(f"section: no compound {compound!r}; there are {known}")

@@ -293,7 +293,7 @@ class InflatedRing:
             "vertical": (1, np.stack([one, 1j * one, none], axis=-1)),
             "yaw": (1, np.stack([-y, -1j * y, r], axis=-1)),
         }
-        found = []
+        shapes = []
         for wave in (0, 1):
             squares, loss, fields = self._lowest(wave, 3, self.mass)
             whole = np.zeros((self._size, fields.shape[1]), complex)
@@ -307,8 +307,8 @@ class InflatedRing:
                 parts = np.abs(motion.ravel().conj() @ heavy) ** 2 / sizes * around
                 k = int(parts.argmax())
                 frequency = float(np.sqrt(squares[k]) / (2 * np.pi))
-                found.append(RigidMode(name, frequency, float(loss[k] / 2), float(parts[k])))
-        return found
+                shapes.append(RigidMode(name, frequency, float(loss[k] / 2), float(parts[k])))
+        return shapes
 
     def _of_kind(self, wave: int, share: np.ndarray) -> sparse.csr_matrix:
         """The wall's own stiffness at a wave number, times a `share` of each cell."""

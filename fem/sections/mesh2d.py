@@ -524,12 +524,12 @@ def element_corners(
         np.interp(np.linspace(0, total[-1], n + 1)[:-1], total, x)
         for n, (x, total) in zip(numbers, parts, strict=True)
     ]
-    found = np.append(np.concatenate(lines), high)
+    corners = np.append(np.concatenate(lines), high)
     starts = np.concatenate([[0], np.cumsum(numbers)])
     if np.allclose(fixed + fixed[::-1], low + high, rtol=0, atol=small) and _even(numbers):
-        found = ((low + high) + (found - found[::-1])) / 2
-    found[starts] = fixed
-    return found
+        corners = ((low + high) + (corners - corners[::-1])) / 2
+    corners[starts] = fixed
+    return corners
 
 
 def _cumulative(
@@ -590,13 +590,13 @@ class Ring:
     @cached_property
     def fingerprint(self) -> str:
         """Hash of the mesh: nodes, cells, regions, faces, lines of cords and angles around."""
-        mesh, found = self.section, hashlib.sha256()
+        mesh, digest = self.section, hashlib.sha256()
         faces = (mesh.outer, mesh.tread, mesh.inner, mesh.rim)
         lines = [line for _, line in sorted(mesh.plies.items())]
         for array in (mesh.nodes, mesh.cells, mesh.region, *faces, *lines, self.ring_corners):
-            found.update(np.ascontiguousarray(array).tobytes())
-        found.update(repr((mesh.order, mesh.regions, sorted(mesh.plies))).encode())
-        return found.hexdigest()
+            digest.update(np.ascontiguousarray(array).tobytes())
+        digest.update(repr((mesh.order, mesh.regions, sorted(mesh.plies))).encode())
+        return digest.hexdigest()
 
     @property
     def segments(self) -> int:

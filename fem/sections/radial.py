@@ -178,23 +178,23 @@ def size(text: str) -> Size:
     Raises InputError for another format or a size out of range.
     """
     shown = f'tire.size = "{text[:40]}"'
-    found = _SIZE.fullmatch(text.strip())
-    if not found:
+    match = _SIZE.fullmatch(text.strip())
+    if not match:
         raise InputError(
             f'{shown}: must be like "205/60 R15", "P205/60R15 91V" or "LT245/75R16 120/116S"'
         )
-    width, ratio, inches = (int(found[part]) for part in ("width", "ratio", "rim"))
+    width, ratio, inches = (int(match[part]) for part in ("width", "ratio", "rim"))
     if not (125 <= width <= 355 and 25 <= ratio <= 85 and 10 <= inches <= 24):
         raise InputError(
             f"{shown}: from 125 to 355 mm wide, 25 to 85 % high, on rims of 10 to 24 inches"
         )
-    index, last = int(found["index"] or 0), FIRST_INDEX + len(CAPACITIES) - 1
+    index, last = int(match["index"] or 0), FIRST_INDEX + len(CAPACITIES) - 1
     if index and not FIRST_INDEX <= index <= last:
         raise InputError(f"{shown}: load index {index} must lie from {FIRST_INDEX} to {last}")
-    symbol = (found["symbol"] or (found["within"] or "").replace("Z", "").replace("z", "")).upper()
+    symbol = (match["symbol"] or (match["within"] or "").replace("Z", "").replace("z", "")).upper()
     if symbol and symbol not in SPEEDS:
         raise InputError(f"{shown}: speed symbol {symbol} must be one of {', '.join(SPEEDS)}")
-    marks = " ".join(found["marks"].upper().split())
+    marks = " ".join(match["marks"].upper().split())
     return Size(
         width / 1e3,
         width * ratio / 1e5,
@@ -202,7 +202,7 @@ def size(text: str) -> Size:
         index=index or None,
         symbol=symbol or None,
         reinforced=bool(re.search(r"\b(XL|EXTRA ?LOAD|REINFORCED)\b", marks)),
-        light_truck=bool(found["light"]) or (found["use"] or "").upper() == "LT",
+        light_truck=bool(match["light"]) or (match["use"] or "").upper() == "LT",
     )
 
 

@@ -82,19 +82,21 @@ def _construction(raw: dict[str, Any]) -> Construction:
     if unit not in UNITS:
         raise InputError(f'unit = "{unit}": must be "m" or "mm"')
     scale = UNITS[unit]
-    layers = [_layer(one, scale) for one in _tables(raw, "layer", least=1)]
+    layers = [_layer(layer, scale) for layer in _tables(raw, "layer", least=1)]
     if twice := _twice(layers):
         raise InputError(f"layer {twice!r}: the name of two layers; parts and cords refer to one")
-    cords = [_cords(one, scale) for one in _tables(raw, "cords")]
+    cords = [_cords(cords, scale) for cords in _tables(raw, "cords")]
     if twice := _twice(cords):
         raise InputError(f"cords {twice!r}: the name of two lines; results have one of each name")
     held = scale * _number(raw, "held", "the file") if "held" in raw else None
     return Construction(
         outline=_outline(_table(raw, "outline"), scale),
         layers=layers,
-        parts=[_part(one, scale) for one in _tables(raw, "part")],
+        parts=[_part(part, scale) for part in _tables(raw, "part")],
         cords=cords,
-        compounds={name: _compound(name, one) for name, one in _table(raw, "compound").items()},
+        compounds={
+            name: _compound(name, compound) for name, compound in _table(raw, "compound").items()
+        },
         tread=scale * _number(raw, "tread", "the file"),
         held=held,
     )
@@ -102,7 +104,7 @@ def _construction(raw: dict[str, Any]) -> Construction:
 
 def _twice(named: Sequence[Layer | CordLine]) -> str | None:
     """The first name that two of them have; None if each has its own."""
-    names = [one.name for one in named]
+    names = [name.name for name in named]
     return next((name for name in names if names.count(name) > 1), None)
 
 
@@ -197,12 +199,12 @@ def _table(raw: dict[str, Any], key: str) -> dict[str, Any]:
 
 
 def _tables(raw: dict[str, Any], key: str, least: int = 0) -> list[dict[str, Any]]:
-    found = raw.get(key, [])
-    if not isinstance(found, list) or not all(isinstance(one, dict) for one in found):
+    value = raw.get(key, [])
+    if not isinstance(value, list) or not all(isinstance(table, dict) for table in value):
         raise InputError(f"{key} must be written [[{key}]], one for each")
-    if len(found) < least:
+    if len(value) < least:
         raise InputError(f"a [[{key}]] is needed")
-    return found
+    return value
 
 
 def _number(table: dict[str, Any], key: str, where: str, default: float | None = None) -> float:
@@ -224,9 +226,9 @@ def _text(table: dict[str, Any], key: str, where: str) -> str:
 
 def _pairs(value: Any, where: str) -> np.ndarray:
     try:
-        found = np.array(value, dtype=float)
+        pairs = np.array(value, dtype=float)
     except (TypeError, ValueError):
-        found = np.zeros(0)
-    if found.ndim != 2 or found.shape[1] != 2 or not np.isfinite(found).all():
+        pairs = np.zeros(0)
+    if pairs.ndim != 2 or pairs.shape[1] != 2 or not np.isfinite(pairs).all():
         raise InputError(f"{where} must be pairs of numbers, [[a, b], …]")
-    return found
+    return pairs

@@ -16,13 +16,13 @@ def _nothing(number: int, entry: Entry) -> None: ...
 class Journal:
     """This process's own results of the steps of a computation, in order.
 
-    `found`: those of an earlier attempt, which need not be repeated; new ones are passed to
+    `entries`: those of an earlier attempt, which need not be repeated; new ones are passed to
     `keep(number, entry)`."""
 
     def __init__(
-        self, found: Sequence[Entry] = (), keep: Callable[[int, Entry], None] = _nothing
+        self, entries: Sequence[Entry] = (), keep: Callable[[int, Entry], None] = _nothing
     ) -> None:
-        self.found = list(found)
+        self.found = list(entries)
         self._keep, self._next = keep, 0
 
     def agreed(self, comm: MPI.Comm) -> int:

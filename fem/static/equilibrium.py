@@ -167,8 +167,8 @@ class SolutionHistory:
         self._problems: list[weakref.ref[Equilibrium]] = []  # a past one may be freed
         self._predicted: list[bool] = []
         self._open: dict[str, np.ndarray] | None = None  # of the solution being computed
-        found = journal.found if journal else []
-        last = {int(entry["problem"]): k for k, entry in enumerate(found)}
+        entries = journal.found if journal else []
+        last = {int(entry["problem"]): k for k, entry in enumerate(entries)}
         self._again = set(last.values())
 
     def retrace(self, problem: Equilibrium) -> SolveOutcome | None:
@@ -180,7 +180,7 @@ class SolutionHistory:
             return None
         number, comm = self._number(problem), problem.body.comm
         place = self._journal.done
-        entry = self._journal.next(comm, lambda one: _same_mesh(problem, one))
+        entry = self._journal.next(comm, lambda entry: _same_mesh(problem, entry))
         predicted, self._predicted = np.array(self._predicted, dtype=bool), []
         if entry is None:
             about = {"problem": np.array(number), "mesh": _mesh(problem), "predicted": predicted}
@@ -209,8 +209,8 @@ class SolutionHistory:
             self._predicted.append(success)
 
     def _number(self, problem: Equilibrium) -> int:
-        for k, one in enumerate(self._problems):
-            if one() is problem:
+        for k, other in enumerate(self._problems):
+            if other() is problem:
                 return k
         self._problems.append(weakref.ref(problem))
         return len(self._problems) - 1
@@ -226,9 +226,11 @@ def _same_mesh(problem: Equilibrium, entry: Entry) -> bool:
 
 
 def _state(problem: Equilibrium, when: str) -> dict[str, np.ndarray]:
-    kept = {name: np.array(one) for name, one in zip(_ROAD, problem.road.snapshot(), strict=True)}
-    kept["field"] = problem.body.u.x.array.copy()
-    return {f"{when}/{name}": value for name, value in kept.items()}
+    state = {
+        name: np.array(values) for name, values in zip(_ROAD, problem.road.snapshot(), strict=True)
+    }
+    state["field"] = problem.body.u.x.array.copy()
+    return {f"{when}/{name}": value for name, value in state.items()}
 
 
 def _put(problem: Equilibrium, entry: Entry, when: str) -> None:
@@ -431,7 +433,7 @@ class Equilibrium(Forces):
         tangent settles the set (LinearContact) and is reused while each step leaves at most a fifth
         of the error, or what a new one would leave (`convergence_rate`)."""
         field = self.body.u.x
-        kept, self._contact = (field.array.copy(), self.road.snapshot()), None
+        before, self._contact = (field.array.copy(), self.road.snapshot()), None
         self.road.height = -np.inf if road_height is None else road_height
         self._before.x.array[:] = field.array
         error, tangents = 0.0, 0
@@ -450,8 +452,8 @@ class Equilibrium(Forces):
             reason = reason or self._move(gap_closure, load)
             if reason:
                 break
-        field.array[:] = kept[0]
-        self.road.restore(kept[1])
+        field.array[:] = before[0]
+        self.road.restore(before[1])
         return self.solved(SolveOutcome(False, tangents, error, reason))
 
     def solved(self, step: SolveOutcome) -> SolveOutcome:
@@ -515,19 +517,19 @@ class Equilibrium(Forces):
             self._assemble_tangent()
             if (along := self._in_its_coordinates) is not None:
                 along.tangent(self.matrix)
-        taken = self._system.take(self.matrix, self.road.held, *self.road.steps())
-        self._contact = self._make_contact() if taken else None
-        return taken
+        factorised = self._system.take(self.matrix, self.road.held, *self.road.steps())
+        self._contact = self._make_contact() if factorised else None
+        return factorised
 
     def _move(
         self, gap_closure: PrescribedMotion | None, load: float | None, rise: float | None = None
     ) -> str:
         """One linearised step; the road may `rise` (m). Reason for failure, or "". Collective."""
-        given = self.road.rows(self._work.array_r.copy()), gap_closure, load
+        rows = self.road.rows(self._work.array_r.copy()), gap_closure, load
         if self._contact is None or self.road.height == -np.inf:
-            step = held_step(self.body.comm, self._system, self.road, given)
+            step = held_step(self.body.comm, self._system, self.road, rows)
         else:
-            step = self._contact.step(*given, rise)
+            step = self._contact.step(*rows, rise)
         if step is None:
             return "the road meets no resistance"
         (change, reaction), field = step, self.body.u.x

@@ -291,8 +291,8 @@ class TreadSurface:
             for line, index in ((lattice.ring_corners, around), (lattice.arc_corners, along))
         ]
         while max((box[:, 1] - box[:, 0]).max() for box in corners) > _CLOSE_ANGLE:
-            corners, found = self._closed_in(*corners)
-        return float(found.min())
+            corners, inside = self._closed_in(*corners)
+        return float(inside.min())
 
     def _closed_in(self, ring: np.ndarray, arc: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
         """Boxes (k, 2) a third as wide around the lowest of 7 x 7 points, and heights (k,)."""
@@ -316,23 +316,23 @@ class TreadSurface:
         key = x.tobytes() + y.tobytes()
         if key not in self._located:
             self._located[key] = self._found(x, y)
-        ring, arc, found = self._located[key]
-        return ring.copy(), arc.copy(), found.copy()
+        ring, arc, inside = self._located[key]
+        return ring.copy(), arc.copy(), inside.copy()
 
     def _found(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         target = np.stack([x, y], axis=-1)
         place = self._guess(target)
-        found = np.isfinite(place).all(axis=1)
-        place[~found] = 0.0
+        inside = np.isfinite(place).all(axis=1)
+        place[~inside] = 0.0
         for _ in range(_NEWTON):
             defect = self.at(*place.T)[:, :2] - target
-            open_ = found & (np.abs(defect).max(axis=1) > _CLOSE)
+            open_ = inside & (np.abs(defect).max(axis=1) > _CLOSE)
             if not open_.any():
                 break
             place[open_] -= self._newton_step(place[open_], defect[open_])
             place[:, 1] = np.clip(place[:, 1], *self._across)
-        found &= np.abs(self.at(*place.T)[:, :2] - target).max(axis=1) <= 1e3 * _CLOSE
-        return place[:, 0], place[:, 1], found
+        inside &= np.abs(self.at(*place.T)[:, :2] - target).max(axis=1) <= 1e3 * _CLOSE
+        return place[:, 0], place[:, 1], inside
 
     def _newton_step(self, place: np.ndarray, defect: np.ndarray) -> np.ndarray:
         ring, arc = place.T

@@ -61,10 +61,10 @@ class RubbingSystem:
         """Factorise; `matrix` must not be used afterwards."""
         with self._timing("road"):
             system = self._joined(matrix)
-        found = self._inner.take(system, held, gap_closure, road_rise)
+        step = self._inner.take(system, held, gap_closure, road_rise)
         if system is not matrix:
             system.destroy()
-        return found
+        return step
 
     def solve(self, right: Array, moved: PrescribedMotion | None = None) -> tuple[Array, Array]:
         """du (m) of the owned dofs, forces (N) at held ones; `right` already includes L."""
@@ -96,13 +96,13 @@ class RubbingSystem:
 
     def _rows_and_springs(self, matrix: PETSc.Mat) -> tuple[PETSc.Mat, PETSc.Mat]:
         first = matrix.getOwnershipRange()[0]
-        given = self._road.couplings()
-        unknowns, springs, ahead = given.unknowns, given.springs, given.ahead
+        couplings = self._road.couplings()
+        unknowns, springs, ahead = couplings.unknowns, couplings.springs, couplings.ahead
         rows = _sparse(
             matrix,
-            np.broadcast_to(unknowns[:, :, None], given.shares.shape),
-            np.broadcast_to(given.sources[:, None, :] + first, given.shares.shape),
-            given.shares,
+            np.broadcast_to(unknowns[:, :, None], couplings.shares.shape),
+            np.broadcast_to(couplings.sources[:, None, :] + first, couplings.shares.shape),
+            couplings.shares,
         )
         row = np.broadcast_to(unknowns[:, :, None], springs.shape)
         own = np.broadcast_to(unknowns[:, None, :] + first, springs.shape)
@@ -112,7 +112,7 @@ class RubbingSystem:
             matrix,
             np.concatenate([row.ravel(), row[led]]),
             np.concatenate([own.ravel(), far[led]]),
-            np.concatenate([given.own.ravel(), -springs[led]]),
+            np.concatenate([couplings.own.ravel(), -springs[led]]),
         )
 
     def _along(self, matrix: PETSc.Mat) -> PETSc.Mat | None:
@@ -169,7 +169,7 @@ class RubbingEquilibrium(Equilibrium):
         The stick and slip sets are kept, and the state is restored. Raises ConvergenceError for a
         singular tangent. Collective."""
         field = self.body.u.x
-        kept, self._before.x.array[:] = (field.array.copy(), self.road.snapshot()), field.array
+        before, self._before.x.array[:] = (field.array.copy(), self.road.snapshot()), field.array
         self._residual()
         if not self._take_tangent() or self._move(self._system.gap_closure, load):
             raise ConvergenceError("static: the tangent of a state with friction is singular")
@@ -177,8 +177,8 @@ class RubbingEquilibrium(Equilibrium):
             self._residual()
             self._move(None, load)
         pulled = self.body.comm.allreduce(self.road.pull.sum(axis=0))
-        field.array[:] = kept[0]
-        self.road.restore(kept[1])
+        field.array[:] = before[0]
+        self.road.restore(before[1])
         return pulled
 
 
@@ -429,16 +429,16 @@ def _march(
 def _free(drag: Callable[[float], float], radius: float, load: float) -> float:
     """Travel per radian (m) at which `drag` (N) vanishes."""
     near = radius * (1 - _NEAR)
-    found = root_scalar(
+    root = root_scalar(
         drag, method="secant", x0=radius, x1=near, xtol=_CLOSE * radius, maxiter=_MOST
     )
-    left = drag(found.root)
-    if not (found.converged and abs(left) < 1e-4 * load):
+    left = drag(root.root)
+    if not (root.converged and abs(left) < 1e-4 * load):
         raise ConvergenceError(
-            f"static: no free rolling with friction: at a travel of {found.root:.6g} m per radian {left:.3g} N of drag remain. "
+            f"static: no free rolling with friction: at a travel of {root.root:.6g} m per radian {left:.3g} N of drag remain. "
             "Give rotation.rolling_radius (m), or a smaller static.friction"
         )
-    return float(found.root)
+    return float(root.root)
 
 
 def _checked(rubbing: LoadStepper, step: SolveOutcome) -> None:

@@ -69,15 +69,15 @@ def locate(
     _, candidates = cKDTree(nodes[cells].mean(axis=1)).query(points, k=near)
     candidates = candidates.reshape(len(points), near)
     best = np.full(len(points), np.inf)
-    found = np.zeros((len(points), 3))
+    places = np.zeros((len(points), 3))
     for cell in candidates.T:
         place = _inverse(nodes[cells[cell]], order, points)
         # Any cell that contains the point will do; otherwise the nearest.
         excess = np.abs(place - 0.5).max(axis=1)
         better = excess < best - 1e-9
         best[better] = excess[better]
-        found[better] = np.column_stack([cell, place])[better]
-    return found[:, 0].astype(int), found[:, 1], found[:, 2]
+        places[better] = np.column_stack([cell, place])[better]
+    return places[:, 0].astype(int), places[:, 1], places[:, 2]
 
 
 def _inverse(corners: np.ndarray, order: int, points: np.ndarray) -> np.ndarray:
@@ -172,7 +172,7 @@ def _strips(section: SectionMesh, starts: np.ndarray) -> np.ndarray:
             cut[cell, _along(side)] = True
             opposite = cell, side ^ 1
             both = across[tuple(sorted(sides[opposite]))]
-            cell, side = next((found for found in both if found != opposite), opposite)
+            cell, side = next((strip for strip in both if strip != opposite), opposite)
     return cut
 
 
@@ -201,7 +201,7 @@ class _Children:
 
     def edges(self, edges: np.ndarray, turned: np.ndarray | None = None) -> np.ndarray:
         """The children's edges (k', 2) of edges (k, 2), reversed for sides that are `turned`."""
-        found = []
+        pairs = []
         for number, (cell, side) in enumerate(edges):
             across, step = self.parts[cell], _along(side)
             place = np.zeros((across[step], 2), int)
@@ -210,8 +210,8 @@ class _Children:
             if turned is not None and turned[number]:
                 place = place[::-1]
             child = self.first[cell] + place[:, 0] * across[1] + place[:, 1]
-            found.append(np.stack([child, np.full(len(child), side)], axis=1))
-        return np.concatenate(found) if found else edges
+            pairs.append(np.stack([child, np.full(len(child), side)], axis=1))
+        return np.concatenate(pairs) if pairs else edges
 
     def chain(self, section: SectionMesh, edges: np.ndarray) -> np.ndarray:
         """The children's edges of an ordered chain, in its order."""
@@ -314,15 +314,15 @@ class Balance:
         step = balance_near(other, self.height, self.load, allowed)
         if not step.converged:
             raise ConvergenceError(f"static: elements half as long do not converge ({step.reason})")
-        found = _nodes(other, lattice)
+        index = _nodes(other, lattice)
         return Balance(
             ring=ring,
             lattice=lattice,
             rolling=self.rolling,
             height=self.height,
             load=other.load(),
-            displacement=found[0],
-            force=found[1],
+            displacement=index[0],
+            force=index[1],
             solved=other,
         )
 
@@ -429,16 +429,16 @@ def load_error(loader: LoadStepper, rolling: Rolling) -> LoadError | str:
     """
     if not loader.load():
         return "nothing touches the road"
-    given = Balance.of(loader, rolling)
+    balance = Balance.of(loader, rolling)
     try:
-        finer = at_finer_footprint(given)
-        bulk = _bulk(given)
+        finer = at_finer_footprint(balance)
+        bulk = _bulk(balance)
     except ConvergenceError as error:
         return f"on the companion, {error}"
-    edge = 1 - finer.load / given.load
+    edge = 1 - finer.load / balance.load
     both = edge if bulk is None else edge + bulk
     return LoadError(
-        load=given.load * (1 - both),
+        load=balance.load * (1 - both),
         relative=abs(both),
         footprint=edge,
         bulk=bulk,
@@ -447,20 +447,20 @@ def load_error(loader: LoadStepper, rolling: Rolling) -> LoadError | str:
     )
 
 
-def at_finer_footprint(given: Balance) -> Balance:
+def at_finer_footprint(balance: Balance) -> Balance:
     """The same tire and road with the elements at the footprint split in two. Collective."""
-    lattice, force = given.lattice, given.face_force
+    lattice, force = balance.lattice, balance.face_force
     around = _touched(np.asarray(force.any(axis=1)), lattice.ring_corners, lattice, closed=True)
     along = _touched(np.asarray(force.any(axis=0)), lattice.arc_corners, lattice, closed=False)
-    return given.balanced_on(split_ring(given.ring, around, along), ENOUGH * given.load)
+    return balance.balanced_on(split_ring(balance.ring, around, along), ENOUGH * balance.load)
 
 
-def _bulk(given: Balance) -> float | None:
+def _bulk(balance: Balance) -> float | None:
     """Relative excess of the load because the elements are too stiff. Collective.
 
     None if the state strains the cords of the other-order elements too much for a single step to be
     meaningful."""
-    ring, load = given.ring, given.load
+    ring, load = balance.ring, balance.load
     order = ring.order + 1 if ring.order < HIGHEST else ring.order - 1
     section, corners = ring.section.of_order(order), ring.ring_corners
     half = ring.coarser() if order > ring.order else None
@@ -469,20 +469,20 @@ def _bulk(given: Balance) -> float | None:
         # (50 x 16, order 2: 0.741 % of the load with all elements, 0.747 % with half).
         corners = half.ring_corners
     other = replace(ring, ring_corners=corners, section=section)
-    place, spread = _spot(given)
-    weights, others = (probe.spot(field_lattice(one), *place, spread) for one in (ring, other))
-    near = given.near(other)
+    place, spread = _spot(balance)
+    weights, others = (probe.spot(field_lattice(mesh), *place, spread) for mesh in (ring, other))
+    near = balance.near(other)
     if cords_strained(near, load):
         return None
-    sinks, compliance = given.near(ring).uniform_traction_step(weights, load)
+    sinks, compliance = balance.near(ring).uniform_traction_step(weights, load)
     further = near.uniform_traction_step(others, load)[0]
     share = REMAINS * (further - sinks) / compliance / load
     return share if order > ring.order else -CUBIC * share
 
 
-def _spot(given: Balance) -> tuple[tuple[float, float], tuple[float, float]]:
+def _spot(balance: Balance) -> tuple[tuple[float, float], tuple[float, float]]:
     """Centre and half widths of the contact (rad, around and along), at least one element each."""
-    lattice, force = given.lattice, given.face_force
+    lattice, force = balance.lattice, balance.face_force
     around = (lattice.ring + np.pi) % (2 * np.pi) - np.pi
     places, spreads = [], []
     for angle, share, corners in (

@@ -255,12 +255,12 @@ class LoadPath:
 
         def attempt(deflection: float) -> SolveOutcome:
             height = self._loader.touch + deflection
-            kept = field.array.copy(), road.snapshot()
+            before = field.array.copy(), road.snapshot()
             self._equilibrium.predict(height)
             step = self._equilibrium.solve(height, allowed=allowed)
             if not step.converged:  # restore the state before the prediction
-                field.array[:] = kept[0]
-                road.restore(kept[1])
+                field.array[:] = before[0]
+                road.restore(before[1])
             return self._learnt(step, deflection)
 
         def let_go(deflection: float) -> SolveOutcome:
@@ -477,10 +477,10 @@ class LoadStepper:
         except ConvergenceError:
             self._taken_over(half)
             raise
-        found = self._taken_over(half)
-        if not found:
+        half_way = self._taken_over(half)
+        if not half_way:
             self.body.u.x.array[:] = start
-        return found
+        return half_way
 
     def carry(self, load: float) -> float:
         """Raise the road until it carries `load` (N) by bracketed secants; the deflection (m).

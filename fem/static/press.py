@@ -73,7 +73,7 @@ class InitialState:
         old state. Collective."""
         assert self.height is not None, "there is no road"
         equilibrium, field = loader.equilibrium, loader.body.u.x.array
-        kept = field.copy(), equilibrium.road.snapshot()
+        before = field.copy(), equilibrium.road.snapshot()
         field[:] = self.pressed
         equilibrium.road.take(self.force, self.height)
         step = equilibrium.solve(self.height if rise is None else loader.touch + rise, load)
@@ -81,8 +81,8 @@ class InitialState:
         if step.converged:
             loader.tell("deflection", loader.deflection, "m", step)
         else:
-            field[:] = kept[0]
-            equilibrium.road.restore(kept[1])
+            field[:] = before[0]
+            equilibrium.road.restore(before[1])
         return step.converged
 
 
@@ -99,11 +99,11 @@ def place(
     Starts from the state `near`, if there is one and Newton's method converges from it. Returns the
     loader of the state found, which is another one with friction. Collective.
     """
-    given = {"load": load, "deflection": deflection, "road_height": road_height}
-    named = [name for name, value in given.items() if value is not None]
+    placed = {"load": load, "deflection": deflection, "road_height": road_height}
+    named = [name for name, value in placed.items() if value is not None]
     if len(named) > 1:
         raise InputError(f"{' and '.join(named)} each set the height of the road: give one of them")
-    for name, value in given.items():
+    for name, value in placed.items():
         if value is not None and not math.isfinite(value):
             raise InputError(f"{name} = {value:g} must be finite")
     if not named:

@@ -60,7 +60,7 @@ def _balance_with_springs(
     equilibrium: Equilibrium, road_height: float, load: float, allowed: float
 ) -> SolveOutcome:
     body, road, field = equilibrium.body, equilibrium.road, equilibrium.body.u.x
-    kept = field.array.copy(), road.snapshot(), equilibrium.road_height
+    before = field.array.copy(), road.snapshot(), equilibrium.road_height
     typical = equilibrium.force_scale / body.ring.thickness
     springs, tangents = RestoringSprings(body, _FIRST * typical), 0
     share = _FIRST
@@ -80,8 +80,8 @@ def _balance_with_springs(
         springs.here()
         share *= factor
         springs.stiffness *= factor
-    field.array[:], equilibrium.road_height = kept[0], kept[2]
-    road.restore(kept[1])
+    field.array[:], equilibrium.road_height = before[0], before[2]
+    road.restore(before[1])
     return replace(step, iterations=tangents)
 
 
@@ -104,7 +104,7 @@ def pseudo_transient(
     solved for without it.
     """
     field, road = equilibrium.body.u.x, equilibrium.road
-    kept = field.array.copy(), road.snapshot(), equilibrium.road_height
+    before = field.array.copy(), road.snapshot(), equilibrium.road_height
     typical = equilibrium.force_scale / equilibrium.body.ring.thickness
     equilibrium.springs = springs = RestoringSprings(equilibrium.body, _FIRST_DRAG * typical)
     share, tangents = 1.0, 0
@@ -119,8 +119,8 @@ def pseudo_transient(
         springs.stiffness *= factor
         equilibrium.springs = springs if share > _LAST else None
     equilibrium.springs = None
-    field.array[:], equilibrium.road_height = kept[0], kept[2]
-    road.restore(kept[1])
+    field.array[:], equilibrium.road_height = before[0], before[2]
+    road.restore(before[1])
     return SolveOutcome(
         False, tangents, step.residual, "pseudo-transient continuation does not converge either"
     )

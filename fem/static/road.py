@@ -90,9 +90,9 @@ class RoadShape:
     def frames(self, x: Array, y: Array) -> Array:
         """Unit vectors (n, 3, 3) in the wheel's axes: along the road, to its left, normal to it."""
         along, across = self.slopes(x, y)
-        one, nothing = np.ones(len(along)), np.zeros(len(along))
-        left = _unit(np.stack([nothing, one, across], axis=-1))
-        normal = _unit(np.stack([-along, -across, one], axis=-1))
+        unit, nothing = np.ones(len(along)), np.zeros(len(along))
+        left = _unit(np.stack([nothing, unit, across], axis=-1))
+        normal = _unit(np.stack([-along, -across, unit], axis=-1))
         forward = _unit(np.asarray(np.cross(left, normal), dtype=np.float64))
         return np.stack([forward, left, normal], axis=1)
 
@@ -203,10 +203,10 @@ class RoadContact:
 
     def choose(self) -> bool:
         """Update the active set; True if it changed on any process. Collective."""
-        wanted = self.pressing() > self.stiffness * self.gap()
-        changed = bool((wanted != self.active).any())
-        self.active = wanted
-        self.force[~wanted] = 0.0
+        pressing = self.pressing() > self.stiffness * self.gap()
+        changed = bool((pressing != self.active).any())
+        self.active = pressing
+        self.force[~pressing] = 0.0
         return self._body.comm.allreduce(changed, op=MPI.LOR)
 
     def project(self) -> None:

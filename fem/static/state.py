@@ -50,15 +50,15 @@ class CordForce:
 
 def cord_forces(body: Body) -> dict[str, CordForce]:
     """Cord forces by ply at the present displacement, on every process. Collective."""
-    found = {}
+    forces = {}
     for number, cord in enumerate(body.plies.cords):
         chain = body.ring.section.plies[cord.name]
         values = np.zeros((2, *_grid(body, chain)))
         for sheet in body.plies.sheets:
             _read(body, sheet, number, chain, values)
         body.comm.Allreduce(MPI.IN_PLACE, values)
-        found[cord.name] = CordForce(_points(body, chain), values[0], values[1])
-    return found
+        forces[cord.name] = CordForce(_points(body, chain), values[0], values[1])
+    return forces
 
 
 def _line(body: Body) -> np.ndarray:

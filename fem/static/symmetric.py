@@ -106,8 +106,8 @@ def _turned(body: Body) -> sparse.csr_matrix:
     number = np.cumsum(~held) - 1
     own = np.flatnonzero(~held[node])
     sine, cosine = (f(body.lattice.ring[angle[own]]) for f in (np.sin, np.cos))
-    one, none = np.ones(len(own)), np.zeros(len(own))
-    axes = np.array([[cosine, none, sine], [none, one, none], [sine, none, -cosine]])
+    unit, none = np.ones(len(own)), np.zeros(len(own))
+    axes = np.array([[cosine, none, sine], [none, unit, none], [sine, none, -cosine]])
     rows = np.broadcast_to((3 * own + np.arange(3)[:, None])[:, None], axes.shape)
     columns = np.broadcast_to((3 * number[node[own]] + np.arange(3)[:, None])[None], axes.shape)
     size = 3 * body.nodes, 3 * int((~held).sum())
@@ -204,11 +204,11 @@ def _global_numbers(body: Body) -> np.ndarray:
     return number
 
 
-def _found(ids: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Positions of `wanted` entries in `ids`, and their indices in `wanted`."""
-    order = np.argsort(wanted)
-    own = np.flatnonzero(np.isin(ids, wanted))
-    return own, order[np.searchsorted(wanted, ids[own], sorter=order)]
+def _found(ids: np.ndarray, selection: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Positions in `ids` of entries of `selection`, and their indices in `selection`."""
+    order = np.argsort(selection)
+    own = np.flatnonzero(np.isin(ids, selection))
+    return own, order[np.searchsorted(selection, ids[own], sorter=order)]
 
 
 class FoldedSystem:
@@ -282,12 +282,12 @@ class _Folding:
         new = np.append(True, np.diff(key[order]) > 0)
         self._place = np.empty(len(key), np.intp)
         self._place[order] = np.cumsum(new) - 1
-        kept = key[order][new]
-        self._columns = (kept % size).astype(PETSc.IntType)
-        counts = np.bincount(kept // size, minlength=last - first)
+        keys = key[order][new]
+        self._columns = (keys % size).astype(PETSc.IntType)
+        counts = np.bincount(keys // size, minlength=last - first)
         self._begin = np.append(0, np.cumsum(counts)).astype(PETSc.IntType)
         self._ones = np.ones(len(alone))
-        csr = self._begin, self._columns, np.zeros(len(kept))
+        csr = self._begin, self._columns, np.zeros(len(keys))
         self.matrix = PETSc.Mat().createAIJ(matrix.getSizes(), csr=csr, comm=comm)
 
     def fill(self, matrix: PETSc.Mat) -> None:

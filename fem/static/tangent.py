@@ -204,10 +204,10 @@ class ConstrainedSystem:
         held = np.isin(dofs, self._held)
         x.getDenseArray()[dofs[held], numbers[held]] = 1.0
         forces = self._reaction.matMult(x)
-        found = x.getDenseArray().copy(), forces.getDenseArray().copy()
+        columns = x.getDenseArray().copy(), forces.getDenseArray().copy()
         for part in (right, x, forces):
             part.destroy()
-        return found
+        return columns
 
     def _fill(self, right: PETSc.Mat, numbers: np.ndarray, dofs: np.ndarray) -> None:
         """Unit forces at free dofs; for held ones the forces of a unit motion on the free ones."""
@@ -345,33 +345,33 @@ class LinearContact:
         if lift is not None and not lift.force.sum() > 0:
             return None
         held = self._gathered(road.active)
-        found = self._solved(free, lift, held, load)
+        solved_step = self._solved(free, lift, held, load)
         if (
             gap_closure is not None or given is not None
         ):  # near equilibrium the sets of a reused tangent are unreliable
-            held, found = self._settled(
-                held, found, lambda held: self._solved(free, lift, held, load)
+            held, solved_step = self._settled(
+                held, solved_step, lambda held: self._solved(free, lift, held, load)
             )
-        z, rise = found.parts
+        z, rise = solved_step.parts
         self.changed = bool((held != self._base).any())
-        motion = free.motion + self._columns.motion[:, self._number[found.nodes]] @ z
+        motion = free.motion + self._columns.motion[:, self._number[solved_step.nodes]] @ z
         road.height += rise + (given or 0.0)
         road.active, road.force = held[self._own].copy(), np.zeros(len(road.dofs))
         motion = motion if lift is None else motion + rise * lift.motion
-        return self._system.spread(motion), found.force[self._own][road.active]
+        return self._system.spread(motion), solved_step.force[self._own][road.active]
 
     def _settled(
-        self, held: Array, found: _Found, solved: Callable[[Array], _Found]
+        self, held: Array, solution: _Found, solved: Callable[[Array], _Found]
     ) -> tuple[Array, _Found]:
         """The first held set that no longer changes, with its solution; else the given ones."""
-        first = held, found
+        first = held, solution
         for _ in range(_ROUNDS):
-            if (found.wanted == held).all():
-                return held, found
-            if np.count_nonzero(found.wanted ^ self._base) > _MOST:
+            if (solution.wanted == held).all():
+                return held, solution
+            if np.count_nonzero(solution.wanted ^ self._base) > _MOST:
                 break
-            held = found.wanted
-            found = solved(held)
+            held = solution.wanted
+            solution = solved(held)
         return first
 
     def _solved(

@@ -22,19 +22,19 @@ from tireroad.fem.tire.plies import Plies, laid_on
 
 
 class Gather:
-    """Gathers values at chosen lattice nodes on every process, in the order of `wanted`.
+    """Gathers values at chosen lattice nodes on every process, in the order of `ids`.
 
-    `owned`: ids of this process's owned nodes; `wanted`: ids to gather, the same on all
+    `owned`: ids of this process's owned nodes; `ids`: those to gather, the same on all
     processes.
     """
 
-    def __init__(self, comm: MPI.Comm, owned: np.ndarray, wanted: np.ndarray) -> None:
+    def __init__(self, comm: MPI.Comm, owned: np.ndarray, ids: np.ndarray) -> None:
         self.comm = comm
-        self.ids = wanted
-        self.local = np.flatnonzero(np.isin(owned, wanted))  # owned blocks that are wanted
-        order = np.argsort(wanted, kind="stable")
-        # Their indices in `wanted`.
-        self.place = order[np.searchsorted(wanted, owned[self.local], sorter=order)]
+        self.ids = ids
+        self.local = np.flatnonzero(np.isin(owned, ids))  # owned blocks that are wanted
+        order = np.argsort(ids, kind="stable")
+        # Their indices in `ids`.
+        self.place = order[np.searchsorted(ids, owned[self.local], sorter=order)]
 
     def __call__(self, owned: np.ndarray) -> np.ndarray:
         """Values (nodes, ...) on every process from those at the owned nodes (owned, ...).

@@ -91,7 +91,7 @@ class MaterialLaw(Parameters):
         return replace(
             self,
             **{
-                name: tuple(factor * one for one in value)
+                name: tuple(factor * number for number in value)
                 if isinstance(value, tuple)
                 else factor * value
                 for name, value in values.items()
@@ -212,7 +212,7 @@ def measured(
     ratio = lost / stored
     eta = float(np.interp(there, x, ratio))
     storage_over, loss_over = (
-        tuple(one.tolist()) for one in (stored / modulus, ratio / (eta or 1))
+        tuple(number.tolist()) for number in (stored / modulus, ratio / (eta or 1))
     )
     return modulus, eta, Spectrum(tuple(f.tolist()), storage_over, loss_over)
 
@@ -329,15 +329,15 @@ def kinds(compounds: Sequence[tuple[Spectrum, float, float]]) -> dict[Kind, list
     same at all frequencies are left out. Those whose moduli are constant are one kind with a loss factor
     of 1 and the loss modulus in place of the storage modulus: nothing else is asked of them.
     """
-    found: dict[Kind, list[float]] = {}
+    shares: dict[Kind, list[float]] = {}
     for number, (spectrum, loss, dynamic) in enumerate(compounds):
         constant = spectrum == CONSTANT
         if constant and not loss:
             continue
         kind = Kind(CONSTANT, 1.0) if constant else Kind(spectrum, loss, 1 / dynamic)
-        share = found.setdefault(kind, [0.0] * len(compounds))
+        share = shares.setdefault(kind, [0.0] * len(compounds))
         share[number] = dynamic * (loss if constant else 1.0)
-    return found
+    return shares
 
 
 def own_moduli(

@@ -165,16 +165,16 @@ def _tag(mesh: dmesh.Mesh, ring: Ring, section_cell: np.ndarray) -> dmesh.MeshTa
     Cells are numbered alike on all processes, so each process's own cells suffice.
     """
     section, facet_of = ring.section, compat.cell_facets(mesh)
-    found: dict[int, int] = {}
+    tags: dict[int, int] = {}
     # An edge in two sets belongs to the later one: a face held by the wheel is no free face.
     for tag, edges in ((INNER, section.inner), (TREAD, section.tread), (RIM, section.rim)):
         for side in range(len(mesh2d.SIDES)):
             marked = np.zeros(len(section.cells), bool)
             marked[edges[edges[:, 1] == side, 0]] = True
             facets = facet_of[marked[section_cell], _HEX_FACE[1 + side // 2, side % 2]]
-            found |= dict.fromkeys(facets.tolist(), tag)
-    entities = np.array(sorted(found), dtype=int)
-    return compat.meshtags(mesh, 2, entities, np.array([found[e] for e in entities.tolist()], int))
+            tags |= dict.fromkeys(facets.tolist(), tag)
+    entities = np.array(sorted(tags), dtype=int)
+    return compat.meshtags(mesh, 2, entities, np.array([tags[e] for e in entities.tolist()], int))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -230,7 +230,7 @@ class Wall:
     def _coefficient(self, name: str, law: type[MaterialLaw]) -> fem.Function:
         """A coefficient of the law by cell; 0 where the material follows another law."""
         own = [m.law for m in self._materials]
-        return self._by_cell([getattr(one, name) if type(one) is law else 0.0 for one in own])
+        return self._by_cell([getattr(value, name) if type(value) is law else 0.0 for value in own])
 
     def _by_cell(self, values: Sequence[float]) -> fem.Function:
         field = fem.Function(self._space)

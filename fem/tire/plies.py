@@ -126,15 +126,15 @@ class Sheet:
         # Without a ply: zero stiffness and mass along a unit vector.
         values = dict.fromkeys(("stiffness", "mass", "slack", "sine"), 0.0) | {"cosine": 1.0}
         by_cell = {name: np.full(count, value) for name, value in values.items()}
-        for one in laid:
-            given, cells = cords[one.number], one.cells
-            woven = given.at(np.ones(len(cells)) if one.radius is None else one.radius)
-            self.owner[cells] = one.number
-            by_cell["slack"][cells] = given.compression
+        for layer in laid:
+            line, cells = cords[layer.number], layer.cells
+            woven = line.at(np.ones(len(cells)) if layer.radius is None else layer.radius)
+            self.owner[cells] = layer.number
+            by_cell["slack"][cells] = line.compression
             for name, part in vars(woven).items():
                 by_cell[name][cells] = part
             # e_arc is e_circ x n or its opposite, n being the cell's outward normal.
-            by_cell["sine"][cells] *= -1.0 if one.reverse else 1.0
+            by_cell["sine"][cells] *= -1.0 if layer.reverse else 1.0
         space = compat.cell_space(face.mesh)
         fields = {name: fem.Function(space) for name in by_cell}
         for name, field in fields.items():
@@ -208,16 +208,16 @@ def _sheets(mesh: Mesh, order: int, cords: Sequence[Cords], laid: Sequence[Laid]
     """The fewest sheets for all plies: one per cell face, more where plies coincide. Collective."""
     cells = mesh.topology.index_map(3)
     count = cells.size_local + cells.num_ghosts
-    taken: dict[tuple[int, int, int], np.ndarray] = {}
+    sheets: dict[tuple[int, int, int], np.ndarray] = {}
     parts: dict[tuple[int, int, int], list[Laid]] = {}
-    for one in laid:
+    for layer in laid:
         for slot in itertools.count():
-            key = one.axis, one.side, slot
-            used = taken.setdefault(key, np.zeros(count, bool))
-            if not mesh.comm.allreduce(bool(used[one.cells].any()), op=MPI.LOR):
+            key = layer.axis, layer.side, slot
+            used = sheets.setdefault(key, np.zeros(count, bool))
+            if not mesh.comm.allreduce(bool(used[layer.cells].any()), op=MPI.LOR):
                 break
-        used[one.cells] = True
-        parts.setdefault(key, []).append(one)
+        used[layer.cells] = True
+        parts.setdefault(key, []).append(layer)
     faces = {key[:2]: Face(mesh, *key[:2], order) for key in parts}
     return [Sheet(faces[key[:2]], count, parts[key], cords) for key in sorted(parts)]
 

@@ -43,14 +43,14 @@ class FullModes:
     left_residual: Array
     condition: float
 
-    def among(self, wanted: Array) -> FullModes:
-        """The states where `wanted` (q,) is true."""
+    def among(self, which: Array) -> FullModes:
+        """The states at `which` (q,), a mask."""
         return FullModes(
-            self.eigenvalue[wanted],
-            self.right[:, wanted],
-            self.left[:, wanted],
-            self.residual[wanted],
-            self.left_residual[wanted],
+            self.eigenvalue[which],
+            self.right[:, which],
+            self.left[:, which],
+            self.residual[which],
+            self.left_residual[which],
             self.condition,
         )
 
@@ -74,17 +74,17 @@ def window(
     most = stiffness.getSize()[0]
     count = min(max(expected, 1) + _EXTRA, most)
     while True:
-        found = solve(mass, drag, stiffness, count)
-        if np.abs(found.eigenvalue).max() > limit or count == most:
+        solution = solve(mass, drag, stiffness, count)
+        if np.abs(solution.eigenvalue).max() > limit or count == most:
             break
         count = min(2 * count, most)
-    inside = (found.eigenvalue.imag >= low) & (found.eigenvalue.imag <= high)
+    inside = (solution.eigenvalue.imag >= low) & (solution.eigenvalue.imag <= high)
     if not inside.any():
         raise ConvergenceError(
             f"rotating: no state from {low / (2 * np.pi):.4g} to {high / (2 * np.pi):.4g} Hz. Widen "
             "rotation.window."
         )
-    return found.among(inside)
+    return solution.among(inside)
 
 
 def solve(mass: Array, drag: PETSc.Mat, stiffness: PETSc.Mat, count: int) -> FullModes:
@@ -141,9 +141,9 @@ def _pairing(comm: MPI.Comm, mass: Array, drag: PETSc.Mat, s: Array, u: Array, w
 
 
 def _states(
-    mass: Array, drag: PETSc.Mat, stiffness: PETSc.Mat, wanted: int, tolerance: float = TOLERANCE
+    mass: Array, drag: PETSc.Mat, stiffness: PETSc.Mat, count: int, tolerance: float = TOLERANCE
 ) -> tuple[Array, Array, Array]:
-    """(s, vectors, residuals) of about `wanted` states nearest to zero, conjugates included."""
+    """(s, vectors, residuals) of about `count` states nearest to zero, conjugates included."""
     weight = stiffness.createVecLeft()
     weight.array[:] = mass
     inertia = PETSc.Mat().createAIJ(stiffness.getSizes(), nnz=1, comm=stiffness.comm)
@@ -152,7 +152,7 @@ def _states(
     pep = SLEPc.PEP().create(stiffness.comm)
     pep.setOptionsPrefix("rotating_")
     pep.setOperators([stiffness, drag, inertia])
-    pep.setDimensions(min(wanted + _EXTRA, 2 * stiffness.getSize()[0]))
+    pep.setDimensions(min(count + _EXTRA, 2 * stiffness.getSize()[0]))
     pep.setTolerances(tolerance, ITERATIONS)
     pep.setWhichEigenpairs(SLEPc.PEP.Which.TARGET_MAGNITUDE)
     pep.setTarget(0.0)
@@ -165,14 +165,14 @@ def _states(
     pc.setFactorSolverType("mumps")
     pep.setFromOptions()
     pep.solve()
-    found = pep.getConverged()
-    if found < wanted:
+    converged = pep.getConverged()
+    if converged < count:
         raise ConvergenceError(
-            f"rotating: {found} of {wanted} states converged in {pep.getIterationNumber()} restarts. "
+            f"rotating: {converged} of {count} states converged in {pep.getIterationNumber()} restarts. "
             "Lower rotation.count, or give PETSc options such as -rotating_pep_max_it 1000."
         )
-    s, vectors = _read(pep, stiffness, found)
-    order = _up_to_a_gap(s, wanted)
+    s, vectors = _read(pep, stiffness, converged)
+    order = _up_to_a_gap(s, count)
     s, vectors = s[order], vectors[:, order]
     factor = pc.getFactorMatrix()
     vectors = _polished(factor, mass, drag, s, vectors)
@@ -181,7 +181,7 @@ def _states(
     residual = _residuals(mass, drag, stiffness, s, vectors)
     if not residual.max() <= RESIDUAL_TOLERANCE:
         if tolerance > FINER:
-            return _states(mass, drag, stiffness, wanted, FINER)
+            return _states(mass, drag, stiffness, count, FINER)
         raise ConvergenceError(
             f"rotating: worst relative residual {residual.max():.1e}, allowed "
             f"{RESIDUAL_TOLERANCE:.0e}. Give -rotating_pep_tol a value below {FINER:g}."
@@ -189,11 +189,11 @@ def _states(
     return s, vectors, residual
 
 
-def _read(pep: SLEPc.PEP, matrix: PETSc.Mat, found: int) -> tuple[Array, Array]:
+def _read(pep: SLEPc.PEP, matrix: PETSc.Mat, count: int) -> tuple[Array, Array]:
     real, imaginary = matrix.createVecs()
-    s = np.empty(found, complex)
-    vectors = np.empty((real.getLocalSize(), found), complex)
-    for k in range(found):
+    s = np.empty(count, complex)
+    vectors = np.empty((real.getLocalSize(), count), complex)
+    for k in range(count):
         s[k] = pep.getEigenpair(k, real, imaginary)
         vectors[:, k] = real.array_r + 1j * imaginary.array_r
     real.destroy()
@@ -224,14 +224,14 @@ def _times(matrix: PETSc.Mat, vectors: Array) -> Array:
     return multiply(matrix, vectors.real) + 1j * multiply(matrix, vectors.imag)
 
 
-def _up_to_a_gap(s: Array, wanted: int) -> Array:
+def _up_to_a_gap(s: Array, count: int) -> Array:
     """Indices by |s| up to the widest gap after the wanted ones: conjugates stay together."""
     order = np.argsort(np.abs(s), kind="stable")
     size = np.abs(s[order])
     end = len(size)
-    if end > wanted:
-        gaps = np.diff(size[wanted - 1 :]) / size[wanted - 1 : -1]
-        end = wanted + int(np.argmax(gaps))
+    if end > count:
+        gaps = np.diff(size[count - 1 :]) / size[count - 1 : -1]
+        end = count + int(np.argmax(gaps))
     return order[:end]
 
 

@@ -102,7 +102,7 @@ class ProcessGroup:
         if self.alone:
             return q, r
         every = self.comm.allgather(r)
-        start = sum(len(one) for one in every[: self.comm.rank])
+        start = sum(len(factor) for factor in every[: self.comm.rank])
         turn, r = np.linalg.qr(np.vstack(every))
         return q @ turn[start : start + q.shape[1]], r
 
@@ -188,9 +188,9 @@ class Modes:
             residual=self.residual[:count],
         )
 
-    def among(self, wanted: np.ndarray) -> Modes:
-        """The same with the squares and vectors at `wanted`, indices or a mask."""
-        return replace(self, squares=self.squares[wanted], vectors=self.vectors[:, wanted])
+    def among(self, which: np.ndarray) -> Modes:
+        """The same with the squares and vectors at `which`, indices or a mask."""
+        return replace(self, squares=self.squares[which], vectors=self.vectors[:, which])
 
 
 class Shifted:
@@ -327,11 +327,11 @@ class KrylovBasis:
 
 
 def nearest(
-    shifted: Shifted, low: float, high: float, wanted: int, known: np.ndarray, tolerance: float
+    shifted: Shifted, low: float, high: float, count: int, known: np.ndarray, tolerance: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Eigenvalues (k,) from `low` to `high`; orthonormal vectors (n, k) orthogonal to the `known`.
 
-    The search ends when `wanted` have converged, to a residual below the tolerance relative to
+    The search ends when `count` have converged, to a residual below the tolerance relative to
     theta, or when the basis is full. Each process has its rows. Collective in the team.
 
         W = (A - sigma I)^-1 V_j = V_1..j H_j + V_j+1 R_j,   H s = theta s,   lambda = sigma + 1 / theta
@@ -343,18 +343,18 @@ def nearest(
     vector: 2.8 s). Blocks of 4 and of 16 take 1.3 and 1.4 s. Sources: Golub and Underwood (1977);
     Grimes, Lewis and Simon, SIAM J. Matrix Anal. Appl. 15 (1994) 228.
     """
-    basis = KrylovBasis(shifted, known, _LENGTH * wanted + _MORE * BLOCK, 7 + known.shape[1])
+    basis = KrylovBasis(shifted, known, _LENGTH * count + _MORE * BLOCK, 7 + known.shape[1])
     blocks = 0
     while True:
         basis.grow()
         blocks += 1
-        if not basis.full and (basis.size < 2 * wanted or blocks % _EVERY):
+        if not basis.full and (basis.size < 2 * count or blocks % _EVERY):
             continue
         theta, residual, vectors = basis.ritz()
         values = shifted.shift + 1 / np.where(theta == 0.0, np.finfo(float).tiny, theta)
-        found = (values > low) & (values < high) & (residual <= tolerance * np.abs(theta))
-        if found.sum() >= wanted or basis.full:
-            return values[found], basis.fields(vectors[:, found])
+        inside = (values > low) & (values < high) & (residual <= tolerance * np.abs(theta))
+        if inside.sum() >= count or basis.full:
+            return values[inside], basis.fields(vectors[:, inside])
 
 
 def merged(steps: list[tuple[float, np.ndarray]], most: float) -> list[tuple[float, np.ndarray]]:
@@ -362,11 +362,11 @@ def merged(steps: list[tuple[float, np.ndarray]], most: float) -> list[tuple[flo
 
     The first steps are narrow, because the density of eigenvalues is not known yet.
     """
-    kept = steps[:1]
+    steps_left = steps[:1]
     for step, following in zip(steps[1:], [*steps[2:], None], strict=True):
-        if following is None or (following[1] - kept[-1][1]).sum() > most:
-            kept.append(step)
-    return kept
+        if following is None or (following[1] - steps_left[-1][1]).sum() > most:
+            steps_left.append(step)
+    return steps_left
 
 
 def onward(low: float, step: float) -> float:
@@ -445,7 +445,7 @@ class _Inverse:
 
 
 def krylov_schur(
-    shifted: Shifted, low: float, high: float, wanted: int, known: np.ndarray, tolerance: float
+    shifted: Shifted, low: float, high: float, count: int, known: np.ndarray, tolerance: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """The same as `nearest` by SLEPc's Krylov-Schur with one vector, the `known` deflated.
 
@@ -474,8 +474,8 @@ def krylov_schur(
         solver.setProblemType(SLEPc.EPS.ProblemType.HEP)
         solver.setType(SLEPc.EPS.Type.KRYLOVSCHUR)
         solver.setWhichEigenpairs(SLEPc.EPS.Which.LARGEST_MAGNITUDE)
-        longest = min(math.ceil(_LONGEST * wanted) + _PROBES, size - known.shape[1])
-        solver.setDimensions(min(wanted, longest), longest, PETSc.DECIDE)
+        longest = min(math.ceil(_LONGEST * count) + _PROBES, size - known.shape[1])
+        solver.setDimensions(min(count, longest), longest, PETSc.DECIDE)
         solver.setKrylovSchurRestart(_KEPT)
         solver.setTolerances(tolerance)
         if known.shape[1]:
@@ -495,8 +495,8 @@ def krylov_schur(
             f'({str(error).splitlines()[-1].strip()}): take modal.solver = "lanczos"'
         ) from error
     finally:
-        for one in (vector, solver, inverse):
-            one.destroy()
+        for item in (vector, solver, inverse):
+            item.destroy()
     values = shifted.shift + 1 / np.where(theta == 0.0, np.finfo(float).tiny, theta)
     inside = (values > low) & (values < high)
     return values[inside], vectors[:, inside]
@@ -507,10 +507,10 @@ SOLVERS: dict[str, Search] = {"lanczos": nearest, "slepc": krylov_schur}
 """What searches eigenpairs near the shift of a slice."""
 
 
-def _check_count(found: int, interval: Interval) -> None:
-    if found != interval.count:
+def _check_count(count: int, interval: Interval) -> None:
+    if count != interval.count:
         raise ConvergenceError(
-            f"modes: {found} modes found from {_hertz(interval.low):.3f} to "
+            f"modes: {count} modes found from {_hertz(interval.low):.3f} to "
             f"{_hertz(interval.high):.3f} Hz, but the inertia of K - sigma M counts {interval.count}. "
             "The matrix may be far from symmetric, or scaled so that rounding hides the low modes."
         )
@@ -661,10 +661,10 @@ class SymmetricProblem:
             shifted.destroy()
             return np.append(estimates, negative)
 
-        found = self._shared(work)
-        negative = int(sum(one[-1] for one in found))
+        answers = self._shared(work)
+        negative = int(sum(answer[-1] for answer in answers))
         return LowestEigenvalues(
-            zero, negative, np.sort(np.concatenate([one[:-1] for one in found]))
+            zero, negative, np.sort(np.concatenate([answer[:-1] for answer in answers]))
         )
 
     def below(self, shift: float) -> np.ndarray:

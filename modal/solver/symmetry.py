@@ -135,10 +135,10 @@ def symmetries(matrix: PETSc.Mat, sites: DofPositions) -> list[Symmetry]:
     The two mirrors are tried first. The half turn is their product, so it is tried only where there
     is neither.
     """
-    found = [_found(matrix, sites, isometry) for isometry in (MIRROR_Y, MIRROR_X)]
-    if not any(found):
-        found = [_found(matrix, sites, HALF_TURN)]
-    return [symmetry for symmetry in found if symmetry]
+    isometries = [_found(matrix, sites, isometry) for isometry in (MIRROR_Y, MIRROR_X)]
+    if not any(isometries):
+        isometries = [_found(matrix, sites, HALF_TURN)]
+    return [symmetry for symmetry in isometries if symmetry]
 
 
 def _found(matrix: PETSc.Mat, sites: DofPositions, isometry: Isometry) -> Symmetry | None:
@@ -345,10 +345,10 @@ def repeated(matrix: PETSc.Mat, sites: DofPositions) -> RepeatingMatrix | None:
     for nodes in range(1, _LONGEST + 1):
         if places % nodes or places // nodes < 3:
             continue
-        found = _segments(points, angle, places // nodes, near)
-        if found is None:
+        segments = _segments(points, angle, places // nodes, near)
+        if segments is None:
             continue
-        ring = _verified(matrix, points, angle, found)
+        ring = _verified(matrix, points, angle, segments)
         if ring is not None:
             return ring
     return None
@@ -389,8 +389,8 @@ def _verified(
     difference = less(by_one, local)
     far, defect = largest_entry(difference), row_sum(difference)
     top = rows_of(local, np.arange(each)).tocoo()
-    for one in (local, by_one, difference):
-        one.destroy()
+    for item in (local, by_one, difference):
+        item.destroy()
     if far > allowed:
         return None
     blocks = {}
@@ -401,9 +401,9 @@ def _verified(
     own = nodes[0]
     within = np.where(angle[own] > np.pi, angle[own] - 2 * np.pi, angle[own])
     for along_axle in (1.0, -1.0):
-        kept = _kept(points[own], within, 2 * np.pi / count, along_axle)
-        if kept is not None:
-            ring = RepeatingMatrix(count, turn, blocks, np.repeat(within, 3), kept, defect)
+        columns_left = _kept(points[own], within, 2 * np.pi / count, along_axle)
+        if columns_left is not None:
+            ring = RepeatingMatrix(count, turn, blocks, np.repeat(within, 3), columns_left, defect)
             if ring.is_kept():
                 return ring
     return RepeatingMatrix(count, turn, blocks, np.repeat(within, 3), None, defect)
@@ -413,8 +413,8 @@ def _turned(angle: np.ndarray, order: np.ndarray) -> sparse.csr_matrix:
     """Tangential, axial and radial components of the nodes, in their order, to x, y, z."""
     size = 3 * len(order)
     sine, cosine = np.sin(angle[order]), np.cos(angle[order])
-    one, none = np.ones(len(order)), np.zeros(len(order))
-    axes = np.array([[cosine, none, sine], [none, one, none], [sine, none, -cosine]])
+    unit, none = np.ones(len(order)), np.zeros(len(order))
+    axes = np.array([[cosine, none, sine], [none, unit, none], [sine, none, -cosine]])
     rows = np.broadcast_to((3 * order + np.arange(3)[:, None])[:, None], axes.shape)
     columns = np.broadcast_to((3 * np.arange(len(order)) + np.arange(3)[:, None])[None], axes.shape)
     turn = sparse.csr_matrix((axes.ravel(), (rows.ravel(), columns.ravel())), (size, size))

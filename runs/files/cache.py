@@ -74,8 +74,8 @@ class Cache:
     @classmethod
     def of_user(cls) -> Cache:
         """The cache named by TIREROAD_CACHE, by default the user's own."""
-        given = os.environ.get(VARIABLE) or str(own_folder())
-        return cls(None if given == OFF else Path(given))
+        name = os.environ.get(VARIABLE) or str(own_folder())
+        return cls(None if name == OFF else Path(name))
 
     def of_family(self, folder: Path) -> Cache:
         """The cache of a family of runs: its own `folder`, unless the user has named one."""
@@ -88,27 +88,27 @@ class Cache:
 
     def entries(self) -> list[Kept]:
         """The stages kept, least recently used first."""
-        found = []
+        entries = []
         for path in self.folder.glob("*-*.h5") if self.folder else ():
             with suppress(OSError):  # another process has just removed it
                 used = path.with_suffix(".json").stat().st_mtime
-                found.append(Kept(path, path.stat().st_size, used))
-        return sorted(found, key=lambda one: one.used)
+                entries.append(Kept(path, path.stat().st_size, used))
+        return sorted(entries, key=lambda entry: entry.used)
 
     def described(self) -> str:
         """A table of the stages kept, most recently used first, and their total size."""
         if self.folder is None:
             return "no stages are kept: TIREROAD_CACHE is off, or the folder cannot be written"
-        kept = self.entries()[::-1]
+        entries = self.entries()[::-1]
         lines = [f"{'stage':10s}{'scene':26s}{'MB':>9s}  last used"]
-        for one in kept:
-            with suppress(OSError), h5py.File(one.path) as file:
-                when = time.strftime("%Y-%m-%d %H:%M", time.localtime(one.used))
+        for entry in entries:
+            with suppress(OSError), h5py.File(entry.path) as file:
+                when = time.strftime("%Y-%m-%d %H:%M", time.localtime(entry.used))
                 scene = str(file.attrs.get("scene_name", "?"))[:24]
-                lines.append(f"{one.stage:10s}{scene:26s}{one.size / 1e6:9.1f}  {when}")
-        total = sum(one.size for one in kept) / 1e9
+                lines.append(f"{entry.stage:10s}{scene:26s}{entry.size / 1e6:9.1f}  {when}")
+        total = sum(one.size for one in entries) / 1e9
         most = f", at most {LARGEST / 1e9:g} GB" if self._own else ""
-        return "\n".join([*lines, f"{len(kept)} stages, {total:.2f} GB in {self.folder}{most}"])
+        return "\n".join([*lines, f"{len(entries)} stages, {total:.2f} GB in {self.folder}{most}"])
 
     def clear(self, unused_for: float) -> str:
         """Remove the stages unused for that many days; returns a report."""
@@ -118,13 +118,13 @@ class Cache:
         for lock in self.folder.glob("*.lock") if self.folder and not unused_for else ():
             with suppress(OSError):
                 lock.unlink()
-        return f"{len(old)} stages removed, {sum(one.size for one in old) / 1e9:.2f} GB"
+        return f"{len(old)} stages removed, {sum(entry.size for entry in old) / 1e9:.2f} GB"
 
     def _prune(self) -> None:
         """Remove the least recently used stages of the user's own cache beyond its limit."""
-        kept = self.entries() if self._own else []
-        total = sum(one.size for one in kept)
-        for one in kept:
+        entries = self.entries() if self._own else []
+        total = sum(entry.size for entry in entries)
+        for one in entries:
             if total <= LARGEST:
                 return
             one.remove()

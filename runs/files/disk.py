@@ -157,10 +157,10 @@ def is_whole(path: Path) -> bool:
     if _known.get(str(path)) == state:
         return True
     with path.open("rb") as file:
-        found = file.read(BLOCK)
-        if found.startswith(_HDF5):
+        block = file.read(BLOCK)
+        if block.startswith(_HDF5):
             raise NoChecksum(f"{path} carries no checksum")
-        whole = len(found) == BLOCK and found == _block(file)
+        whole = len(block) == BLOCK and block == _block(file)
     if whole:
         _known[str(path)] = state
     return whole
@@ -173,8 +173,8 @@ def signed(text: str) -> str:
 
 def is_as_signed(text: str) -> bool:
     """Whether a text is unchanged since `signed`; a truncated text is not."""
-    lines, found, digest = text.rpartition(_SIGNATURE)
-    return bool(found) and digest.strip() == text_digest(lines)
+    lines, separator, digest = text.rpartition(_SIGNATURE)
+    return bool(separator) and digest.strip() == text_digest(lines)
 
 
 def signed_table(table: Mapping[str, Any]) -> dict[str, Any]:

@@ -45,16 +45,16 @@ def earlier_summary(directory: Path) -> dict[str, Any] | None:
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read ({error}); {OTHER}") from None
     try:
-        found = json.loads(text)
-        found["program"]["version"], found["scene"], found["stages"].items()
+        summary = json.loads(text)
+        summary["program"]["version"], summary["scene"], summary["stages"].items()
     except (ValueError, TypeError, KeyError, AttributeError):
         raise InputError(f"{path}: is not a summary of {PROGRAM}; {OTHER}") from None
-    if not is_table_as_signed(found):
+    if not is_table_as_signed(summary):
         raise InputError(
             f"{path}: is damaged: it is not what was written (checksum). Remove it to go on, the"
             " stages' own files are kept; or choose another folder with --out"
         )
-    return found
+    return summary
 
 
 def check_kept_scene(path: Path) -> None:
@@ -74,10 +74,10 @@ def check_kept_scene(path: Path) -> None:
         )
 
 
-def _check_name(directory: Path, found: Any, scene_name: str) -> None:
-    if found != scene_name:
+def _check_name(directory: Path, summary: Any, scene_name: str) -> None:
+    if summary != scene_name:
         raise InputError(
-            f'{directory}: holds results of the scene "{found}", not of "{scene_name}"; {OTHER}'
+            f'{directory}: holds results of the scene "{summary}", not of "{scene_name}"; {OTHER}'
         )
 
 
@@ -97,12 +97,12 @@ def _check_scene(directory: Path, scene_name: str) -> None:
 
 def check_owner(directory: Path, scene_name: str) -> None:
     """Raise InputError if the folder holds results of another scene or another version."""
-    found = earlier_summary(directory)
-    if found is None:
+    summary = earlier_summary(directory)
+    if summary is None:
         _check_scene(directory, scene_name)
         return
-    _check_name(directory, found["scene"], scene_name)
-    program = found["program"]
+    _check_name(directory, summary["scene"], scene_name)
+    program = summary["program"]
     if (program["version"], program.get("format")) != (VERSION, RESULT_FORMAT):
         raise InputError(
             f"{directory}: holds results of {PROGRAM} {program['version']}"
@@ -216,18 +216,18 @@ def left_out(directory: Path) -> dict[str, str]:
 def _left_out(directory: Path, table: Mapping[str, Any] | None) -> dict[str, str]:
     if table is None:
         return {}
-    entries, found = table["stages"], {}
+    entries, left = table["stages"], {}
     for stage in STAGES:
         name, entry = f"{stage}.h5", entries.get(stage)
         if not has_result(entry) and (directory / name).is_file():
             why = (entry or {}).get("reason") or "this run has not finished it"
-            found[name] = f"it is of an earlier run ({why})"
+            left[name] = f"it is of an earlier run ({why})"
     for name in UNFINISHED:
         if (directory / name).is_file() and not _is_of_scene(directory, name):
-            found[name] = "it is of another scene"
+            left[name] = "it is of another scene"
     if _read(directory / CHOSEN) not in (None, _read(directory / "scene.toml")):
-        found[CHOSEN] = "it was chosen for another scene"
-    return found
+        left[CHOSEN] = "it was chosen for another scene"
+    return left
 
 
 def ending(summary: Mapping[str, Any]) -> str:
@@ -290,14 +290,14 @@ class Summary:
         self.path = directory / "summary.json"
         self._scene = directory / "scene.toml", signed(scene_text)
         self._entered: set[str] = set()
-        found = earlier_summary(directory) or {"stages": {}}
+        summary = earlier_summary(directory) or {"stages": {}}
         self.data: dict[str, Any] = {
             "program": {"name": PROGRAM, "version": VERSION, "format": RESULT_FORMAT},
             "scene": scene_name,
             "resolved_scene": text_digest(scene_text),
             "processes": processes,
-            "stages": found["stages"],
-            "earlier": found.get("earlier", {}),
+            "stages": summary["stages"],
+            "earlier": summary.get("earlier", {}),
         }
         self._of_another = not self._is_scene()
         if self._of_another:
@@ -335,18 +335,18 @@ class Summary:
         """
         if status == "skipped" and has_result(self.data["stages"].get(stage)):
             return
-        kept = self._known(stage, input_hash) if status == "reused" else {}
+        before = self._known(stage, input_hash) if status == "reused" else {}
         self._displace(stage, status, input_hash)
         self.data["stages"][stage] = {
             "status": status,
             "reason": reason,
             "seconds": seconds,
             "input_hash": input_hash,
-            "headline": _figures(headline) or kept.get("headline", {}),
-            "indicators": _figures(indicators) or kept.get("indicators", {}),
-            "warnings": warnings or kept.get("warnings", []),
-            **({"notes": said} if (said := notes or kept.get("notes", [])) else {}),
-            "cost": cost or kept.get("cost", {}),
+            "headline": _figures(headline) or before.get("headline", {}),
+            "indicators": _figures(indicators) or before.get("indicators", {}),
+            "warnings": warnings or before.get("warnings", []),
+            **({"notes": said} if (said := notes or before.get("notes", [])) else {}),
+            "cost": cost or before.get("cost", {}),
         }
         self._write()
 
@@ -392,8 +392,8 @@ class Summary:
         write_text(self.path, text + "\n")
 
 
-def _figures(given: dict[str, tuple[Any, str]] | None) -> dict[str, Any]:
-    return {name: {"value": value, "unit": unit} for name, (value, unit) in (given or {}).items()}
+def _figures(figures: dict[str, tuple[Any, str]] | None) -> dict[str, Any]:
+    return {name: {"value": value, "unit": unit} for name, (value, unit) in (figures or {}).items()}
 
 
 def _finite(value: Any) -> Any:

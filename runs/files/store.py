@@ -105,10 +105,10 @@ def _version(holders: tuple[str, ...]) -> str:
     """The version of the first distribution that is installed, with its name if that is WHEEL."""
     for name in holders:
         try:
-            found = metadata.version(name)
+            version = metadata.version(name)
         except metadata.PackageNotFoundError:
             continue
-        return f"in {WHEEL} {found}" if name == WHEEL else found
+        return f"in {WHEEL} {version}" if name == WHEEL else version
     return "unknown"
 
 
@@ -118,8 +118,8 @@ def _mumps() -> str:
         maps = Path("/proc/self/maps").read_text(encoding="utf-8", errors="replace")
     except OSError:
         return "unknown"
-    found = re.search(r"/libdmumps[^/\n]*?(\d+(?:\.\d+)+)", maps)
-    return found.group(1) if found else _version((WHEEL,))
+    match = re.search(r"/libdmumps[^/\n]*?(\d+(?:\.\d+)+)", maps)
+    return match.group(1) if match else _version((WHEEL,))
 
 
 class Disk(io.RawIOBase):
@@ -271,25 +271,25 @@ def attribute(name: str = "", **given: Any) -> Any:
 
 def write_fields(file: h5py.Group, product: Any) -> None:
     """Write the fields of a product that are a `dataset` or an `attribute`; none for those that are None."""
-    for one in fields(product):
-        value, meant = getattr(product, one.name), one.metadata
+    for item in fields(product):
+        value, meant = getattr(product, item.name), item.metadata
         if "dataset" in meant and value is not None:
-            put(file, meant["dataset"] or one.name, value, meant["unit"])
+            put(file, meant["dataset"] or item.name, value, meant["unit"])
         elif "attribute" in meant:
-            file.attrs[meant["attribute"] or one.name] = value
+            file.attrs[meant["attribute"] or item.name] = value
 
 
 def read_fields(file: h5py.Group, kind: type) -> dict[str, Any]:
     """The same fields of a product of class `kind`, by name; without datasets that the file lacks."""
-    found: dict[str, Any] = {}
-    for one in fields(kind):
-        meant = one.metadata
-        if "dataset" in meant and (meant["dataset"] or one.name) in file:
-            found[one.name] = file[meant["dataset"] or one.name][()]
+    values: dict[str, Any] = {}
+    for item in fields(kind):
+        meant = item.metadata
+        if "dataset" in meant and (meant["dataset"] or item.name) in file:
+            values[item.name] = file[meant["dataset"] or item.name][()]
         elif "attribute" in meant:
-            value = file.attrs[meant["attribute"] or one.name]
-            found[one.name] = value.item() if isinstance(value, np.generic) else value
-    return found
+            value = file.attrs[meant["attribute"] or item.name]
+            values[item.name] = value.item() if isinstance(value, np.generic) else value
+    return values
 
 
 def stage_hash(inputs: Mapping[str, Any]) -> str:
@@ -312,29 +312,29 @@ def wanted_hash(stage: str, inputs: Mapping[str, Any]) -> str:
     )
 
 
-def why_not(path: Path, wanted: str, stage: str) -> str:
+def why_not(path: Path, expected: str, stage: str) -> str:
     """Why a stage's file cannot be reused; "" if it can, "absent" if it does not exist.
 
-    `wanted`: hash of the stage's present inputs.
+    `expected`: hash of the stage's present inputs.
     """
     if not path.exists():
         return "absent"
     try:
         with opened(path) as file:
-            found = dict(file.attrs)
+            attributes = dict(file.attrs)
     except InputError:
         return "it is damaged"
-    if found.get("input_hash") == wanted:
+    if attributes.get("input_hash") == expected:
         return ""
-    return _changed(found, identity(stage))
+    return _changed(attributes, identity(stage))
 
 
-def _changed(found: Mapping[str, Any], now: Identity) -> str:
+def _changed(before: Mapping[str, Any], now: Identity) -> str:
     """Changes since a file with these attributes was written."""
-    if "code" not in found:
+    if "code" not in before:
         return "it is of an earlier version"
-    libraries = json.loads(found["libraries"])
-    return now.differs(found["code"], libraries) or "the inputs have changed since"
+    libraries = json.loads(before["libraries"])
+    return now.differs(before["code"], libraries) or "the inputs have changed since"
 
 
 @contextmanager

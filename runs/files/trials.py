@@ -66,16 +66,16 @@ class ErrorsByCause:
     centre: tuple[float, ...]
     level: Mapping[str, tuple[float, ...]]
 
-    def over(self, wanted: Target) -> np.ndarray:
+    def over(self, target: Target) -> np.ndarray:
         """Errors (causes, figures) over their targets; infinite where unknown."""
         columns = []
-        if wanted.target is not None:
+        if target.target is not None:
             for values in (self.history, self.mean):
-                columns.append([values.get(cause, np.nan) / wanted.target for cause in CAUSES])
-        if wanted.target_db is not None:
+                columns.append([values.get(cause, np.nan) / target.target for cause in CAUSES])
+        if target.target_db is not None:
             levels = np.array([self.level[cause] for cause in CAUSES]).reshape(len(CAUSES), -1)
             # Without a band below that frequency, nothing is known.
-            columns += list((levels / wanted.target_db).T) or [[np.nan] * len(CAUSES)]
+            columns += list((levels / target.target_db).T) or [[np.nan] * len(CAUSES)]
         return np.nan_to_num(np.array(columns, float).T, nan=np.inf)
 
 
@@ -104,13 +104,13 @@ class Trial:
 
 def read_trials(path: Path) -> list[Trial]:
     """All trials in a file, of any scene. Raises OSError, ValueError or KeyError without any."""
-    return [trial_of(one) for one in json.loads(path.read_text(encoding="utf-8"))["trials"]]
+    return [trial_of(trial) for trial in json.loads(path.read_text(encoding="utf-8"))["trials"]]
 
 
 def trial_of(data: dict[str, Any]) -> Trial:
     settings = data["settings"] | {"mesh": tuple(data["settings"]["mesh"])}
-    found = data["found"]
-    if found is not None:
-        level = {cause: tuple(values) for cause, values in found["level"].items()}
-        found = ErrorsByCause(found["history"], found["mean"], tuple(found["centre"]), level)
-    return Trial(**data | {"settings": Settings(**settings), "found": found})
+    best = data["found"]
+    if best is not None:
+        level = {cause: tuple(values) for cause, values in best["level"].items()}
+        best = ErrorsByCause(best["history"], best["mean"], tuple(best["centre"]), level)
+    return Trial(**data | {"settings": Settings(**settings), "found": best})

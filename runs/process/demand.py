@@ -15,15 +15,15 @@ CERTAIN, DOUBTFUL = 1.5, 0.8
 LONG = 3600.0  # s: runs estimated to take longer cause a warning
 
 
-def check_demand(wanted: Estimate, directory: Path, processes: int = 1) -> list[str]:
+def check_demand(demand: Estimate, directory: Path, processes: int = 1) -> list[str]:
     """Warnings about memory, disk and time. Raises InputError if they cannot suffice.
 
     `directory`: result folder, which need not exist yet. If memory is short, factors are kept on
     disk.
     """
-    on_disk = out_of_core(wanted, processes)
-    taken = memory_of(wanted, processes, on_disk)
-    memory, free = sum(taken.values()), available_memory()
+    on_disk = out_of_core(demand, processes)
+    memory_taken = memory_of(demand, processes, on_disk)
+    memory, free = sum(memory_taken.values()), available_memory()
     room = shutil.disk_usage(_existing(directory)).free
     warnings = []
     if on_disk:
@@ -31,8 +31,8 @@ def check_demand(wanted: Estimate, directory: Path, processes: int = 1) -> list[
             f"memory is short: factors are kept on disk in {directory} (MUMPS out of core), which takes longer"
         )
     for what, where, parts, needed, there in (
-        ("memory", "", taken, memory, free),
-        ("disk", f" in {directory}", wanted.disk, sum(wanted.disk.values()), float(room)),
+        ("memory", "", memory_taken, memory, free),
+        ("disk", f" in {directory}", demand.disk, sum(demand.disk.values()), float(room)),
     ):
         if needed < DOUBTFUL * there:
             continue
@@ -43,18 +43,18 @@ def check_demand(wanted: Estimate, directory: Path, processes: int = 1) -> list[
         if needed > CERTAIN * there:
             raise InputError(text)
         warnings.append(text)
-    seconds = sum(wanted.seconds.values())
+    seconds = sum(demand.seconds.values())
     if seconds > LONG:
         warnings.append(
             f"the run takes about {duration(seconds)} of one core, most of it for "
-            f"{_largest(wanted.seconds)}"
+            f"{_largest(demand.seconds)}"
         )
     return warnings
 
 
-def out_of_core(wanted: Estimate, processes: int) -> bool:
+def out_of_core(demand: Estimate, processes: int) -> bool:
     """Whether factors must be kept on disk because this machine's memory is too small for them."""
-    return sum(memory_of(wanted, processes).values()) > DOUBTFUL * available_memory()
+    return sum(memory_of(demand, processes).values()) > DOUBTFUL * available_memory()
 
 
 def _largest(parts: dict[str, float]) -> str:
@@ -65,4 +65,4 @@ def _largest(parts: dict[str, float]) -> str:
 
 def _existing(directory: Path) -> Path:
     directory = directory.absolute()
-    return next(one for one in (directory, *directory.parents) if one.exists())
+    return next(folder for folder in (directory, *directory.parents) if folder.exists())

@@ -49,8 +49,8 @@ def beside(program):
 
 def missing(tests, processes):
     """Debian's names of what this python lacks to run the program."""
-    wanted = dict(PACKAGES, **(OF_TESTS if tests else {}))
-    lacking = [name for module, name in wanted.items() if not found(module)]
+    packages = dict(PACKAGES, **(OF_TESTS if tests else {}))
+    lacking = [name for module, name in packages.items() if not found(module)]
     if compiler() is None and not found("ziglang"):
         lacking.append("gcc")
     if (tests or processes != 1) and beside("mpirun") is None:
@@ -64,8 +64,8 @@ def requirements(tests):
 
     with open(Path(__file__).resolve().parents[2] / "pyproject.toml", "rb") as file:
         extras = tomllib.load(file)["project"]["optional-dependencies"]
-    wanted = extras["solver"] + (extras["test"] if tests else [])
-    return wanted + (extras["compiler"] if compiler() is None else [])
+    names = extras["solver"] + (extras["test"] if tests else [])
+    return names + (extras["compiler"] if compiler() is None else [])
 
 
 def make(folder, tests):
@@ -74,12 +74,12 @@ def make(folder, tests):
         sys.exit("an environment of wheels needs Python 3.12 or newer")
     if not found("ensurepip"):
         sys.exit(f"{sys.executable} has no venv with pip (on Debian: python3-venv)")
-    wanted, mark = requirements(tests), folder / MADE
+    names, mark = requirements(tests), folder / MADE
     before = mark.read_text().splitlines() if mark.exists() else []
-    if set(wanted) <= set(before):
+    if set(names) <= set(before):
         return
     python = folder / "bin" / "python"
-    size = "1.1 GB with a C compiler" if any("ziglang" in one for one in wanted) else "650 MB"
+    size = "1.1 GB with a C compiler" if any("ziglang" in name for name in names) else "650 MB"
     print(
         f"tireroad: making an environment in {folder}, once ({size}, about a minute;"
         " TIREROAD_PYTHON=… names a python that has dolfinx)",
@@ -90,10 +90,10 @@ def make(folder, tests):
         if not before:
             subprocess.run([sys.executable, "-m", "venv", "--clear", str(folder)], check=True)
         pip = [str(python), "-m", "pip", "install", "-q", "--disable-pip-version-check"]
-        subprocess.run([*pip, *wanted], check=True)
+        subprocess.run([*pip, *names], check=True)
     except (OSError, subprocess.CalledProcessError) as error:
         sys.exit(f"no environment in {folder}: {error}; XDG_CACHE_HOME names another place")
-    mark.write_text("\n".join(sorted({*before, *wanted})) + "\n")
+    mark.write_text("\n".join(sorted({*before, *names})) + "\n")
 
 
 if __name__ == "__main__":

@@ -60,21 +60,21 @@ def installation() -> dict[str, str]:
 
 def described(as_json: bool) -> str:
     """`installation` as text, one line each, or as JSON."""
-    found = installation()
+    setup = installation()
     if as_json:
-        return json.dumps(found, indent=2)
-    width = max(map(len, found))
-    return "\n".join(f"{name:{width}s}  {text}" for name, text in found.items())
+        return json.dumps(setup, indent=2)
+    width = max(map(len, setup))
+    return "\n".join(f"{name:{width}s}  {text}" for name, text in setup.items())
 
 
 def _blas() -> str:
     """BLAS libraries with their kernels and threads; scipy's and PETSc's may be two."""
     import threadpoolctl
 
-    found = [
-        f"{one['internal_api']} {one['version']} ({one.get('architecture', 'unknown kernels')},"
-        f" {one['num_threads']} thread{'s' if one['num_threads'] > 1 else ''})"
-        for one in threadpoolctl.threadpool_info()
-        if one["user_api"] == "blas"
+    libraries = [
+        f"{library['internal_api']} {library['version']} ({library.get('architecture', 'unknown kernels')},"
+        f" {library['num_threads']} thread{'s' if library['num_threads'] > 1 else ''})"
+        for library in threadpoolctl.threadpool_info()
+        if library["user_api"] == "blas"
     ]
-    return "; ".join(dict.fromkeys(found)) or "unknown"
+    return "; ".join(dict.fromkeys(libraries)) or "unknown"

@@ -110,10 +110,10 @@ def crowded(processes: int) -> list[str]:
 
 def _check_temporary() -> None:
     for name in ("TMPDIR", "TEMP", "TMP"):  # in MPI's order, which takes the first that is set
-        if given := os.environ.get(name):
-            if not (os.path.isdir(given) and os.access(given, os.W_OK | os.X_OK)):
+        if folder_name := os.environ.get(name):
+            if not (os.path.isdir(folder_name) and os.access(folder_name, os.W_OK | os.X_OK)):
                 raise InputError(
-                    f"{name} = {given} is not writable, and MPI keeps its session files there: set it to "
+                    f"{name} = {folder_name} is not writable, and MPI keeps its session files there: set it to "
                     "another, or unset it"
                 )
             break
@@ -121,8 +121,8 @@ def _check_temporary() -> None:
         folder = Path(tempfile.gettempdir())
     except FileNotFoundError:
         raise InputError("no folder for temporary files can be written: set TMPDIR") from None
-    found = os.statvfs(folder)
-    free = found.f_bavail * found.f_frsize
+    room = os.statvfs(folder)
+    free = room.f_bavail * room.f_frsize
     if free < LEAST_TEMPORARY:
         raise InputError(
             f"{folder} has {1e-6 * free:.3g} MB free, and MPI needs about"

@@ -72,12 +72,12 @@ def _same(first: Any, other: Any) -> bool:
 
 def scene_rows(scenes: Sequence[Mapping[str, Any]]) -> list[Row]:
     """The scene keys whose values differ between runs; None for an absent key."""
-    flat = [{one.path: one for one in scene_keys(scene)} for scene in scenes]
-    keys = sorted({key for one in flat for key in one} - {"name"})
+    flat = [{key.path: key for key in scene_keys(scene)} for scene in scenes]
+    keys = sorted({key for key_in in flat for key in key_in} - {"name"})
     rows = []
     for key in keys:
-        unit = next(one[key].unit for one in flat if key in one)
-        values = tuple(one[key].value if key in one else None for one in flat)
+        unit = next(key_in[key].unit for key_in in flat if key in key_in)
+        values = tuple(key_in[key].value if key in key_in else None for key_in in flat)
         rows.append(Row("scene", key, unit, values))
     return [row for row in rows if row.differs]
 
@@ -111,17 +111,17 @@ def cost_rows(summaries: Sequence[Mapping[str, Any]]) -> list[Row]:
 
 def level_rows(runs: Sequence[RunResults]) -> list[Row]:
     """Third-octave levels by quantity and band (runs.report.levels); None where a run has none."""
-    every = [{one.name: one for one in band_levels(run)} for run in runs]
-    units = {name: one.unit for found in every for name, one in found.items()}
+    every = [{band.name: band for band in band_levels(run)} for run in runs]
+    units = {name: level.unit for levels in every for name, level in levels.items()}
     return [row for name in units for row in _bands(name, units[name], every)]
 
 
 def _bands(name: str, unit: str, every: Sequence[Mapping[str, BandLevels]]) -> list[Row]:
     """Rows of one quantity, ascending, of the bands that any run has."""
     levels: list[dict[float, float]] = []
-    for found in every:
-        one = found.get(name)
-        pairs = [] if one is None else zip(one.band, one.level, strict=True)
+    for by_name in every:
+        level = by_name.get(name)
+        pairs = [] if level is None else zip(level.band, level.level, strict=True)
         levels.append({float(band): float(value) for band, value in pairs if np.isfinite(value)})
     return [
         Row(name, f"{band:g} Hz", unit, tuple(own.get(band) for own in levels))
@@ -141,19 +141,19 @@ def mode_rows(runs: Sequence[RunResults]) -> list[Row]:
     frequency = reference["modes/frequency"][:MATCHED]
     shape = reference["modes/surface/shape"][:MATCHED]
     points = reference["modes/surface/points"]
-    found = [list(frequency)]
+    rows = [list(frequency)]
     least = np.ones(len(frequency))
     for run in runs[1:]:
         other = run["modes/surface/shape"]
         _, near = cKDTree(run["modes/surface/points"]).query(points)
         mac = assurance(shape, other[:, near])
         best = mac.argmax(axis=1)
-        found.append(list(run["modes/frequency"][best]))
+        rows.append(list(run["modes/frequency"][best]))
         least = np.minimum(least, mac.max(axis=1))
     called = reference["modes/name"] if "modes/name" in reference else [""] * len(frequency)
     return [
         Row("modes", f"mode {k + 1}{_called(called[k])}, MAC {least[k]:.2f}", "Hz", values)
-        for k, values in enumerate(zip(*([float(f) for f in one] for one in found), strict=True))
+        for k, values in enumerate(zip(*([float(f) for f in row] for row in rows), strict=True))
     ]
 
 
@@ -182,28 +182,28 @@ class BandMarks:
     chance: Array
 
     @staticmethod
-    def at(bands: Sequence[float], one: BandLevels | None) -> BandMarks:
+    def at(bands: Sequence[float], levels: BandLevels | None) -> BandMarks:
         """Marks of one run at bands (b,) Hz; NaN where it has none of them."""
-        found = BandMarks(*(np.full((len(bands), *more), np.nan) for more in ((), (), (2,))))
-        if one is None:
-            return found
+        placed = BandMarks(*(np.full((len(bands), *more), np.nan) for more in ((), (), (2,))))
+        if levels is None:
+            return placed
         for k, band in enumerate(bands):
-            for here in np.flatnonzero(np.isclose(one.band, band)):
-                found.level[k], found.error[k] = one.level[here], one.error[here]
-                found.chance[k] = one.chance[here]
-        return found
+            for here in np.flatnonzero(np.isclose(levels.band, band)):
+                placed.level[k], placed.error[k] = levels.level[here], levels.error[here]
+                placed.chance[k] = levels.chance[here]
+        return placed
 
 
-def marks(axes: Axes, place: Array, one: BandMarks, **drawn: Any) -> None:
+def marks(axes: Axes, place: Array, bands: BandMarks, **drawn: Any) -> None:
     """Levels joined by a line at places (b,), with a bar for the numerical error and a box for the chance of each."""
-    line = axes.plot(place, one.level, marker="o", ms=3, **drawn)[0]
+    line = axes.plot(place, bands.level, marker="o", ms=3, **drawn)[0]
     colour = line.get_color()
-    known = np.isfinite(one.level) & np.isfinite(one.error)
-    ends = place[known], one.level[known], one.error[known]
+    known = np.isfinite(bands.level) & np.isfinite(bands.error)
+    ends = place[known], bands.level[known], bands.error[known]
     axes.errorbar(*ends, fmt="none", ecolor=colour, elinewidth=1.2, capsize=2.5)
-    boxed = np.isfinite(one.level) & np.isfinite(one.chance).all(axis=1)
-    low, high = one.chance[boxed].T
-    bottom = one.level[boxed] + low
+    boxed = np.isfinite(bands.level) & np.isfinite(bands.chance).all(axis=1)
+    low, high = bands.chance[boxed].T
+    bottom = bands.level[boxed] + low
     box = {"color": colour, "alpha": 0.16, "lw": 0}
     axes.bar(place[boxed], high - low, _BOX, bottom=bottom, **box)
 
@@ -216,11 +216,11 @@ def levels_figure(
     figure, axes = canvas(width, 5.0, 2, sharex=True, gridspec_kw={"height_ratios": (2, 1)})
     names, place = list(runs), np.arange(len(bands), dtype=float)
     first = runs[names[0]].level
-    for number, (name, one) in enumerate(runs.items()):
+    for number, (name, levels) in enumerate(runs.items()):
         shift = 0.5 * (number / max(len(names) - 1, 1) - 0.5)  # so that no mark hides another
-        marks(axes[0, 0], place + 0.5 * shift, one, label=name, **pen(number))
+        marks(axes[0, 0], place + 0.5 * shift, levels, label=name, **pen(number))
         if number:
-            change = one.level - first
+            change = levels.level - first
             axes[1, 0].plot(place, change, marker="o", ms=3, **pen(number))
     axes[0, 0].set_ylabel(shown_unit(unit))
     legend_above(axes[0, 0], names, width)
@@ -325,8 +325,8 @@ def _table(names: Sequence[str], groups: dict[str, list[Row]]) -> str:
     writer.writerow(["group", "quantity", "unit", *names])
     for rows in groups.values():
         for row in rows:
-            given = ["" if value is None else value for value in row.values]
-            writer.writerow([row.group, row.name, row.unit, *given])
+            cells = ["" if value is None else value for value in row.values]
+            writer.writerow([row.group, row.name, row.unit, *cells])
     return stream.getvalue()
 
 
@@ -383,15 +383,15 @@ def _figures(
     runs: Sequence[RunResults], names: Sequence[str], levels: Sequence[Row]
 ) -> list[Drawing]:
     """Charts of the third octaves that several runs have, of histories and of footprints."""
-    figures, every = [], [{one.name: one for one in band_levels(run)} for run in runs]
+    figures, every = [], [{level.name: level for level in band_levels(run)} for run in runs]
     for group in dict.fromkeys(row.group for row in levels if is_drawn(row.group)):
         rows = [row for row in levels if row.group == group]
         several = sum(any(row.values[k] is not None for row in rows) for k in range(len(runs))) > 1
         if len(rows) >= FEWEST_BANDS and several:  # fewer are in the table
             bands = [float(row.name.removesuffix(" Hz")) for row in rows]
             drawn = {
-                name: BandMarks.at(bands, found.get(group))
-                for name, found in zip(names, every, strict=True)
+                name: BandMarks.at(bands, levels.get(group))
+                for name, levels in zip(names, every, strict=True)
             }
             text = f"Third octaves: {group}.{marks_told(list(drawn.values()))}"
             chart = partial(levels_figure, bands, rows[0].unit, drawn)
@@ -418,11 +418,11 @@ def _figures(
 def marks_told(drawn: Sequence[BandMarks]) -> str:
     """Explanation of the marks that a chart has."""
     told = ""
-    if any(np.isfinite(one.error).any() for one in drawn):
+    if any(np.isfinite(mark.error).any() for mark in drawn):
         told += " Bars: estimated numerical error, unknown where there is none."
-    elif any(np.isfinite(one.level).any() for one in drawn):
+    elif any(np.isfinite(mark.level).any() for mark in drawn):
         told += " Their numerical error is unknown."
-    if any(np.isfinite(one.chance).any() for one in drawn):
+    if any(np.isfinite(mark.chance).any() for mark in drawn):
         told += " Boxes: chance of the stretch of road, 95 %, by the number of lines."
     return told
 

@@ -60,8 +60,8 @@ def envelope(x: NDArray, y: NDArray, bins: int = DRAWN) -> tuple[NDArray, NDArra
     whole = width * bins
     blocks = np.nan_to_num(y[:whole]).reshape(bins, width)
     ends = np.sort(np.stack((blocks.argmin(axis=1), blocks.argmax(axis=1)), -1), axis=1)
-    kept = np.append((ends + width * np.arange(bins)[:, None]).ravel(), np.arange(whole, len(y)))
-    return x[kept], y[kept]
+    order = np.append((ends + width * np.arange(bins)[:, None]).ravel(), np.arange(whole, len(y)))
+    return x[order], y[order]
 
 
 def peak_hold(frequency: NDArray, level: NDArray, bins: int = DRAWN) -> tuple[NDArray, NDArray]:
@@ -160,12 +160,14 @@ def forces(time: NDArray, contact: NDArray, axle: NDArray | None, active: NDArra
 def spectrum(frequency: NDArray, axle: NDArray, of: str = "axle force") -> str:
     """Amplitude spectrum (nf, 3) N of a force, named `of`, over frequency (nf) Hz."""
     figure, axes = line_canvas(WIDE, 3.4)
-    here, kept = axes[0, 0], frequency > 0
-    levels = decibels(axle[kept])
+    here, above_zero = axes[0, 0], frequency > 0
+    levels = decibels(axle[above_zero])
     for column, name in enumerate(COMPONENTS):
-        here.plot(*peak_hold(frequency[kept], levels[:, column]), color=COLOURS[column], label=name)
+        here.plot(
+            *peak_hold(frequency[above_zero], levels[:, column]), color=COLOURS[column], label=name
+        )
     here.set(xscale="log", xlabel="frequency in Hz", ylabel=f"{of} in dB re 1 N")
-    _over_frequency(here, frequency[kept])
+    _over_frequency(here, frequency[above_zero])
     _top_decibels(here, levels)
     here.legend(ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0))
     return encode(figure)
@@ -265,16 +267,16 @@ def driven_points(time: NDArray, force: NDArray | None, moved: NDArray, names: l
 def receptance(frequency: NDArray, pairs: Sequence[tuple[str, NDArray]]) -> str:
     """Magnitude (dB re 1 m/N) and phase (degrees) of named receptances (nf) m/N."""
     figure, axes = canvas(WIDE, 4.4, 2, sharex=True, gridspec_kw={"height_ratios": (2, 1)})
-    kept = frequency > 0
-    levels = decibels(np.stack([values[kept] for _, values in pairs]))
+    above_zero = frequency > 0
+    levels = decibels(np.stack([values[above_zero] for _, values in pairs]))
     for number, (name, values) in enumerate(pairs):
         colour = CYCLE[number % len(CYCLE)]
-        axes[0, 0].plot(frequency[kept], levels[number], color=colour, label=name)
-        axes[1, 0].plot(frequency[kept], np.angle(values[kept], deg=True), color=colour)
+        axes[0, 0].plot(frequency[above_zero], levels[number], color=colour, label=name)
+        axes[1, 0].plot(frequency[above_zero], np.angle(values[above_zero], deg=True), color=colour)
     axes[0, 0].set(xscale="log", ylabel="receptance in dB re 1 m/N")
     axes[0, 0].legend(ncols=4, loc="lower left", bbox_to_anchor=(0.0, 1.0))
     axes[1, 0].set(ylabel="phase in °", xlabel="frequency in Hz", yticks=(-180, -90, 0, 90, 180))
-    _over_frequency(axes[1, 0], frequency[kept])
+    _over_frequency(axes[1, 0], frequency[above_zero])
     _top_decibels(axes[0, 0], levels)
     return encode(figure)
 

@@ -221,12 +221,12 @@ def _run(steps: DeckHistory, unit: str) -> list[str]:
             f"# segments = {steps.segments}   # [tire]: of *SYMMETRIC MODEL GENERATION, which revolves by {steps.angle:g} degrees; "
             "absent: as many as the program takes"
         ]
-    given = steps.pressure is not None
+    has_pressure = steps.pressure is not None
     pressure = steps.pressure * of.stress if steps.pressure is not None else INFLATION
     rows += [
         "[static]",
         f"inflation = {pressure:.6g}".ljust(40)
-        + (" # Pa, of *DSLOAD" if given else " # Pa, not in the file"),
+        + (" # Pa, of *DSLOAD" if has_pressure else " # Pa, not in the file"),
     ]
     if steps.load is not None:
         rows.append(
@@ -293,10 +293,10 @@ def describe_road(path: Path, out: Path) -> str:
     ]
     if texture.depth is not None:
         lines.append(f"  mean profile depth {1e3 * texture.depth:.3g} mm (ISO 13473-1:2019)")
-    found = iso_class(texture)
-    if found is not None:
+    name = iso_class(texture)
+    if name is not None:
         lines.append(
-            f"  waves over {_LONG:g} m: G_d(0.1/m) = {found[1]:.3g} m3, class {found[0]} of ISO 8608"
+            f"  waves over {_LONG:g} m: G_d(0.1/m) = {name[1]:.3g} m3, class {name[0]} of ISO 8608"
         )
     for wave, level in list(zip(texture.wavelength, texture.level, strict=True))[
         :: max(len(texture.level) // 8, 1)
@@ -312,9 +312,11 @@ def describe_road(path: Path, out: Path) -> str:
     return "\n".join([*lines, "", *table])
 
 
-def _reading(one: ReadAs) -> str:
+def _reading(reading: ReadAs) -> str:
     """Lines on the quantities that were read of the file, with places and units."""
-    return f"{one.quantity}: {one.place}, {one.unit}" + (f", {one.remark}" if one.remark else "")
+    return f"{reading.quantity}: {reading.place}, {reading.unit}" + (
+        f", {reading.remark}" if reading.remark else ""
+    )
 
 
 def _read(path: Path) -> tuple[str, Any, list[str]]:

@@ -79,9 +79,11 @@ def band_levels(run: RunResults) -> Iterator[BandLevels]:
             yield _heard(f"{SOUND}{name}", "dB(A) re 20 uPa", band, level[k], error[k])
         if "sound/third_octave/intensity_level_a" in run:
             probes = run.attributes("sound")["probe_names"]
-            for name, one in zip(probes, run["sound/third_octave/intensity_level_a"], strict=True):
-                unknown = np.full_like(one, np.nan)
-                yield _heard(f"{INTENSITY}{name}", "dB(A) re 1 pW/m2", band, one, unknown)
+            for name, column in zip(
+                probes, run["sound/third_octave/intensity_level_a"], strict=True
+            ):
+                unknown = np.full_like(column, np.nan)
+                yield _heard(f"{INTENSITY}{name}", "dB(A) re 1 pW/m2", band, column, unknown)
         power = run["sound/power"]
         yield _heard(POWER, "dB re 1 pW", band, power, np.full_like(power, np.nan))
 

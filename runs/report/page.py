@@ -41,7 +41,7 @@ Fact = tuple[str, str]
 _MODES = 4
 _HEARD = 3  # microphones among the first figures
 _SPREAD = "error of the deviation of the"
-Given = Callable[[str, str], float | None]
+Indicator = Callable[[str, str], float | None]
 _KNOWN = 0.9  # least part of a total that lies in bands of known error
 
 SECTIONS: Mapping[str, Callable[[Results], Section]] = {
@@ -59,13 +59,13 @@ SECTIONS: Mapping[str, Callable[[Results], Section]] = {
 
 def answer(results: Results, stages: Mapping[str, Any]) -> list[Fact]:
     """Facts (what, value) from the result files and the summary's `stages`, as far as available."""
-    found: list[Fact] = []
+    facts: list[Fact] = []
     for part in (_heard, _standing, _rolling, _levels, _modes):
         try:
-            found += part(results, _Headlines(stages))
+            facts += part(results, _Headlines(stages))
         except (Absent, InputError, LookupError, ValueError):
             continue  # the file's own section reports the problem
-    return found
+    return facts
 
 
 class _Headlines:
@@ -82,24 +82,24 @@ class _Headlines:
         return float(value) if isinstance(value, int | float) else None
 
 
-def _standing(results: Results, given: Given) -> list[Fact]:
+def _standing(results: Results, indicator: Indicator) -> list[Fact]:
     """Load, deflection and footprint."""
     load, sunk, length, width = (
         float(results.attribute("static.h5", name) or 0.0)
         for name in ("load", "deflection", "footprint_length", "footprint_width")
     )
-    found: list[Fact] = []
+    facts: list[Fact] = []
     if load and results.optional("static.h5", "contact/force") is not None:
-        error = given("static", "estimated error of the load")
+        error = indicator("static", "estimated error of the load")
         known = f" ± {quantity(float(f'{error:.2g}'), '%')}" if error else ", error unknown"
-        found.append(("load at rest", quantity(load, "N") + known))
-        found.append(("deflection", quantity(sunk, "m")))
+        facts.append(("load at rest", quantity(load, "N") + known))
+        facts.append(("deflection", quantity(sunk, "m")))
     if length and width:
-        found.append(("footprint at rest", f"{digits(1e3 * length)} × {digits(1e3 * width)} mm"))
-    return found
+        facts.append(("footprint at rest", f"{digits(1e3 * length)} × {digits(1e3 * width)} mm"))
+    return facts
 
 
-def _rolling(results: Results, given: Given) -> list[Fact]:
+def _rolling(results: Results, indicator: Indicator) -> list[Fact]:
     """The vertical contact force while rolling, after the run-in as in the spectra.
 
     Errors are estimated on part of that time: that of the deviation as a share of it there.
@@ -112,9 +112,9 @@ def _rolling(results: Results, given: Given) -> list[Fact]:
     end = _of_spectra(results, "limit")
     varies = float(deviation(force[:, None], step, float(end or np.inf))[0])
     error, spread = (
-        given("accuracy", f"{what} contact force") for what in ("error of the mean", _SPREAD)
+        indicator("accuracy", f"{what} contact force") for what in ("error of the mean", _SPREAD)
     )
-    there = given("accuracy", "deviation of the contact force in the window of the error bars")
+    there = indicator("accuracy", "deviation of the contact force in the window of the error bars")
     off = spread / there * varies if spread and there else spread
     after = f" from {quantity(start * step, 's')} on" if start else ""
     what = "its standard deviation" + (f" to {quantity(end, 'Hz')}" if end else "")
@@ -124,13 +124,13 @@ def _rolling(results: Results, given: Given) -> list[Fact]:
             bounded(float(force.mean()), error, "N") + ("" if error else ", error unknown"),
         ),
         (what, bounded(varies, off, "N") + ("" if off else ", error unknown")),
-        *_large(given),
+        *_large(indicator),
     ]
 
 
-def _large(given: Given) -> list[Fact]:
+def _large(indicator: Indicator) -> list[Fact]:
     """Whether motions were large, and what of them was outside the training."""
-    outside = given("contact", "motion outside the training at most")
+    outside = indicator("contact", "motion outside the training at most")
     if outside is None:
         return []
     return [
@@ -146,7 +146,7 @@ def _of_spectra(results: Results, name: str) -> Any:
         return None
 
 
-def _levels(results: Results, given: Given) -> list[Fact]:
+def _levels(results: Results, indicator: Indicator) -> list[Fact]:
     """Levels of the vertical forces over all lines up to the frequency limit, and their errors."""
     end = results.attribute("spectra.h5", "limit")
     levels = []
@@ -158,11 +158,11 @@ def _levels(results: Results, given: Given) -> list[Fact]:
         ("contact_level", "contact force", "contact force"),
     ):
         level = results.optional("spectra.h5", f"third_octave/{key}")
-        total = given("spectra", f"level of the vertical {name}")
+        total = indicator("spectra", f"level of the vertical {name}")
         if total is not None:
             error = results.optional("spectra.h5", f"third_octave/{key}_error")
             text = f"{total:.1f} dB re 1 N, error {about(_error_of(total, level, error))}"
-            weighted = given("spectra", f"A-weighted level of the vertical {name}")
+            weighted = indicator("spectra", f"A-weighted level of the vertical {name}")
             text += f"; {weighted:.1f} dB(A) re 1 N" if weighted is not None else ""
             levels.append((f"{what} z{upto}", text.replace("-", "−")))
         elif level is not None and level[:, 2].max(initial=-np.inf) <= SILENT:
@@ -182,7 +182,7 @@ def _error_of(total: float, level: np.ndarray | None, error: np.ndarray | None) 
     return float((power * off)[known].sum() / held)
 
 
-def _heard(results: Results, given: Given) -> list[Fact]:
+def _heard(results: Results, indicator: Indicator) -> list[Fact]:
     """A-weighted levels at the microphones, in the band of the run."""
     names = results.dataset("sound.h5", "microphones").attrs["names"]
     level = results.array("sound.h5", "total/level_a")
@@ -198,12 +198,12 @@ def _heard(results: Results, given: Given) -> list[Fact]:
     ]
 
 
-def _modes(results: Results, _: Given) -> list[Fact]:
+def _modes(results: Results, _: Indicator) -> list[Fact]:
     """The lowest undamped modes of the non-rotating tire."""
     lowest = results.array("modes.h5", "frequency")[:_MODES]
     name = results.optional("modes.h5", "name")
-    names = [""] * len(lowest) if name is None else [f"{one} " for one in name[:_MODES]]
-    told = ", ".join(f"{one}{value:.4g} Hz" for one, value in zip(names, lowest, strict=True))
+    names = [""] * len(lowest) if name is None else [f"{mode} " for mode in name[:_MODES]]
+    told = ", ".join(f"{mode}{value:.4g} Hz" for mode, value in zip(names, lowest, strict=True))
     return [("lowest modes, undamped", told)] if len(lowest) else []
 
 
@@ -298,9 +298,9 @@ def remarks(directory: Path) -> str | None:
         return unusual(results)
 
 
-def in_script(given: Mapping) -> str:
+def in_script(data: Mapping) -> str:
     """JSON that is safe inside a <script> element."""
-    return json.dumps(given, separators=(",", ":")).replace("<", "\\u003c")
+    return json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
 
 
 def read_summary(path: Path, problems: list[str]) -> dict:
@@ -440,12 +440,12 @@ def parameters(scene: Mapping) -> list[tuple[str, list[tuple[str, str]]]]:
     if built_of(scene):
         tire = {k: v for k, v in scene["tire"].items() if k not in ("region", "cords")}
         scene = {**scene, "tire": tire}
-    found: dict[tuple, list[tuple[str, str]]] = {}
-    for one in scene_keys(scene):
-        rows = found.setdefault(one.table, [])
-        unit = "" if isinstance(one.value, str) else one.unit  # "auto" has none
-        rows.append((one.name.replace("_", " "), quantity(one.value, unit)))
-    return [(_title(table), rows) for table, rows in found.items() if table]
+    groups: dict[tuple, list[tuple[str, str]]] = {}
+    for key in scene_keys(scene):
+        rows = groups.setdefault(key.table, [])
+        unit = "" if isinstance(key.value, str) else key.unit  # "auto" has none
+        rows.append((key.name.replace("_", " "), quantity(key.value, unit)))
+    return [(_title(table), rows) for table, rows in groups.items() if table]
 
 
 def _title(table: tuple[str | int, ...]) -> str:

@@ -152,8 +152,8 @@ class Results:
 
     def array(self, name: str, path: str) -> NDArray:
         """Numbers, or texts."""
-        found = self.dataset(name, path)
-        return found.asstr()[()] if h5py.check_string_dtype(found.dtype) else found[()]
+        data = self.dataset(name, path)
+        return data.asstr()[()] if h5py.check_string_dtype(data.dtype) else data[()]
 
     def optional(self, name: str, path: str) -> NDArray | None:
         try:

@@ -29,10 +29,10 @@ _GROUNDED = (
 
 def unusual(results: Results) -> str | None:
     """One sentence with all unusual figures; None if there are none."""
-    found = [text for check in _CHECKS for text in _asked(check, results)]
-    if not found:
+    remarks = [text for check in _CHECKS for text in _asked(check, results)]
+    if not remarks:
         return None
-    return "outside the usual range of tires (in brackets): " + "; ".join(found)
+    return "outside the usual range of tires (in brackets): " + "; ".join(remarks)
 
 
 def _asked(check: Callable[[Results], Iterator[str]], results: Results) -> list[str]:
@@ -151,11 +151,11 @@ def _damping(results: Results) -> Iterator[str]:
     rigid = int(_number(results, "modes.h5", "rigid_modes"))
     lowest = slice(rigid, rigid + _LOWEST)
     omega = 2 * np.pi * results.array("modes.h5", "frequency")[lowest]
-    given = results.scene.get("damping")
-    if given is None:
+    table = results.scene.get("damping")
+    if table is None:
         parts = {"loss_factor": results.array("modes.h5", "loss_factor")[lowest] / 2}
     else:
-        mass, stiffness = given.get("mass", 0.0), given.get("stiffness", 0.0)
+        mass, stiffness = table.get("mass", 0.0), table.get("stiffness", 0.0)
         parts = {"[damping] mass": mass / (2 * omega), "[damping] stiffness": stiffness * omega / 2}
     share = np.sum(list(parts.values()), axis=0)
     if len(omega) and share.max() > 0.5:

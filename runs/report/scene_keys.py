@@ -43,7 +43,7 @@ def scene_keys(
         if isinstance(value, Mapping):
             below.append((value, (*table, name), of, mine))
         elif isinstance(value, list) and value and isinstance(value[0], Mapping):
-            below += [(one, (*table, name, number), of, "") for number, one in enumerate(value)]
+            below += [(item, (*table, name, number), of, "") for number, item in enumerate(value)]
         else:
             yield SceneKey(table, name, value, mine)
     for one in below:

@@ -53,13 +53,15 @@ def once(draw: Callable[P, str]) -> Callable[P, str]:
 def _digest(*given: Any) -> bytes:
     """Hash of arrays by their bytes, of sequences item by item, of anything else by its repr."""
     digest = hashlib.sha256()
-    for one in given:
-        if isinstance(one, np.ndarray):
-            digest.update(f"{one.dtype}{one.shape}".encode() + np.ascontiguousarray(one).tobytes())
-        elif isinstance(one, list | tuple):
-            digest.update(f"{len(one)}".encode() + _digest(*one))
+    for value in given:
+        if isinstance(value, np.ndarray):
+            digest.update(
+                f"{value.dtype}{value.shape}".encode() + np.ascontiguousarray(value).tobytes()
+            )
+        elif isinstance(value, list | tuple):
+            digest.update(f"{len(value)}".encode() + _digest(*value))
         else:
-            digest.update(repr(one).encode())
+            digest.update(repr(value).encode())
         digest.update(b"\0")
     return digest.digest()
 

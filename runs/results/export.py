@@ -85,9 +85,9 @@ def frequency_responses(file: h5py.File, directions: Sequence[Sequence[float]]) 
         for i, j in np.ndindex(values.shape[1:]):
             ends = (i + 1, ways[i]), (j + 1, ways[j])
             parts += dataset(frequency, values[:, i, j], DISPLACEMENT, *ends)
-    found = file.get("transmissibility/momentum")
-    if found is not None:
-        frequency, values = file["transmissibility/frequency"][()], found[()]
+    ratio = file.get("transmissibility/momentum")
+    if ratio is not None:
+        frequency, values = file["transmissibility/frequency"][()], ratio[()]
         for k, j in np.ndindex(values.shape[1:]):
             parts += dataset(frequency, values[:, k, j], REACTION, (AXLE, k + 1), (j + 1, ways[j]))
     return "".join(f"{line}\n" for line in parts)

@@ -60,7 +60,7 @@ def describe(file: Path, as_json: bool = False) -> str:
 
 def _candidates(folder: Path) -> str:
     """Files of a folder that can be given instead of it."""
-    candidates = [str(one) for one in sorted(folder.glob("*.h5"))]
+    candidates = [str(file) for file in sorted(folder.glob("*.h5"))]
     if not candidates:
         return "it holds no .h5 file; give a result file of a run, such as static.h5"
     return (
@@ -174,19 +174,19 @@ def _scene(text: str) -> str:
 
 
 def _datasets(file: h5py.File, name_of_file: str) -> Iterator[str]:
-    found: list[tuple[str, ...]] = []
+    listed: list[tuple[str, ...]] = []
 
     def visit(name: str, item: h5py.Group | h5py.Dataset) -> None:
         if isinstance(item, h5py.Dataset):
             cells = _shape(item), _kind(item), _unit(item), _stored(item)
-            found.append((name, *cells, _meaning(name_of_file, name)))
+            listed.append((name, *cells, _meaning(name_of_file, name)))
 
     file.visititems(visit)
     yield ""
-    if not found:
+    if not listed:
         yield "no datasets"
         return
-    rows = [("dataset", "shape", "type", "unit", "stored", "meaning"), *found]
+    rows = [("dataset", "shape", "type", "unit", "stored", "meaning"), *listed]
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     for row in rows:
         cells = (f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True))

@@ -92,16 +92,16 @@ class RunResults(Mapping[str, NDArray[Any]]):
     def attributes(self, file: str) -> dict[str, Any]:
         """The attributes of a file, e.g. "static" for `static.h5`: figures and provenance."""
         with self._opened(file) as opened:
-            found = dict(opened.attrs)
-        return {key: v.item() if isinstance(v, np.generic) else v for key, v in found.items()}
+            attributes = dict(opened.attrs)
+        return {key: v.item() if isinstance(v, np.generic) else v for key, v in attributes.items()}
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         self._known(name)
         file, _, path = name.partition("/")
         with self._opened(file) as opened:
-            found = opened[path]
-            texts = h5py.check_string_dtype(found.dtype) is not None
-            return np.asarray(found.asstr()[()] if texts else found[()])
+            item = opened[path]
+            texts = h5py.check_string_dtype(item.dtype) is not None
+            return np.asarray(item.asstr()[()] if texts else item[()])
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._listed())
@@ -152,12 +152,12 @@ class RunResults(Mapping[str, NDArray[Any]]):
     def _listed(self) -> dict[str, str]:
         """The unit of every dataset, by name."""
         if self._units is None:
-            found: dict[str, str] = {}
+            units: dict[str, str] = {}
             paths = sorted(self.directory.glob("*.h5"))
             for path in (path for path in paths if path.name not in self.left_out):
                 with self._opened(path.stem) as opened:
-                    found |= {f"{path.stem}/{name}": unit for name, unit in _units(opened)}
-            self._units = found
+                    units |= {f"{path.stem}/{name}": unit for name, unit in _units(opened)}
+            self._units = units
         return self._units
 
     def _counted(self, stem: str) -> None:

@@ -80,12 +80,12 @@ def written(
         *(f"{key:24s} = '{unit}'" for key, unit in _UNITS),
     ]
     for name, rows in sections.items():
-        found = list(rows)
-        if found:
+        copied = list(rows)
+        if copied:
             lines.append(f"[{name}]")
             lines += [
                 f"{key:24s} = {_shown(value)}".ljust(48) + f" $ {text}"
-                for key, value, text in found
+                for key, value, text in copied
             ]
     return "\n".join(lines) + "\n"
 
@@ -200,17 +200,17 @@ def _rolling(share: np.ndarray, rolling: np.ndarray, radius: float, unit: float)
         offset, b, d, e = at
         return offset + d * np.arctan(b * f) + e * f - sunk
 
-    found = least_squares(off, [0.0, 8.0, 0.25, 0.05]).x
+    coefficients = least_squares(off, [0.0, 8.0, 0.25, 0.05]).x
     text = "-, effective rolling radius over load"
     return [
         (
             "Q_RE0",
-            float(1 - found[0] * unit / radius),
+            float(1 - coefficients[0] * unit / radius),
             "-, free rolling radius over UNLOADED_RADIUS",
         ),
-        ("BREFF", float(found[1]), text),
-        ("DREFF", float(found[2]), text),
-        ("FREFF", float(found[3]), text),
+        ("BREFF", float(coefficients[1]), text),
+        ("DREFF", float(coefficients[2]), text),
+        ("FREFF", float(coefficients[3]), text),
     ]
 
 
@@ -249,17 +249,17 @@ class _AsRun:
         self._mesh = scene.tire.ring().section
         self.cords = shape.cords(scene.tire)
         layers = shape.in_layers(scene.tire)
-        compounds = {name: one.at(scene.temperature) for name, one in layers.items()}
+        compounds = {name: layer.at(scene.temperature) for name, layer in layers.items()}
         self.compounds = {
             name: {
-                "youngs_modulus": one.law.youngs,
-                "poisson_ratio": one.law.poisson,
-                "density": one.density,
-                "dynamic": one.dynamic,
-                "loss_factor": one.loss_factor,
-                "spectrum": one.spectrum,
+                "youngs_modulus": compound.law.youngs,
+                "poisson_ratio": compound.law.poisson,
+                "density": compound.density,
+                "dynamic": compound.dynamic,
+                "loss_factor": compound.loss_factor,
+                "spectrum": compound.spectrum,
             }
-            for name, one in compounds.items()
+            for name, compound in compounds.items()
         }
 
     def section(self, elements: int, order: int) -> SectionMesh:

@@ -1,6 +1,6 @@
 """Choices of what a scene leaves open, in one list, `CHOICES`: by its other tables, in this order.
 
-A choice is a function of the scene so far and of what was `Given`. Those that depend on each other
+A choice is a function of the scene so far and of what was `SceneFile`. Those that depend on each other
 stand in the order in which they do: the mesh before the number of modes that it has.
 """
 
@@ -46,7 +46,7 @@ TREAD_RUBBER = (
 
 
 @dataclass(frozen=True)
-class Given:
+class SceneFile:
     """The `raw` tables of a scene's file, the last stage `until`, its `source` and who is told (`say`)."""
 
     raw: dict[str, Any]
@@ -59,7 +59,7 @@ class Given:
         return keys if isinstance(keys := self.raw.get(table), dict) else {}
 
 
-def air(scene: Scene, given: Given) -> Scene:
+def air(scene: Scene, file: SceneFile) -> Scene:
     """Air in the cavity by default, for every section but the torus of the thesis."""
     tire = scene.tire
     if not tire.shape.air or tire.cavity is not None:
@@ -67,7 +67,7 @@ def air(scene: Scene, given: Given) -> Scene:
     return replace(scene, tire=replace(tire, cavity=CavityTable()))
 
 
-def friction(scene: Scene, given: Given) -> Scene:
+def friction(scene: Scene, file: SceneFile) -> Scene:
     """The friction of a dry road where the tread shears, unless the static state has its own."""
     assert scene.contact is not None
     if scene.static.friction is not None:
@@ -75,9 +75,9 @@ def friction(scene: Scene, given: Given) -> Scene:
     return replace(scene, contact=scene.contact.by_default())
 
 
-def by_band(scene: Scene, given: Given) -> Scene:
+def by_band(scene: Scene, file: SceneFile) -> Scene:
     """Choose by accuracy.up_to what a scene leaves open: mesh, modes, step. Points follow later (points)."""
-    tables = {name: given.keys(name) for name in ("modal", "rotation", "time", "tire")}
+    tables = {name: file.keys(name) for name in ("modal", "rotation", "time", "tire")}
     top, chosen = BAND_EDGE * scene.accuracy.up_to, []
     if not {"count", "up_to"} & set(tables["modal"]):
         highest = 10.0 * math.ceil(top / USABLE / 10)
@@ -103,29 +103,29 @@ def by_band(scene: Scene, given: Given) -> Scene:
             "tire.segments = 24 and tire.elements_arc = 16, which carry waves to that frequency"
         )
     if chosen:
-        given.say(f"accuracy.up_to = {scene.accuracy.up_to:g} Hz chooses " + "; ".join(chosen))
+        file.say(f"accuracy.up_to = {scene.accuracy.up_to:g} Hz chooses " + "; ".join(chosen))
     return scene
 
 
-def has_band(scene: Scene, given: Given) -> bool:
+def has_band(scene: Scene, file: SceneFile) -> bool:
     """Whether accuracy.up_to chooses what the scene leaves open; a search chooses for itself."""
     method = scene.rotation.method if scene.rotation else "projected"
-    stated = "up_to" in given.keys("accuracy") and method == "projected"
+    stated = "up_to" in file.keys("accuracy") and method == "projected"
     return scene.in_contact and stated and not scene.accuracy.searches
 
 
-def mesh(scene: Scene, given: Given) -> Scene:
+def mesh(scene: Scene, file: SceneFile) -> Scene:
     """Set the mesh keys that are open; on a road, elements are smaller at the footprint."""
     return replace(scene, tire=scene.tire.with_elements(scene.static.on_road))
 
 
-def points(scene: Scene, given: Given) -> Scene:
+def points(scene: Scene, file: SceneFile) -> Scene:
     """`ON_A_WAVE` contact points on the shortest wave, where that is closer than `CLOSE`.
 
     `contact.points = "auto"` else (contact.patch).
     """
     contact, rotation = scene.contact, scene.rotation
-    if "points" in given.keys("contact") or contact is None or contact.on_nodes:
+    if "points" in file.keys("contact") or contact is None or contact.on_nodes:
         return scene
     if rotation is None or not rotation.speed:
         return scene
@@ -134,20 +134,20 @@ def points(scene: Scene, given: Given) -> Scene:
     if wave / ON_A_WAVE >= CLOSE:
         return scene
     pitch = _unheard(wave / ON_A_WAVE, speed, scene)
-    given.say(
+    file.say(
         f"accuracy.up_to chooses contact.points = {pitch:g} m, {wave / pitch:.2g} to the shortest wave"
     )
     return replace(scene, contact=replace(contact, points=Pitch(pitch, pitch)))
 
 
-def _unheard(wanted: float, speed: float, scene: Scene) -> float:
-    """The pitch (m), two digits of it, nearest to the `wanted` one whose passing is not heard.
+def _unheard(target: float, speed: float, scene: Scene) -> float:
+    """The pitch (m), two digits of it, nearest to the `target` whose passing is not heard.
 
     Points pass at speed / pitch; that and its harmonics, sampled by the steps, must not return inside
     the band, neither in the run nor in its companions with twice the step and twice the pitch.
     """
-    digit = second_digit(wanted)
-    first, top = math.floor(wanted / digit), UNHEARD * BAND_EDGE * scene.accuracy.up_to
+    digit = second_digit(target)
+    first, top = math.floor(target / digit), UNHEARD * BAND_EDGE * scene.accuracy.up_to
     steps = scene.time.step if scene.time else "auto"
     if isinstance(steps, str):
         return round(first * digit, 9)
@@ -162,12 +162,12 @@ def _unheard(wanted: float, speed: float, scene: Scene) -> float:
     return round(count * digit, 9)
 
 
-def tread_rubber(scene: Scene, given: Given) -> Scene:
+def tread_rubber(scene: Scene, file: SceneFile) -> Scene:
     """Rubber of the contact of a radial tire where the scene leaves it open: as much stiffer as its tread."""
     contact = scene.contact
     assert contact is not None
     stiffer = scene.tire.shape.tread_over_own(scene.tire, scene.temperature)
-    if stiffer is None or "youngs_modulus" in given.keys("contact"):
+    if stiffer is None or "youngs_modulus" in file.keys("contact"):
         return scene
     if not isinstance(contact.law, ElasticTread):
         return scene
@@ -175,16 +175,16 @@ def tread_rubber(scene: Scene, given: Given) -> Scene:
     times = (
         f", {stiffer:.4g} times that of a usual tread as the tire's own is" if stiffer != 1 else ""
     )
-    given.say(f"contact.youngs_modulus = {modulus:g} Pa, of tread rubber{times}")
+    file.say(f"contact.youngs_modulus = {modulus:g} Pa, of tread rubber{times}")
     return replace(
         scene, contact=replace(contact, law=replace(contact.law, youngs_modulus=modulus))
     )
 
 
-def warmth(scene: Scene, given: Given) -> Scene:
+def warmth(scene: Scene, file: SceneFile) -> Scene:
     """Say what another temperature than that of the compounds makes of pressure and moduli."""
     if scene.temperature != REFERENCE:
-        given.say(
+        file.say(
             f"temperature = {scene.temperature:g} °C: {scene.static.inflation / 1e3:.4g} kPa at {REFERENCE:g} °C are "
             f"{scene.inflation / 1e3:.4g} kPa; rubber has at f the moduli that it has there at "
             f"{wlf(scene.temperature):.3g} f"
@@ -192,7 +192,7 @@ def warmth(scene: Scene, given: Given) -> Scene:
     return scene
 
 
-def wheel_speed(scene: Scene, given: Given) -> Scene:
+def wheel_speed(scene: Scene, file: SceneFile) -> Scene:
     """Set the wheel's speed for a travel speed until the static state gives its rolling radius."""
     rotation = scene.rotation
     assert rotation is not None
@@ -204,29 +204,31 @@ def wheel_speed(scene: Scene, given: Given) -> Scene:
     return replace(scene, rotation=replace(rotation, speed=speed))
 
 
-def damping(scene: Scene, given: Given) -> Scene:
+def damping(scene: Scene, file: SceneFile) -> Scene:
     """Set the default proportional damping if neither it nor a compound's loss factor is given."""
     if scene.damping is not None or scene.tire.shape.has_losses(scene.tire):
         return scene
     return replace(scene, damping=DampingTable())
 
 
-def flat_road(scene: Scene, given: Given) -> Scene:
+def flat_road(scene: Scene, file: SceneFile) -> Scene:
     """Set a flat road where there is contact with none given."""
     if scene.road is not None:
         return scene
-    given.say("no [road]: it is flat")
+    file.say("no [road]: it is flat")
     return replace(scene, road=RoadTable())
 
 
-def outputs(scene: Scene, given: Given) -> Scene:
+def outputs(scene: Scene, file: SceneFile) -> Scene:
     """Leave out what is asked of driven points where there are none."""
-    kept = tuple(one for one in scene.output.kinds if scene.force or one[1].of != "points")
-    if len(kept) == len(scene.output.kinds):
+    kinds = tuple(
+        output for output in scene.output.kinds if scene.force or output[1].of != "points"
+    )
+    if len(kinds) == len(scene.output.kinds):
         return scene
-    lost = [f"output.{name}" for name, kind in scene.output.kinds if (name, kind) not in kept]
-    given.say(f"no [[force]], hence no driven points: {', '.join(lost)} left out")
-    return replace(scene, output=replace(scene.output, kinds=kept))
+    lost = [f"output.{name}" for name, kind in scene.output.kinds if (name, kind) not in kinds]
+    file.say(f"no [[force]], hence no driven points: {', '.join(lost)} left out")
+    return replace(scene, output=replace(scene.output, kinds=kinds))
 
 
 def with_modal(scene: Scene, until: str | None) -> Scene:
@@ -237,7 +239,7 @@ def with_modal(scene: Scene, until: str | None) -> Scene:
     return scene
 
 
-def count_of_modes(scene: Scene, given: Given) -> Scene:
+def count_of_modes(scene: Scene, file: SceneFile) -> Scene:
     """Fit the default number of modes to the mesh; note a given one that the mesh does not have.
 
     A given number is judged only if the modes will be computed.
@@ -249,24 +251,24 @@ def count_of_modes(scene: Scene, given: Given) -> Scene:
     count, free = modal.count, scene.tire.free_unknowns()
     if count < free:
         return scene
-    if "count" not in given.keys("modal"):
-        given.say(
+    if "count" not in file.keys("modal"):
+        file.say(
             f"modal.count is {free - 1}, all the modes that the mesh has, not {count} as by default"
         )
         return replace(scene, modal=replace(modal, count=free - 1))
-    if "modes" not in skipped(scene, given.until):
+    if "modes" not in skipped(scene, file.until):
         text = f"= {count} must be less than the {free} free unknowns of the mesh"
-        given.source.add(("modal", "count"), text)
+        file.source.add(("modal", "count"), text)
     return scene
 
 
 class Choice(NamedTuple):
     """A choice for scenes that have the table `of` and for which `where` holds; left out where a table it is made `by` is wrong."""
 
-    make: Callable[[Scene, Given], Scene]
+    make: Callable[[Scene, SceneFile], Scene]
     by: frozenset[str] = frozenset()
     of: str = "tire"
-    where: Callable[[Scene, Given], bool] | None = None
+    where: Callable[[Scene, SceneFile], bool] | None = None
 
 
 CHOICES = (
@@ -281,17 +283,17 @@ CHOICES = (
     Choice(points, TIRE, where=has_band),
     Choice(flat_road, of="contact"),
     Choice(outputs),
-    Choice(lambda scene, given: with_modal(scene, given.until)),
+    Choice(lambda scene, file: with_modal(scene, file.until)),
     Choice(count_of_modes, MODES, of="modal"),
 )
 
 
-def chosen(scene: Scene, given: Given) -> Scene:
+def chosen(scene: Scene, file: SceneFile) -> Scene:
     """The scene with everything chosen that it leaves open."""
     for choice in CHOICES:
         concerned = getattr(scene, choice.of) is not None and (
-            choice.where is None or choice.where(scene, given)
+            choice.where is None or choice.where(scene, file)
         )
-        if concerned and not choice.by & given.source.broken():
-            scene = choice.make(scene, given)
+        if concerned and not choice.by & file.source.broken():
+            scene = choice.make(scene, file)
     return scene

@@ -42,8 +42,8 @@ def _of_road(scene: Scene) -> list[Row]:
     name = " > ".join(file.name for file in scene.road.surface.files)
     road = made(scene.road.surface)
     rows = [
-        (name, one.quantity, one.place, one.unit, one.remark)
-        for one in getattr(road, "readings", ())
+        (name, reading.quantity, reading.place, reading.unit, reading.remark)
+        for reading in getattr(road, "readings", ())
     ]
     return [*rows, *((name, "remark", "", "", note) for note in getattr(road, "notes", ()))]
 

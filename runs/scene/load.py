@@ -20,7 +20,7 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Key, ParameterError, described
 from tireroad.runs.files.names import scene_name
 from tireroad.runs.scene import rules
-from tireroad.runs.scene.choices import Given, chosen
+from tireroad.runs.scene.choices import SceneFile, chosen
 from tireroad.runs.scene.parts import with_parts
 from tireroad.runs.scene.plan import meets_road
 from tireroad.runs.scene.resolved import literal
@@ -122,7 +122,7 @@ def drop_unused(
     if not isinstance(raw, dict):
         return
     for selector, kind, unused in _selected(of, raw):
-        lost = [one for one in unused if one in raw and not _given((*path, one), changed)]
+        lost = [name for name in unused if name in raw and not _given((*path, name), changed)]
         if lost and (*path, selector) in changed:
             for name in lost:
                 del raw[name]
@@ -161,7 +161,10 @@ def _selected(of: type, raw: dict[str, Any]) -> Iterator[tuple[str, str, list[st
 
 def _given(path: Path_, changed: Set[Path_]) -> bool:
     """Whether --set gave a key, a part of it, or the table that holds it."""
-    return any(path[: len(one)] == one or one[: len(path)] == path for one in changed)
+    return any(
+        path[: len(path_given)] == path_given or path_given[: len(path)] == path
+        for path_given in changed
+    )
 
 
 def by_section(raw: dict[str, Any]) -> None:
@@ -176,14 +179,14 @@ def by_section(raw: dict[str, Any]) -> None:
         contact.setdefault("tread", SECTIONS[kind].tread_law)
 
 
-def with_merged(scene: Scene, given: Given) -> Scene:
+def with_merged(scene: Scene, file: SceneFile) -> Scene:
     """Merge the stated compounds and cords into those of the tire, once [tire] is found right."""
-    source = given.source
+    source = file.source
     if "tire" in source.broken():
         return scene
     check_series(scene.tire, source)
     scene.tire.shape.check(scene.tire, source)
-    tire = given.keys("tire")
+    tire = file.keys("tire")
     stated = scene.tire.shape.built_in or {"region", "cords"} & tire.keys()
     if "tire" in source.broken() or not stated:
         return scene
@@ -191,7 +194,7 @@ def with_merged(scene: Scene, given: Given) -> Scene:
     def read(merged: dict[str, Any]) -> TireTable:
         return _table(TireTable, merged, ("tire",), source)
 
-    return replace(scene, tire=with_parts(scene.tire, tire, read, source, given.say))
+    return replace(scene, tire=with_parts(scene.tire, tire, read, source, file.say))
 
 
 def load(
@@ -226,8 +229,8 @@ def load(
         source.add(
             ("name",), f"must be letters, digits, '.', '_', '-', not {described(scene.name)}"
         )
-    given = Given(raw, until, source, say)
-    scene = chosen(with_merged(scene, given), given)
+    file = SceneFile(raw, until, source, say)
+    scene = chosen(with_merged(scene, file), file)
     rules.check(scene, raw, source)
     source.refuse()
     return scene
@@ -266,7 +269,7 @@ def _table(of: type, raw: Any, path: tuple[str, ...], source: Source) -> Any:
 
 def _no_table(path: tuple[str, ...], raw: Any) -> str:
     """Description of a value that must not be a table."""
-    if isinstance(raw, list) and raw and all(isinstance(one, dict) for one in raw):
+    if isinstance(raw, list) and raw and all(isinstance(item, dict) for item in raw):
         header = ".".join(part for part in path if not part.isdigit())
         return f"must be written [{header}] in the scene, and once"
     return f"must be a table, not {described(raw)}"
@@ -331,7 +334,7 @@ def _nested(part: Table, raw: Any, path: tuple[str, ...], source: Source) -> Any
     if not isinstance(raw, list):
         source.add(path, f"must be written [[{'.'.join(path)}]] in the scene, one for each")
         return ()
-    return tuple(_table(part.of, one, (*path, str(i)), source) for i, one in enumerate(raw))
+    return tuple(_table(part.of, item, (*path, str(i)), source) for i, item in enumerate(raw))
 
 
 def _key(key: Key, raw: Any, path: tuple[str, ...], source: Source) -> Any:
@@ -355,15 +358,15 @@ def _file(name: str, path: tuple[str, ...], source: Source) -> Any:
         given = Path(name).expanduser()
         candidates = [(folder / given).resolve() for folder in folders]
         file = next((candidate for candidate in candidates if candidate.is_file()), candidates[0])
-        found, why = file.is_file(), ""
-        if not found:
+        is_file, why = file.is_file(), ""
+        if not is_file:
             file.stat()  # from Python 3.14 on is_file() does not raise for a name that is too long
     except (FileNotFoundError, NotADirectoryError):
-        found, why = False, ""
+        is_file, why = False, ""
     except (OSError, RuntimeError) as error:  # not a valid file name, or no such user
         cut = name if len(name) <= 60 else f"{name[:60]}…"
-        found, file, why = False, Path(cut), f" ({getattr(error, 'strerror', error)})"
-    if not found and path not in source.unread:
+        is_file, file, why = False, Path(cut), f" ({getattr(error, 'strerror', error)})"
+    if not is_file and path not in source.unread:
         source.add(path, f"names no file: {file}{why}")
         return _WRONG
     return str(file)
@@ -371,13 +374,13 @@ def _file(name: str, path: tuple[str, ...], source: Source) -> Any:
 
 def _everywhere(of: type, path: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
     """The paths of all keys and tables below dataclass `of`."""
-    found = []
+    paths = []
     for name, item in every_field(of).items():
-        found.append((*path, name))
+        paths.append((*path, name))
         part = table_of(item)
         if part:
-            found += _everywhere(part.of, (*path, name))
-    return found
+            paths += _everywhere(part.of, (*path, name))
+    return paths
 
 
 def _unknown(of: type, path: tuple[str, ...], name: str, values: dict, source: Source) -> None:
@@ -402,7 +405,7 @@ def _unknown(of: type, path: tuple[str, ...], name: str, values: dict, source: S
     if near:
         hint = f"did you mean {'.'.join((*path, near[0]))}?"
     else:
-        elsewhere = [found for found in _everywhere(Scene) if found[-1] == name]
+        elsewhere = [place for place in _everywhere(Scene) if place[-1] == name]
         if elsewhere:
             hint = f"did you mean {'.'.join(elsewhere[0])}? {hint}"
     source.add_as_is((*path, name), f"unknown key {shortened((*path, name))}; {hint}")

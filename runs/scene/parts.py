@@ -77,18 +77,18 @@ def with_parts(
             say(f"tire.scale: {change}")
     if source.broken() & {"tire"}:
         return tire
-    found = read(merged)
+    table = read(merged)
     if not built.whole:
-        return found
+        return table
     if source.broken() & {"tire"}:
-        return found
-    regions = {region.name: region for region in found.region}
-    lines = {line.name: line for line in found.cords}
+        return table
+    regions = {region.name: region for region in table.region}
+    lines = {line.name: line for line in table.cords}
     return replace(
-        found,
+        table,
         region=tuple(regions[name] for name in built.compounds),
         cords=tuple(replace(lines[name], depth=None, arc=None) for name in built.cords),
-        shape=found.shape.as_scaled(),
+        shape=table.shape.as_scaled(),
     )
 
 
@@ -101,8 +101,8 @@ def scaled(tire: TireTable, scale: Mapping[str, float]) -> TireTable:
             pass
     if source.problems:
         raise InputError(source.problems[0][1].removeprefix("tire: "))
-    regions = (_region_table(one) for one in merged["region"])
-    cords = (CordsTable(**one) for one in merged["cords"])
+    regions = (_region_table(region) for region in merged["region"])
+    cords = (CordsTable(**line) for line in merged["cords"])
     return replace(tire, region=tuple(regions), cords=tuple(cords), shape=tire.shape.as_scaled())
 
 
@@ -130,7 +130,8 @@ def material_table(law: MaterialLaw, model: str, density: float | None) -> Raw:
 def _regions(built: Parts, given: Sequence[Raw], source: Source) -> list[Raw]:
     """Each given region over what it changes; of a built-in section also the compounds not given."""
     everywhere = next(
-        ((n, one) for n, one in enumerate(given) if built.whole and "name" not in one), None
+        ((n, region) for n, region in enumerate(given) if built.whole and "name" not in region),
+        None,
     )
 
     def over(place: int | None, one: Raw, base: Raw) -> Raw:
@@ -138,30 +139,30 @@ def _regions(built: Parts, given: Sequence[Raw], source: Source) -> list[Raw]:
             base = _over(everywhere[1], base, ("tire", "region", str(everywhere[0])), source)
         return _over(one, base, ("tire", "region", str(place)), source)
 
-    found, seen = [], set()
+    merged, seen = [], set()
     for place, one in enumerate(given):
         name = _spelt(one.get("name"), built.compounds)
         seen.add(name)
         if everywhere and place == everywhere[0]:
-            found.append(one)
+            merged.append(one)
         elif name in built.compounds:
-            found.append({**over(place, one, built.compounds[name]), "name": name})
+            merged.append({**over(place, one, built.compounds[name]), "name": name})
         else:
-            found.append(over(place, one, built.region_elsewhere))
+            merged.append(over(place, one, built.region_elsewhere))
     rest = built.compounds if built.whole else {}
-    return found + [over(None, {}, one) for name, one in rest.items() if name not in seen]
+    return merged + [over(None, {}, region) for name, region in rest.items() if name not in seen]
 
 
 def _cords(built: Parts, given: Sequence[Raw]) -> list[Raw]:
     """Each given line over what it changes; of a built-in section also the lines not given."""
-    found, seen = [], set()
+    merged, seen = [], set()
     for one in given:
         name = _spelt(one.get("name"), built.cords)
         seen.add(name)
         base = built.cords.get(name, built.cords_elsewhere)
-        found.append({**base, **one} | ({"name": name} if name in built.cords else {}))
+        merged.append({**base, **one} | ({"name": name} if name in built.cords else {}))
     rest = built.cords if built.whole else {}
-    return found + [dict(line) for name, line in rest.items() if name not in seen]
+    return merged + [dict(line) for name, line in rest.items() if name not in seen]
 
 
 def _spelt(name: str | None, known: Mapping[str, Raw]) -> str:
@@ -169,34 +170,34 @@ def _spelt(name: str | None, known: Mapping[str, Raw]) -> str:
     return next((own for own in known if name and own.upper() == name.upper()), name or "")
 
 
-def _over(given: Raw, base: Raw, path: Path_, source: Source) -> Raw:
+def _over(stated: Raw, base: Raw, path: Path_, source: Source) -> Raw:
     """A region's table with what it leaves out from another."""
-    kept = dict(base)
-    way = next((one for one in _WAYS if one & given.keys()), None)
+    rest = dict(base)
+    way = next((way for way in _WAYS if way & stated.keys()), None)
     if way is not None:
         others = set().union(*_WAYS) - way
-        kept = {key: value for key, value in kept.items() if key not in others}
-    result = kept | given
-    if "material" in given and "material" in base:
+        rest = {key: value for key, value in rest.items() if key not in others}
+    result = rest | stated
+    if "material" in stated and "material" in base:
         result["material"] = _material(
-            given["material"], base["material"], (*path, "material"), source
+            stated["material"], base["material"], (*path, "material"), source
         )
-    if "hardness" in given:
-        _harden(result, given, path, source)
+    if "hardness" in stated:
+        _harden(result, stated, path, source)
     return result
 
 
-def _harden(region: Raw, given: Raw, path: Path_, source: Source) -> None:
+def _harden(region: Raw, stated: Raw, path: Path_, source: Source) -> None:
     """Write a hardness (Shore A) back as the moduli of the region's material."""
     hardness = region.pop("hardness")
     fits = isinstance(hardness, int | float) and 20 <= hardness <= 95
-    if not fits or not isinstance(given.get("material", {}), dict):
+    if not fits or not isinstance(stated.get("material", {}), dict):
         region["hardness"] = hardness  # refused where the table is read
         return
     material = dict(region["material"])
     values = {key: value for key, value in material.items() if key not in ("model", "density")}
     pascals = {item.name for item, key in keys(MATERIALS[material["model"]]) if key.unit == "Pa"}
-    if both := pascals & given.get("material", {}).keys():
+    if both := pascals & stated.get("material", {}).keys():
         source.add((*path, "hardness"), f"and material.{min(both)} exclude each other")
         return
     factor = shore_a(hardness) / MATERIALS.make(material["model"], **values).youngs
@@ -205,7 +206,7 @@ def _harden(region: Raw, given: Raw, path: Path_, source: Source) -> None:
     }
 
 
-def _material(given: Raw, base: Raw, path: Path_, source: Source) -> Raw:
+def _material(stated: Raw, base: Raw, path: Path_, source: Source) -> Raw:
     """A material's table over another.
 
     Under another law the moduli of small strain stay, as far as it has parameters that are these; its
@@ -213,10 +214,10 @@ def _material(given: Raw, base: Raw, path: Path_, source: Source) -> Raw:
     """
     default = MaterialTable().model
     own = _names(base["model"])
-    same = given.keys() - {"density", "model"} <= own
-    model = given.get("model", base["model"] if same else default)
+    same = stated.keys() - {"density", "model"} <= own
+    model = stated.get("model", base["model"] if same else default)
     if model == base["model"]:
-        return base | given
+        return base | stated
     law = MATERIALS.make(base["model"], **{key: base[key] for key in own if key in base})
     moduli = {
         "youngs_modulus": law.youngs,
@@ -225,7 +226,7 @@ def _material(given: Raw, base: Raw, path: Path_, source: Source) -> Raw:
     }
     known = moduli | base
     stays = {key: known[key] for key in _names(model) | {"density"} if key in known}
-    result = stays | given | {"model": model}
+    result = stays | stated | {"model": model}
     missing = [
         item.name
         for item, key in keys(MATERIALS[model])
@@ -263,18 +264,18 @@ def _scale(merged: Raw, built: Parts, key: str, factor: float, source: Source) -
             path, f'has no quantity "{quantity}" of {name}: take one of {", ".join(possible)}'
         )
         return
-    for one in merged[table]:
-        if one.get("name") in members:
-            yield from _multiplied(one, quantity, factor, path, source)
+    for part in merged[table]:
+        if part.get("name") in members:
+            yield from _multiplied(part, quantity, factor, path, source)
 
 
 def _groups(built: Parts) -> dict[str, tuple[str, list[str]]]:
     """(table, names of its parts) that a name in [tire.scale] stands for."""
     belts = [name for name in built.cords if name.startswith(f"{BELTS} ")]
-    found = {name: ("region", [name]) for name in built.compounds}
-    found |= {name: ("cords", [name]) for name in built.cords}
-    found |= {BELTS: ("cords", belts)} if belts else {}
-    return found | {
+    groups = {name: ("region", [name]) for name in built.compounds}
+    groups |= {name: ("cords", [name]) for name in built.cords}
+    groups |= {BELTS: ("cords", belts)} if belts else {}
+    return groups | {
         "compounds": ("region", list(built.compounds)),
         "cords": ("cords", list(built.cords)),
     }
@@ -309,12 +310,14 @@ def _multiplied(
 
 
 def _times(value: Any, factor: float) -> Any:
-    return [factor * one for one in value] if isinstance(value, list | tuple) else factor * value
+    return (
+        [factor * number for number in value] if isinstance(value, list | tuple) else factor * value
+    )
 
 
 def _shown(value: Any) -> str:
     return (
-        ", ".join(f"{one:.6g}" for one in value)
+        ", ".join(f"{number:.6g}" for number in value)
         if isinstance(value, list | tuple)
         else f"{value:.6g}"
     )

@@ -45,7 +45,9 @@ def make_body(
     comm: MPI.Comm, tire: TireTable, section: Ring, temperature: float = REFERENCE
 ) -> Body:
     """The finite-element body, undeformed, at a temperature, degrees C. Collective."""
-    compounds = {name: one.at(temperature) for name, one in tire.shape.in_layers(tire).items()}
+    compounds = {
+        name: compound.at(temperature) for name, compound in tire.shape.in_layers(tire).items()
+    }
     return Body(comm, section, compounds, cords=tire.shape.cords(tire))
 
 

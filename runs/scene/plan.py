@@ -73,10 +73,10 @@ def _small(scene: Scene) -> str | None:
         return _no_contact(scene)
     if scene.motion.kind == "linear":
         return 'motion.kind is "linear"'
-    found = next(confined(scene), None) if scene.motion.kind == "auto" else None
+    reason = next(confined(scene), None) if scene.motion.kind == "auto" else None
     return (
-        f'motion.kind = "auto" takes a linear tire: {".".join(found[0])} {found[1]}'
-        if found
+        f'motion.kind = "auto" takes a linear tire: {".".join(reason[0])} {reason[1]}'
+        if reason
         else None
     )
 

@@ -148,8 +148,8 @@ def without_relief(road: RoadTable, first: float, last: float) -> str:
 
 def made(surface: RoadKind) -> Road:
     """The road of a scene; the last one is kept, since reading a file may take seconds."""
-    found = _MADE.get(_which(surface))
-    return found or keep(surface, surface.make())
+    road = _MADE.get(_which(surface))
+    return road or keep(surface, surface.make())
 
 
 def keep(surface: RoadKind, road: Road) -> Road:
@@ -216,8 +216,8 @@ def check_outputs(
     for name, kind in output.kinds:
         try:
             _check_kind(scene, kind, ("output", name), error)
-        except InputError as found:
-            yield found
+        except InputError as problem:
+            yield problem
 
 
 def _check_kind(scene: Scene, kind: Output, path: tuple[str, ...], error: Where) -> None:
@@ -292,9 +292,11 @@ def check(scene: Scene, raw: Raw, source: Source) -> None:
 
 
 def _static(static: StaticTable, scene: Scene, raw: Raw, error: Where) -> None:
-    given = [key for key in ("load", "deflection", "road_height") if key in raw.get("static", {})]
-    if len(given) > 1:
-        raise error(("static", given[1]), f"and {given[0]} place the road twice: keep one of them")
+    places = [key for key in ("load", "deflection", "road_height") if key in raw.get("static", {})]
+    if len(places) > 1:
+        raise error(
+            ("static", places[1]), f"and {places[0]} place the road twice: keep one of them"
+        )
 
 
 def _rotation(rotation: RotationTable, scene: Scene, raw: Raw, error: Where) -> None:

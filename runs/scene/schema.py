@@ -106,11 +106,11 @@ def line_of(text: str, path: tuple[str, ...]) -> int | None:
     A list of tables is where its first one is.
     """
     best: tuple[int, int] | None = None
-    for line_number, found in _paths(text):
-        if found == (*path, "0"):
-            found = path
-        if path[: len(found)] == found and (best is None or len(found) > best[1]):
-            best = (line_number, len(found))
+    for line_number, place in _paths(text):
+        if place == (*path, "0"):
+            place = path
+        if path[: len(place)] == place and (best is None or len(place) > best[1]):
+            best = (line_number, len(place))
     return best[0] if best else None
 
 
@@ -133,7 +133,7 @@ class Source:
                 return f"--set {shortened(path[:length])}"
         if line := line_of(self.text, path):
             return f"{self.path}, line {line}"
-        below = (one for one in self.overridden if one[: len(path)] == path)
+        below = (given_path for given_path in self.overridden if given_path[: len(path)] == path)
         return f"--set {shortened(least)}" if (least := min(below, default=())) else f"{self.path}"
 
     def add(self, path: Path_, message: str) -> None:
@@ -197,9 +197,9 @@ class Collection:
         """Dataclass fields: a switch for a class without parameters, else an optional table."""
         for name in self.registry:
             of, doc = self.registry[name], self.registry.doc(name)
-            made = table(of, doc, optional=True) if fields(of) else flag(False, doc)
-            made.name = name
-            yield made
+            item = table(of, doc, optional=True) if fields(of) else flag(False, doc)
+            item.name = name
+            yield item
 
     def gathered(self, values: dict[str, Any]) -> tuple[tuple[str, Any], ...]:
         """(name, object) for each key that is switched on or given as a table."""
@@ -229,9 +229,9 @@ def points(doc: str, *, least: float, most: float) -> Any:
                 f'must be "nodes", "auto" or {{ dx = 0.002, dy = 0.002 }}, not {described(value)}'
             )
         pitch = {}
-        for name, given in value.items():
+        for name, length in value.items():
             try:
-                pitch[name] = finite(given)
+                pitch[name] = finite(length)
                 limits.check(pitch[name], "m")
             except ValueError as error:
                 raise ValueError(f"{name} {error}") from None
@@ -292,8 +292,8 @@ class Collects(Parameters):
             if part is None or name.startswith("_") or name not in part.registry:
                 continue
             absent = None if fields(part.registry[name]) else False
-            found = dict(getattr(self, item.name)).get(name, absent)
-            return absent is False and found is not False or found
+            value = dict(getattr(self, item.name)).get(name, absent)
+            return absent is False and value is not False or value
         raise AttributeError(f"{type(self).__name__} has no {name}")
 
 
@@ -352,15 +352,15 @@ def names(of: type) -> list[str]:
 
 def every_field(of: type) -> dict[str, Field]:
     """The keys and tables that dataclass `of` has in any variant, by name."""
-    found = {}
+    items = {}
     for item in fields_of(of):
         part = variant_of(item)
         if part is None:
-            found[item.name] = item
+            items[item.name] = item
             continue
         for kind in part.registry:
-            found = every_field(part.registry[kind]) | found
-    return found
+            items = every_field(part.registry[kind]) | items
+    return items
 
 
 def owners(of: type, name: str) -> tuple[str, list[str]] | None:

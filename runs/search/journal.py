@@ -41,12 +41,12 @@ FOLDER = "search"
 _SCENE = "scene.toml"
 
 
-def errors_of(product: Accuracy, wanted: AccuracyTable) -> ErrorsByCause:
+def errors_of(product: Accuracy, table: AccuracyTable) -> ErrorsByCause:
     """Errors of the force that the target applies to."""
-    bars = product.by_cause.get(wanted.of, {})
+    bars = product.by_cause.get(table.of, {})
     below = np.flatnonzero(product.centre <= product.up_to)
     unknown = (float("nan"),) * len(below)
-    mean = abs(float(product.mean[wanted.of][VERTICAL])) if wanted.of in product.mean else 0.0
+    mean = abs(float(product.mean[table.of][VERTICAL])) if table.of in product.mean else 0.0
     return ErrorsByCause(
         {c: float(bar.history[VERTICAL]) for c, bar in bars.items()},
         {c: float(bar.mean[VERTICAL]) / mean if mean else 0.0 for c, bar in bars.items()},
@@ -58,12 +58,12 @@ def errors_of(product: Accuracy, wanted: AccuracyTable) -> ErrorsByCause:
     )
 
 
-def shown(over: np.ndarray, wanted: AccuracyTable) -> str:
+def shown(over: np.ndarray, table: AccuracyTable) -> str:
     """The error and its shares in words, for the figure that is furthest from its target."""
     total, figure = worst(over)
-    relative = 2 if wanted.target is not None else 0
+    relative = 2 if table.target is not None else 0
     unit, scale = (
-        ("%", 100 * (wanted.target or 0.0)) if figure < relative else ("dB", wanted.target_db)
+        ("%", 100 * (table.target or 0.0)) if figure < relative else ("dB", table.target_db)
     )
     parts = ", ".join(
         f"{cause} {_number(scale * value)}"
@@ -90,8 +90,8 @@ def begin(directory: Path, scene_text: str) -> None:
 
 def to_resume(directory: Path) -> Path:
     """The scene that `resume` goes on with: that of an unfinished search, if there is one."""
-    given = directory / FOLDER / _SCENE
-    return given if given.is_file() else directory / _SCENE
+    scene = directory / FOLDER / _SCENE
+    return scene if scene.is_file() else directory / _SCENE
 
 
 def leave(directory: Path) -> None:
@@ -119,7 +119,7 @@ class SearchJournal:
     def add(self, trial: Trial) -> None:
         """Add a trial."""
         self.trials.append(trial)
-        data = {"of": self._of, "trials": [asdict(one) for one in self.trials]}
+        data = {"of": self._of, "trials": [asdict(trial) for trial in self.trials]}
         write_text(self.path, json.dumps(data, indent=1) + "\n")
 
     @staticmethod
@@ -132,7 +132,7 @@ class SearchJournal:
         with suppress(OSError, ValueError, KeyError, TypeError):
             data = json.loads(self.path.read_text(encoding="utf-8"))
             if data["of"] == self._of:
-                return [trial_of(one) for one in data["trials"]]
+                return [trial_of(trial) for trial in data["trials"]]
         return []
 
 
@@ -153,5 +153,5 @@ def _origin(scene: Scene) -> str:
 
 
 def _files(scene: Scene) -> list[str]:
-    given = scene.road and scene.road.file, scene.pattern and scene.pattern.file
-    return [path for path in given if path]
+    files = scene.road and scene.road.file, scene.pattern and scene.pattern.file
+    return [path for path in files if path]

@@ -103,7 +103,7 @@ def _without_excess(
             for cause in CAUSES
             if now.rungs[cause] > begun.rungs[cause]
         )
-        enough = [one for one in lower if one is not None and met(one)]
+        enough = [rung for rung in lower if rung is not None and met(rung)]
         if not enough:
             break
         now = min(enough, key=costs)
@@ -133,8 +133,8 @@ def fits(scene: Scene, settings: Settings, processes: int) -> bool:
 def _after_failure(ladders: Ladders, trial: Trial, processes: int) -> Settings | None:
     """One rung up for mesh and step: a run that fails altogether is too coarse in one of them."""
     rungs = trial.settings.rungs
-    found = ladders.at(rungs | {"mesh": rungs["mesh"] + 1, "step": rungs["step"] + 1})
-    return found if found is not None and fits(ladders.scene, found, processes) else None
+    settings = ladders.at(rungs | {"mesh": rungs["mesh"] + 1, "step": rungs["step"] + 1})
+    return settings if settings is not None and fits(ladders.scene, settings, processes) else None
 
 
 def _worth(
@@ -176,11 +176,11 @@ class _Costs:
 
     def __call__(self, settings: Settings) -> float:
         """Seconds of all stages; stages unknown to the model are scaled like the others."""
-        wanted, known, before = self._estimated(settings), 0.0, 0.0
+        estimated, known, before = self._estimated(settings), 0.0, 0.0
         for stage, seconds in self._measured.items():
             part = _STAGE.get(stage, stage)
             if self._base.get(part):
-                known += seconds * wanted[part] / self._base[part]
+                known += seconds * estimated[part] / self._base[part]
                 before += seconds
         rest = sum(self._measured.values()) - before
         return known + rest * (known / before if before else 1.0)

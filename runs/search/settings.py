@@ -57,16 +57,16 @@ class Ladders:
 
     def first(self) -> Settings:
         """The coarsest settings."""
-        found = self.at(dict.fromkeys(CAUSES, 0))
-        assert found is not None
-        return found
+        settings = self.at(dict.fromkeys(CAUSES, 0))
+        assert settings is not None
+        return settings
 
     def finest(self) -> Settings:
         """The finest settings."""
         top = RUNGS | {"mesh": len(self._meshes) - 1}
-        found = self.at(top)
-        assert found is not None
-        return found
+        settings = self.at(top)
+        assert settings is not None
+        return settings
 
     def finer(self, settings: Settings) -> Iterator[tuple[str, Settings]]:
         """(cause, settings one rung up its ladder) for each cause that has a higher rung."""
@@ -118,13 +118,13 @@ def bounds(scene: Scene) -> list[str]:
     ]
 
 
-def size_ratio(cause: str, one: Settings, other: Settings) -> float:
-    """Size that causes the error in `other` over that in `one`: below 1 if `other` is finer."""
+def size_ratio(cause: str, settings: Settings, other: Settings) -> float:
+    """Size that causes the error in `other` over that in `settings`: below 1 if `other` is finer."""
     sizes = {
-        "mesh": (1 / one.mesh[0], 1 / other.mesh[0]),
-        "modes": (1 / one.up_to, 1 / other.up_to),
-        "points": (one.pitch, other.pitch),
-        "step": (one.step, other.step),
+        "mesh": (1 / settings.mesh[0], 1 / other.mesh[0]),
+        "modes": (1 / settings.up_to, 1 / other.up_to),
+        "points": (settings.pitch, other.pitch),
+        "step": (settings.step, other.step),
     }
     before, after = sizes[cause]
     return after / before

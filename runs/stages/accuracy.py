@@ -157,7 +157,7 @@ def _outer(scene: Scene, ring: Ring) -> Influence:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Given:
+class ReferenceRun:
     """The run that companions repeat in part.
 
     Its `job`, static state, patch and road (`setup`, not settled), response and rolling modes; the
@@ -221,11 +221,11 @@ class Given:
         reference. Collective on `comm`.
         """
         step, spec = 2 * self.step, self.job.scene.contact
-        kept = self.response.resolved(step)
-        if len(kept.every) < len(self.response.resolved(self.step).every):
+        resolved = self.response.resolved(step)
+        if len(resolved.every) < len(self.response.resolved(self.step).every):
             return self.own
         patch = self.equilibrated.patch
-        steps = oscillation(spec, patch, kept, step, bristles(spec, patch))
+        steps = oscillation(spec, patch, resolved, step, bristles(spec, patch))
         if self.scheme == "linear" and choose(steps).scheme != "linear":
             return self.own
         try:
@@ -233,34 +233,34 @@ class Given:
         except (ConvergenceError, InputError):
             return self.own
 
-    def first(self, steps: int) -> Given:
+    def first(self, steps: int) -> ReferenceRun:
         """The same for fewer steps."""
         return self._keeping("equilibrated", steps=steps)
 
-    def of(self, job: Job) -> Given:
+    def of(self, job: Job) -> ReferenceRun:
         """The same with another job; `base` stays that of the run."""
         return self._keeping("base", "own", job=job)
 
-    def alone(self) -> Given:
+    def alone(self) -> ReferenceRun:
         """The same for this process by itself, with what all processes have found."""
         names = ("equilibrated", "on_coarser_mesh", "longer", "own", "base")
         known = (name for name in names if name in self.__dict__)
         return self._keeping(*known, comm=MPI.COMM_SELF)
 
-    def same_loop(self, other: Given) -> bool:
+    def same_loop(self, other: ReferenceRun) -> bool:
         """Whether both repeat as many steps of the same size by the same scheme."""
         return all(
             getattr(self, name) == getattr(other, name) for name in ("step", "steps", "scheme")
         )
 
-    def keeping_what(self, other: Given) -> Given:
+    def keeping_what(self, other: ReferenceRun) -> ReferenceRun:
         """The same with what another has found for the same loop."""
         names = ("equilibrated", "longer", "own", "base")
-        made = replace(self)
-        made.__dict__.update({name: vars(other)[name] for name in names if name in vars(other)})
-        return made
+        narrowed = replace(self)
+        narrowed.__dict__.update({name: vars(other)[name] for name in names if name in vars(other)})
+        return narrowed
 
-    def _keeping(self, *names: str, **changes: Any) -> Given:
+    def _keeping(self, *names: str, **changes: Any) -> ReferenceRun:
         """The same with `changes`, and the cached properties `names` as here."""
         other = replace(self, **changes)
         other.__dict__.update({name: getattr(self, name) for name in names})
@@ -308,11 +308,11 @@ class CoarserStatic(StaticStage):
 
     def compute(self, record: Record) -> StaticState:
         """The static state. Collective."""
-        wanted = self.job.scene.static
-        if wanted.deflection is None:
-            given = self.near.product, self.run.tire, self.job.tire, wanted.load
-            if (found := carried_over(*given)) is not None:
-                return found
+        static = self.job.scene.static
+        if static.deflection is None:
+            arguments = self.near.product, self.run.tire, self.job.tire, static.load
+            if (carried := carried_over(*arguments)) is not None:
+                return carried
         return super().compute(record)
 
 
@@ -331,8 +331,8 @@ def coarser(run: Job, static: Result[StaticState]) -> tuple[Job, dict[str, Resul
             if kind is StaticStage
             else kind.with_inputs(job, done)
         )
-        if (found := _made(job, kind, part, done)) is not None:
-            done[kind.name] = found
+        if (result := _made(job, kind, part, done)) is not None:
+            done[kind.name] = result
     return job, done
 
 
@@ -407,30 +407,30 @@ class Budget:
         """
         return max(MOST, self._whole / (_TOUCHING * least))
 
-    def window(self, least: int, given: Given) -> int:
+    def window(self, least: int, reference: ReferenceRun) -> int:
         """Last step of companion runs: `least`, more as far as the budget goes; even."""
-        spacing = given.points_ratio
+        spacing = reference.points_ratio
         each = _LOOPS[spacing] * self.loop
-        if spacing < 1 and (finer := finer_touching(given.equilibrated.patch)) > MOST:
+        if spacing < 1 and (finer := finer_touching(reference.equilibrated.patch)) > MOST:
             each += _TOUCHING * finer / 2
         count = round((self._whole - _COARSE * self.before) / each)
         count = int(np.clip(count, min(least, self.steps), self.steps))
         return count - count % 2
 
 
-def longer_step(given: Given) -> ContactForces:
+def longer_step(reference: ReferenceRun) -> ContactForces:
     """Twice the time step. Collective."""
-    return given.longer
+    return reference.longer
 
 
-def other_points(given: Given) -> ContactForces:
+def other_points(reference: ReferenceRun) -> ContactForces:
     """Every other point of the grid both ways or, where affordable, twice as many. Collective."""
-    job, patch = given.job, given.setup.patch
+    job, patch = reference.job, reference.setup.patch
     if patch.places is None:
         raise InputError(
             "the points are nodes of the mesh: take a grid, contact.points = { dx, dy }"
         )
-    coarser = given.points_ratio > 1
+    coarser = reference.points_ratio > 1
     brush = job.scene.contact.brush_stiffness
     if brush is not None:  # stiffness of a point that stands for four, or for a quarter
         contact = replace(job.scene.contact, brush_stiffness=brush * (4 if coarser else 0.25))
@@ -438,65 +438,65 @@ def other_points(given: Given) -> ContactForces:
     if coarser:
         patch = thinned(patch)
     else:
-        surface = tread_surface(job, given.static.product, given.static.key)
-        height = given.static.product.road_height
+        surface = tread_surface(job, reference.static.product, reference.static.key)
+        height = reference.static.product.road_height
         assert height is not None
-        patch = halved(patch, surface, height, given.setup.reach)
-        patch = on_shape(patch, given.static.product.road)
-    setup = replace(given.setup, patch=patch)
-    setup = equilibrated(job, setup, given.response, given.static.product.normal_force)
-    return given.of(job).repeated(setup, given.response)
+        patch = halved(patch, surface, height, reference.setup.reach)
+        patch = on_shape(patch, reference.static.product.road)
+    setup = replace(reference.setup, patch=patch)
+    setup = equilibrated(job, setup, reference.response, reference.static.product.normal_force)
+    return reference.of(job).repeated(setup, reference.response)
 
 
-def fewer_modes(given: Given) -> ContactForces:
+def fewer_modes(reference: ReferenceRun) -> ContactForces:
     """Modes up to `FEWER` of the highest, with what joins modes joining these. Collective.
 
     With attachment modes a response of the same kind (greens.fewer_modes): states that are made static lose their inertia, of
     which attachment modes are there to keep it. Without, the states from there to the highest are static; states above
     the highest mode are kept: they belong to the rotation shapes, without which the band below would shift.
     """
-    attached = given.attached
+    attached = reference.attached
     if attached is not None and not attached.full:
-        comm, points = given.comm or given.job.comm, given.probes
+        comm, points = reference.comm or reference.job.comm, reference.probes
         arguments = attached, attached.basis.shape, points.loads[points.counted], FEWER
-        residual = given.job.scene.greens.residual
-        kept = of_fewer_modes(given.response, *arguments, residual, comm)
-        return given.repeated(given.equilibrated, kept)
-    highest = given.rolling.highest
-    joined = given.rolling.basis.projection.shapes > 0
+        residual = reference.job.scene.greens.residual
+        coarse = of_fewer_modes(reference.response, *arguments, residual, comm)
+        return reference.repeated(reference.equilibrated, coarse)
+    highest = reference.rolling.highest
+    joined = reference.rolling.basis.projection.shapes > 0
     limits = FEWER * highest, highest if joined else np.inf
-    kept = given.response.keeping_where(
+    coarse = reference.response.keeping_where(
         lambda s: (np.abs(s) <= limits[0]) | (np.abs(s) > limits[1])
     )
-    if len(kept.every) == len(given.response.every):
+    if len(coarse.every) == len(reference.response.every):
         raise InputError("all states lie far below the highest mode: none can be left out")
-    return given.repeated(given.equilibrated, kept)
+    return reference.repeated(reference.equilibrated, coarse)
 
 
-def coarser_mesh(given: Given) -> ContactForces:
+def coarser_mesh(reference: ReferenceRun) -> ContactForces:
     """Elements of twice the size, from the static state on. Collective."""
-    return given.repeated(*given.on_coarser_mesh)
+    return reference.repeated(*reference.on_coarser_mesh)
 
 
-def finer_wall(given: Given) -> tuple[ContactForces, ContactForces | None]:
+def finer_wall(reference: ReferenceRun) -> tuple[ContactForces, ContactForces | None]:
     """With the local flexibility of the wall between nodes below the contact points added, and its reference.
 
     A coarser mesh does not show this part: halving the elements changes the far field of a point
     eight times and more, but its near field only twice. It is known for forces normal to the road: with friction,
     both runs are repeated without. Collective.
     """
-    force = given.static.product.normal_force
-    made = backed(given.job, given.static.product, given.setup, given.response)
-    setup = made.setup.equilibrated(made.response, force, made.contact)[0]
-    found = given.repeated(setup, made.response, contact=made.contact)
-    contact = given.job.scene.contact
+    force = reference.static.product.normal_force
+    wall = backed(reference.job, reference.static.product, reference.setup, reference.response)
+    setup = wall.setup.equilibrated(wall.response, force, wall.contact)[0]
+    forces = reference.repeated(setup, wall.response, contact=wall.contact)
+    contact = reference.job.scene.contact
     if not contact.has_friction:
-        return found, given.base
+        return forces, reference.base
     plain = TreadContact(law=contact.law, solver=contact.solver)
-    return found, given.repeated(given.equilibrated, given.response, contact=plain)
+    return forces, reference.repeated(reference.equilibrated, reference.response, contact=plain)
 
 
-COMPANIONS: dict[str, Callable[[Given], ContactForces]] = {
+COMPANIONS: dict[str, Callable[[ReferenceRun], ContactForces]] = {
     "step": longer_step,
     "points": other_points,
     "modes": fewer_modes,
@@ -552,23 +552,23 @@ def figures(
     }
 
 
-def companions(cause: str, given: Given) -> list[Companion]:
+def companions(cause: str, reference: ReferenceRun) -> list[Companion]:
     """Companion runs for one cause, without terminal output; their errors add as squares.
 
-    Raises InputError or ConvergenceError if the cause has none. Collective on the processes of `given`; where these are
+    Raises InputError or ConvergenceError if the cause has none. Collective on the processes of `reference`; where these are
     not those of its job, its coarser mesh is known before.
     """
     with console.quiet():
-        beside = given.own if cause == "step" else given.base
-        told = COMPANIONS[cause](given)
+        beside = reference.own if cause == "step" else reference.base
+        told = COMPANIONS[cause](reference)
         if cause == "modes":
-            found = [Companion(told, beside, within=FEWER)]
+            pairs = [Companion(told, beside, within=FEWER)]
         else:
-            found = [Companion(told, beside, _share(cause, given))]
+            pairs = [Companion(told, beside, _share(cause, reference))]
         if cause == "mesh":
             with suppress(InputError, ConvergenceError):
-                found.append(Companion(*finer_wall(given)))
-    return found
+                pairs.append(Companion(*finer_wall(reference)))
+    return pairs
 
 
 Told = list[Companion] | ConvergenceError | InputError
@@ -587,26 +587,26 @@ def _attempted(record: Record, part: str, run: Callable[[], Any]) -> Any:
 
 
 class Window(NamedTuple):
-    """Part of a run that companions repeat (`given`): its first compared step, and the `limit` and `up_to` (Hz) of the comparison."""
+    """Part of a run that companions repeat (`reference`): its first compared step, and the `limit` and `up_to` (Hz) of the comparison."""
 
-    given: Given
+    reference: ReferenceRun
     start: int
     limit: float
     up_to: float
 
 
 class Ahead(NamedTuple):
-    """Forces that a process computed beside the loop, by cause (`found`), their inputs (`given`), and the seconds taken."""
+    """Forces that a process computed beside the loop, by cause (`found`), their inputs (`reference`), and the seconds taken."""
 
-    given: Given
+    reference: ReferenceRun
     found: dict[str, Told]
     cost: dict[str, float]
 
 
-def _share(cause: str, given: Given) -> float:
-    points = given.points_ratio if cause == "points" else 2.0
+def _share(cause: str, reference: ReferenceRun) -> float:
+    points = reference.points_ratio if cause == "points" else 2.0
     size = {"step": 2.0, "points": points, "mesh": 2.0}[cause]
-    order = orders(given.job.tire.section.order, given.scheme)[cause]
+    order = orders(reference.job.tire.section.order, reference.scheme)[cause]
     return (random_share if cause == "points" else share)(size, order)
 
 
@@ -643,18 +643,18 @@ class Accuracy:
 
     def total(self, force: str) -> Bars | None:
         """Combined error of all causes with an estimate; None if there is none."""
-        found = self.by_cause.get(force, {})
-        return total(found) if found else None
+        terms = self.by_cause.get(force, {})
+        return total(terms) if terms else None
 
     def levels(self, force: str, centre: np.ndarray) -> np.ndarray | None:
         """Error estimates (b, 3) dB at other bands; NaN where unknown."""
-        found = self.total(force)
-        if found is None:
+        total = self.total(force)
+        if total is None:
             return None
         level = np.full((len(centre), 3), np.nan)
         for k, band in enumerate(centre):
             same = np.flatnonzero(np.isclose(self.centre, band))
-            level[k] = found.level[same[0]] if len(same) else np.nan
+            level[k] = total.level[same[0]] if len(same) else np.nan
         return level
 
 
@@ -683,28 +683,28 @@ class AccuracyStage(Computed[Accuracy]):
         window = self._window()
         if window is None:
             return self._none("the run is too short for a companion run with twice the step")
-        given, start, limit, up_to = window
-        steps = given.steps
+        reference, start, limit, up_to = window
+        steps = reference.steps
         axle = None if history.axle_force is None else history.axle_force[:steps]
         own = ContactForces(history.total_force[:steps], axle, history.step)
         since = start * history.step
         bands = wide_enough(1 / (len(history.time) * history.step - since), limit)
         exact = figures(own, since, limit, up_to, bands)
-        found: dict[str, dict[str, Bars]] = {name: {} for name in exact}
+        bars_of: dict[str, dict[str, Bars]] = {name: {} for name in exact}
         absent: dict[str, str] = {}
-        for cause, told in self._companions(given, record).items():
+        for cause, told in self._companions(reference, record).items():
             if isinstance(told, Exception):
                 absent[cause] = str(told)
                 continue
             parts = [one.bars(own, since, limit, up_to, bands) for one in told]
             for name in exact:
-                found[name][cause] = total(dict(enumerate(part[name] for part in parts)))
+                bars_of[name][cause] = total(dict(enumerate(part[name] for part in parts)))
         product = Accuracy(
             centre=exact["contact_force"].centre,
             window=steps * history.step,
             up_to=up_to,
             mean={name: one.mean for name, one in exact.items()},
-            by_cause=found,
+            by_cause=bars_of,
             absent=absent,
         )
         record.indicators["errors are estimated from"] = (since, "s")
@@ -725,9 +725,9 @@ class AccuracyStage(Computed[Accuracy]):
         up_to = min(limit, self.job.scene.accuracy.up_to)
         least = start + least_steps(history.step, up_to)
         budget = Budget.of(self.job.scene, len(history.time))
-        given = self._given(budget.steps, budget.most_touching(least))
-        steps = budget.window(least, given)
-        return Window(given.first(steps), start, limit, up_to) if steps - start >= 2 else None
+        reference = self._given(budget.steps, budget.most_touching(least))
+        steps = budget.window(least, reference)
+        return Window(reference.first(steps), start, limit, up_to) if steps - start >= 2 else None
 
     def ahead(self, ended: Callable[[], bool]) -> None:
         """Repeat loops while the root computes the run's own, until that has `ended`: those that need nothing of other
@@ -735,43 +735,43 @@ class AccuracyStage(Computed[Accuracy]):
         window, comm = None if self._at_rest else self._window(), self.job.comm
         if window is None:
             return
-        given, record, found = window.given.alone(), Record(), dict[str, Told]()
+        reference, record, found = window.reference.alone(), Record(), dict[str, Told]()
         for cause in _dealt(_AHEAD, comm.size - 1)[comm.rank - 1]:
             if not ended():
-                found[cause] = _attempted(record, cause, partial(companions, cause, given))
-        self.job.ahead[self.name] = Ahead(given, found, dict(record.cost))
+                found[cause] = _attempted(record, cause, partial(companions, cause, reference))
+        self.job.ahead[self.name] = Ahead(reference, found, dict(record.cost))
 
-    def _companions(self, given: Given, record: Record) -> dict[str, Told]:
+    def _companions(self, reference: ReferenceRun, record: Record) -> dict[str, Told]:
         """The companions of each cause, or why it has none. Collective."""
         comm, mine = self.job.comm, self.job.ahead.pop(self.name, None)
-        if mine is not None and mine.given.same_loop(given):
-            given, known = given.keeping_what(mine.given), (mine.found, mine.cost)
+        if mine is not None and mine.reference.same_loop(reference):
+            reference, known = reference.keeping_what(mine.reference), (mine.found, mine.cost)
         else:
             known = {}, {}
-        found: dict[str, Told] = {}
+        told_by: dict[str, Told] = {}
         for part, seconds in comm.allgather(known):
-            found |= part
+            told_by |= part
             record.cost |= seconds
-        if isinstance(steps := found.get("step"), list):
-            given.__dict__["longer"] = steps[
+        if isinstance(steps := told_by.get("step"), list):
+            reference.__dict__["longer"] = steps[
                 0
             ].forces  # nearly every other loop is compared with it
-        coarse = _attempted(record, "coarser mesh", lambda: given.on_coarser_mesh)
+        coarse = _attempted(record, "coarser mesh", lambda: reference.on_coarser_mesh)
         if isinstance(coarse, ConvergenceError | InputError):
-            found["mesh"] = coarse
-        alone = sharers(given.response.resolved(given.step), comm).size < comm.size
-        left = [cause for cause in _LONGEST_FIRST if cause not in found]
+            told_by["mesh"] = coarse
+        alone = sharers(reference.response.resolved(reference.step), comm).size < comm.size
+        left = [cause for cause in _LONGEST_FIRST if cause not in told_by]
         if not alone:
             for cause in left:
-                found[cause] = _attempted(record, cause, partial(companions, cause, given))
-            return {cause: found[cause] for cause in CAUSES}
-        one, more = given.alone(), dict[str, Told]()
+                told_by[cause] = _attempted(record, cause, partial(companions, cause, reference))
+            return {cause: told_by[cause] for cause in CAUSES}
+        one, more = reference.alone(), dict[str, Told]()
         for cause in _dealt(left, comm.size)[comm.rank]:
             more[cause] = _attempted(record, cause, partial(companions, cause, one))
         for part, seconds in comm.allgather((more, dict(record.cost))):
-            found |= part
+            told_by |= part
             record.cost |= seconds
-        return {cause: found[cause] for cause in CAUSES}
+        return {cause: told_by[cause] for cause in CAUSES}
 
     def end(self, key: str, product: Accuracy) -> None:
         """Remove the coarser companion's folder, kept to resume. Collective."""
@@ -791,8 +791,8 @@ class AccuracyStage(Computed[Accuracy]):
             centre=np.zeros(0), window=0.0, up_to=0.0, mean={}, by_cause={}, absent=absent
         )
 
-    def _given(self, steps: int, most: float) -> Given:
-        return Given(
+    def _given(self, steps: int, most: float) -> ReferenceRun:
+        return ReferenceRun(
             job=self.job,
             static=self.static,
             setup=self.setup.product,

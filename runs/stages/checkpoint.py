@@ -34,9 +34,9 @@ def checkpointed(stage: Stage, what: str) -> Iterator[Journal]:
     """The journal of a stage, of results named `what`; a stop writes them. Collective."""
     job = stage.job
     parts = _Parts(job, stage.name, store.wanted_hash(stage.name, stage.inputs()))
-    found = parts.read()
-    journal = Journal(found, parts.keep)
-    least = min(job.comm.allgather(len(found)))
+    entries = parts.read()
+    journal = Journal(entries, parts.keep)
+    least = min(job.comm.allgather(len(entries)))
     if least:
         console.say(f"  continues from the checkpoint after {least} {what}")
     try:
@@ -72,19 +72,19 @@ class _Parts:
 
     def read(self) -> list[Entry]:
         """Results stored for the same inputs and process count; reports others. Collective."""
-        found: list[Entry] = []
-        reason = "" if self._job.fresh else self._read(found)
-        reasons = [one for one in self._job.comm.allgather(reason) if one not in ("", "absent")]
+        entries: list[Entry] = []
+        reason = "" if self._job.fresh else self._read(entries)
+        reasons = [text for text in self._job.comm.allgather(reason) if text not in ("", "absent")]
         if reasons:
             console.say(f"  {self._folder.name} exists, but {reasons[0]}: only part of it is used")
-        return found
+        return entries
 
-    def _read(self, found: list[Entry]) -> str:
-        """Append the usable parts to `found`; returns why the next one is not."""
+    def _read(self, entries: list[Entry]) -> str:
+        """Append the usable parts to `entries`; returns why the next one is not."""
         input_hash = self._job.provenance(self._stage, self._key).input_hash
-        while not (reason := store.why_not(self._path(len(found)), input_hash, self._stage)):
-            with store.opened(self._path(len(found))) as file:
-                found += [_entry(file[name]) for name in sorted(file)]
+        while not (reason := store.why_not(self._path(len(entries)), input_hash, self._stage)):
+            with store.opened(self._path(len(entries))) as file:
+                entries += [_entry(file[name]) for name in sorted(file)]
         return reason
 
     def keep(self, number: int, entry: Entry) -> None:
@@ -92,7 +92,7 @@ class _Parts:
         if not self._waiting:
             self._first = number
         self._waiting.append(entry)
-        size = sum(array.nbytes for one in self._waiting for array in one.values())
+        size = sum(array.nbytes for entry in self._waiting for array in entry.values())
         if time.monotonic() - self._written > max(LEAST, WORTH * size / self._rate):
             began = time.monotonic()
             self.flush()
@@ -122,12 +122,12 @@ def _entry(group) -> Entry:
 
     Their memory order is restored, because the rounding of sums of products depends on it.
     """
-    found: dict[str, np.ndarray] = {}
+    arrays: dict[str, np.ndarray] = {}
 
     def add(name: str, one) -> None:
         if hasattr(one, "shape"):
             array = np.asarray(one[()])
-            found[name] = array.T if one.attrs[_COLUMNS] else array
+            arrays[name] = array.T if one.attrs[_COLUMNS] else array
 
     group.visititems(add)
-    return found
+    return arrays

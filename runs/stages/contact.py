@@ -277,11 +277,11 @@ class Losses:
         self._motion: StateMotion | None = None
         if isinstance(tire, Recursion) and StateMotion.known(rolling, response):
             self._motion = StateMotion(rolling, response.slow(chosen.step), chosen.step)
-            kept = response.resolved(chosen.step)
-            left_out = kept.residual[: kept.residual.shape[1]]
+            resolved = response.resolved(chosen.step)
+            left_out = resolved.residual[: resolved.residual.shape[1]]
             self._circulation = Circulation(left_out * (not response.pulse), chosen.scheme)
-            self._modes = kept.of_modes.stop
-            rate = -kept.eigenvalue[self._modes :].real
+            self._modes = resolved.of_modes.stop
+            rate = -resolved.eigenvalue[self._modes :].real
             self._relaxed = Relaxed(rate, chosen.step, chosen.scheme)
             self._tire = tire
             tire.keep_samples()
@@ -345,7 +345,7 @@ def describe_energy(
     record: Record,
     rolling: RollingModes,
     response: Response,
-    kept: dict[str, np.ndarray],
+    state: dict[str, np.ndarray],
     work: Works,
     losses: Losses,
     step: float,
@@ -353,14 +353,14 @@ def describe_energy(
 ) -> None:
     """Record work of forces and drive, energy in the tire, energy lost, and the imbalance.
 
-    `kept`: the tire's snapshot; `pressed`: load times deflection of the static state, J.
+    `state`: the tire's snapshot; `pressed`: load times deflection of the static state, J.
     """
     slight = negligible(pressed)
     total = work.total
     record.indicators["work of contact on the tire"] = (work.contact, "J")
     if work.driven is not None:
         record.indicators["work of the prescribed forces"] = (work.driven, "J")
-    energies = energies_in(rolling, response, kept, step)
+    energies = energies_in(rolling, response, state, step)
     if energies is None:
         console.say(f"  energy: contact and forces put {total:.4g} J into the tire")
         return
@@ -385,24 +385,24 @@ def describe_energy(
             losses.slow,
             "J",
         )
-        taken = springs_lead - work.lead
-        _rolling(record, total, left, lost, drive, beyond, taken, slight)
+        by_springs = springs_lead - work.lead
+        _rolling(record, total, left, lost, drive, beyond, by_springs, slight)
 
 
 def energies_in(
     rolling: RollingModes,
     response: Response,
-    kept: dict[str, np.ndarray],
+    state: dict[str, np.ndarray],
     step: float,
 ) -> tuple[float, float, float] | None:
     """Energy (J) in modes, residual flexibility and slow rubber by a tire's snapshot; None where they are not known."""
-    own = own_states(response, rolling) and len(kept["block_state"]) == len(rolling.states.block)
+    own = own_states(response, rolling) and len(state["block_state"]) == len(rolling.states.block)
     if not own:
         return None
     resolved = response.resolved(step)
-    left = energy_left(rolling, kept, response.slow(step))
-    relaxed = Relaxed.held(kept["state"][resolved.of_modes.stop :].real)
-    return left, springs(resolved, kept["push_force"]), relaxed
+    left = energy_left(rolling, state, response.slow(step))
+    relaxed = Relaxed.held(state["state"][resolved.of_modes.stop :].real)
+    return left, springs(resolved, state["push_force"]), relaxed
 
 
 def _standing(
@@ -429,22 +429,22 @@ def _rolling(
     lost: float,
     drive: float,
     beyond: float,
-    taken: float,
+    by_contact: float,
     slight: float,
 ) -> None:
     """All terms are known: the imbalance is the error of the time steps; `slight` J are none."""
-    off = work + drive - left - lost - beyond - taken
+    off = work + drive - left - lost - beyond - by_contact
     moved = max(abs(work), abs(drive), abs(left), abs(lost))
     record.indicators |= {
         "work of the drive against the damping": (drive, "J"),
         "energy lost in the material": (lost, "J"),
         "energy lost in the modes left out, less their drive": (beyond, "J"),
-        "energy that the scheme takes": (taken, "J"),
+        "energy that the scheme takes": (by_contact, "J"),
         "energy that does not add up": (off, "J"),
     }
     console.say(
         f"  energy: contact {work:.4g} J + drive {drive:.4g} J = in the tire {left:.4g} J + lost "
-        f"{lost:.4g} J + lost in truncated modes, less what the drive puts into them, {beyond:.2g} J + dissipated by the scheme {taken:.2g} J; "
+        f"{lost:.4g} J + lost in truncated modes, less what the drive puts into them, {beyond:.2g} J + dissipated by the scheme {by_contact:.2g} J; "
         f"imbalance {off:.2g} J"
     )
     if abs(off) > _UNBALANCED * moved + slight:
@@ -452,9 +452,9 @@ def _rolling(
             f"the energy of the rolling tire does not add up by {100 * abs(off) / moved:.2g} %: take a "
             "smaller time.step"
         )
-    if abs(taken) > _TAKEN * moved + slight:
+    if abs(by_contact) > _TAKEN * moved + slight:
         record.warnings.append(
-            f"the scheme took {100 * abs(taken) / moved:.2g} % of the energy that moved: what bounces on the "
+            f"the scheme took {100 * abs(by_contact) / moved:.2g} % of the energy that moved: what bounces on the "
             "tread is damped by it; take a smaller time.step to see it"
         )
 
@@ -510,13 +510,13 @@ class ContactStage(Stage[ContactHistory]):
         console.say(
             "  the first process computes the loop, which is too small to distribute, the others its error bars"
         )
-        given = {name: getattr(self, name) for name in ("static", "rotating", "greens", "setup")}
-        for part in given.values():  # reading one is collective
+        products = {name: getattr(self, name) for name in ("static", "rotating", "greens", "setup")}
+        for part in products.values():  # reading one is collective
             _ = part.product
         alone = replace(self, job=self.job.alone())
 
         def meanwhile(ended: Callable[[], bool]) -> None:
-            beside(self.job, given, alone._foreseen(plan), ended)
+            beside(self.job, products, alone._foreseen(plan), ended)
 
         on_root_beside(self.job.comm, lambda: alone._roll(key, record), meanwhile)
         return self.stored()
@@ -624,14 +624,14 @@ class ContactStage(Stage[ContactHistory]):
             attributes["scheme_limit"] = scheme.limit
             attributes["friction"] = self._coefficient
             file = ContactFile(self.job, key, setup, attributes)
-            kept = file.open(stack, self.job.path(self.name))
-            if kept is None:
+            written = file.open(stack, self.job.path(self.name))
+            if written is None:
                 self._begin(loop, totals, losses, response, chosen.step)
             else:
-                loop.restore(kept)
-                totals.set_state(kept)
-                losses.set_state(kept)
-                instants.set_state(kept)
+                loop.restore(written)
+                totals.set_state(written)
+                losses.set_state(written)
+                instants.set_state(written)
                 reached = totals.figures.steps * chosen.step
                 console.say(f"  continues from the checkpoint at t = {reached:.6g} s")
             done, began = totals.figures.steps, time.thread_time()
@@ -670,9 +670,9 @@ class ContactStage(Stage[ContactHistory]):
         if loop.begun is None:
             return
         change, moved = loop.begun
-        kept = loop.tire.snapshot()
-        losses.begin(kept)
-        energies = energies_in(self._states, response, kept, step)
+        snapshot = loop.tire.snapshot()
+        losses.begin(snapshot)
+        energies = energies_in(self._states, response, snapshot, step)
         totals.work.begin(change[: len(moved)], moved, sum(energies or (0.0,)))
 
     def _large(self) -> LargeMotion | None:
@@ -740,8 +740,8 @@ class ContactStage(Stage[ContactHistory]):
                 bar.advance(len(block.time))
                 stop, due = watch(deferred.asked)
                 if stop or due:
-                    kept = totals.state() | losses.state() | instants.state()
-                    file.checkpoint(loop.snapshot() | kept)
+                    state = totals.state() | losses.state() | instants.state()
+                    file.checkpoint(loop.snapshot() | state)
                 if stop:
                     raise Stopped(stop)
             totals.finish()

@@ -25,7 +25,7 @@ _ROWS = 512  # steps read at a time
 def grooves(scene: Scene) -> list[Groove]:
     """The circumferential grooves of the scene's tread: of [pattern], or those of the section itself."""
     if scene.pattern is None:
-        return [Groove(*one) for one in scene.tire.shape.grooves_around]
+        return [Groove(*groove) for groove in scene.tire.shape.grooves_around]
     around = (g for g in scene.pattern.groove if g.direction == "circumferential")
     return [Groove(g.position, g.width, g.depth) for g in around]
 
@@ -67,20 +67,20 @@ class LeavingAir:
             outlets = Outlets.of(cells.inside, cells.cell, *_grid(setup), grooves(job.scene))
             step, speed = float(file.attrs["step"]), float(file.attrs["road_speed"])
             first = len(file["time"]) - round(lines.duration / step)
-            found = squeezed(cells, _gaps(file["gap"], first), outlets.sums, speed, step)
+            air = squeezed(cells, _gaps(file["gap"], first), outlets.sums, speed, step)
         numbers = np.rint(lines.frequency * lines.duration).astype(int)
         # What is known is the mean over a time before each instant.
-        late = lines.frequency * found.over
+        late = lines.frequency * air.over
         true = np.exp(1j * np.pi * late) / np.sinc(np.minimum(late, 0.5))
         shares = on_elements(tire, _face(state), outlets.places)
         ends = shares[:, len(outlets.edge) :]
         resistance = radiation_resistance(far, ends, shares, lines.frequency)
-        given = lines.frequency, found.height, far.air, resistance
+        arguments = lines.frequency, air.height, far.air, resistance
         amplitude, spectrum = (
-            outlets.leaving((part * true[:, None]).T, *given)
-            for part in transformed(found.rate, step, numbers)
+            outlets.leaving((part * true[:, None]).T, *arguments)
+            for part in transformed(air.rate, step, numbers)
         )
-        return LeavingAir(outlets.places, shares, amplitude, spectrum, found.height)
+        return LeavingAir(outlets.places, shares, amplitude, spectrum, air.height)
 
     def on(self, tire: SoundingTire, state: StaticState) -> LeavingAir:
         """The same air in front of another tire's elements."""

@@ -152,17 +152,17 @@ def kept(job: Job, key: str, operators: Operators, basis: ModalBasis) -> Modes |
     path = job.path(NAME)
     if on_root(job.comm, lambda: job.cache.fetch(NAME, key, path)) is None:
         return None
-    found = job.read(path, _read)
+    modes = job.read(path, _read)
 
     def remove() -> None:
         with suppress(OSError):
             path.unlink()
 
     on_root(job.comm, remove)
-    whole = found.pop("field")
+    whole = modes.pop("field")
     vectors = operators.restrict(np.ascontiguousarray(whole[operators.body.ids]))
     return (
-        Modes(vectors=vectors, **found)
+        Modes(vectors=vectors, **modes)
         if same_fields(operators.trace(vectors), basis.shape)
         else None
     )
@@ -170,10 +170,10 @@ def kept(job: Job, key: str, operators: Operators, basis: ModalBasis) -> Modes |
 
 def _read(file: Any) -> dict[str, Any]:
     attrs = file.attrs
-    found = {name: attrs[name].item() for name in _KEPT}
-    found |= {"squares": file["square"][:], "residual": file["residual"][:]}
-    found |= {"sectors": tuple(int(n) for n in attrs["sectors"])}
-    return found | {"symmetries": tuple(map(str, attrs["symmetries"])), "field": file["field"][:]}
+    values = {name: attrs[name].item() for name in _KEPT}
+    values |= {"squares": file["square"][:], "residual": file["residual"][:]}
+    values |= {"sectors": tuple(int(n) for n in attrs["sectors"])}
+    return values | {"symmetries": tuple(map(str, attrs["symmetries"])), "field": file["field"][:]}
 
 
 def _size(operators: Operators, count: int) -> float:
@@ -241,7 +241,7 @@ class ModesStage(Computed[ModalBasis]):
 
     def compute(self, record: Record) -> ModalBasis:
         """Solve and project. Collective."""
-        motions, wanted = self.motions.product, self.job.scene.modes
+        motions, table = self.motions.product, self.job.scene.modes
         with record.timing("matrices"):
             operators = motions.operators
         with (
@@ -249,7 +249,7 @@ class ModesStage(Computed[ModalBasis]):
             checkpointed(self, "count(s) and slice(s)") as journal,
         ):
             teams = self._teams(record)
-            modes = solved(operators, **wanted.asked, teams=teams, journal=journal)
+            modes = solved(operators, **table.asked, teams=teams, journal=journal)
         with record.timing("air"):
             air = cavity.make_air(self.job, motions)
         with record.timing("projection and rotation shapes"):
@@ -351,11 +351,11 @@ def _describe(record: Record, modes: Modes, basis: ModalBasis) -> None:
     }
 
 
-def _damping(given: Damping, projection: Projection) -> str:
+def _damping(damping: Damping, projection: Projection) -> str:
     """The damping in use, in words."""
-    if not isinstance(given, StrainEnergy):
+    if not isinstance(damping, StrainEnergy):
         unused = "" if projection.loss_factor is None else "; the loss factors are not used"
-        mass, stiffness = given
+        mass, stiffness = damping
         return f"γ1 = {mass:g} 1/s, γ2 = {stiffness:g} s{unused}"
     low, high = projection.loss_factor.min(), projection.loss_factor.max()
     return f"modal strain energy, loss factors {low:.3g} to {high:.3g}"

@@ -90,8 +90,8 @@ class Driven:
         wheel = wheel_of(motions, turning, projection=basis.projection)
         held = SmallMotions(self.job.tire, self.static)
         motion = held.rim_motion(turning.speed != 0)
-        found = by_free_rim(wheel, basis.modes, self.points()[0], frequency, motion)
-        return found, float(basis.frequency[-1])
+        receptances = by_free_rim(wheel, basis.modes, self.points()[0], frequency, motion)
+        return receptances, float(basis.frequency[-1])
 
     @property
     def drifts(self) -> bool:

@@ -31,8 +31,8 @@ _PER_PERIOD = 16  # steps per shortest period of the excitation
 
 def directions(forces: Sequence[PointForceTable]) -> np.ndarray:
     """Unit vectors of the forces, (k, 3)."""
-    given = np.array([force.direction for force in forces]).reshape(-1, 3)
-    return given / np.linalg.norm(given, axis=1, keepdims=True)
+    vectors = np.array([force.direction for force in forces]).reshape(-1, 3)
+    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
 
 
 def histories(forces: Sequence[PointForceTable], time: np.ndarray, order: int = 0) -> np.ndarray:
@@ -112,8 +112,8 @@ def planned(job: Job, record: Record, response: Response, shortest: float) -> Pl
         steps = equal_steps(time.duration, min(limits))
     else:
         steps = steps_of(time.duration, time.step)
-    kept = response.resolved(steps.size)
-    moved = len(response.every) - len(kept.every)
+    resolved = response.resolved(steps.size)
+    moved = len(response.every) - len(resolved.every)
     console.say(
         f"  step {steps.size:.4g} s, {steps.count} steps; fastest mode {fastest:.4g} 1/s, "
         f"{moved} states too fast for the step respond statically"
@@ -123,7 +123,7 @@ def planned(job: Job, record: Record, response: Response, shortest: float) -> Pl
             f"  the run ends at {steps.duration:.6g} s: {time.duration:.6g} s is not a multiple of the step"
         )
     record.indicators["states moved to the residual"] = (moved, "-")
-    return Planned(kept, steps.size, steps.count)
+    return Planned(resolved, steps.size, steps.count)
 
 
 def integration(job: Job, plan: Planned, scheme: str) -> Integration:
@@ -222,8 +222,8 @@ def blocks(
 ) -> Iterator[Block]:
     """The blocks of a loop as in `forces`, of a setup that rolls steadily, on the processes `comm` that share it. Collective
     on these."""
-    kept, spec = response.resolved(step), contact or job.scene.contact
-    tire = Recursion(response=kept, step=step, scheme=scheme, comm=comm, look_ahead=True)
+    resolved, spec = response.resolved(step), contact or job.scene.contact
+    tire = Recursion(response=resolved, step=step, scheme=scheme, comm=comm, look_ahead=True)
     driven = driven_tire(job, Integration(tire, step, steps, scheme), setup.patch)
     chosen: LinearTire = driven or tire
     loop = make_loop(spec, setup, chosen, step)

@@ -211,12 +211,12 @@ class RotatingStage(Computed[RollingModes]):
             matrices = wheel.rotating_damping, wheel.rotating_stiffness
             rim = wheel.rim() if wheel.rim else None
             arguments = wheel.operators, matrices, projected, rim
-            found, figures, warnings = full_states(
+            states, figures, warnings = full_states(
                 *arguments, count=rotation.count, window=rotation.window
             )
         record.indicators |= figures
         record.warnings += warnings
-        return found
+        return states
 
     def _campbell(self, record: Record, waves: FaceWaves) -> Campbell | None:
         """Eigenvalue branches over speed, if the scene asks for them. Collective."""
@@ -261,8 +261,8 @@ class RotatingStage(Computed[RollingModes]):
         """The states on the modes, or on fields of their own."""
         (states, own), basis = held, self.modes.product
         if own:
-            kept = {name: own[name] for name in ("momentum", "corner")}
-            projection = replace(basis.projection, **kept)
+            state = {name: own[name] for name in ("momentum", "corner")}
+            projection = replace(basis.projection, **state)
             basis = replace(basis, shape=own["shape"], projection=projection, modes=None)
         turning = turning_of(self.job.scene, self.job.speed)
         return RollingModes(basis=basis, states=states, turning=turning, full=bool(own))

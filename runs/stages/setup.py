@@ -48,18 +48,18 @@ MOST = 20_000_000  # most depths in a file
 _SHOWN = 2e-3  # m: spacing of the depths stored for the report
 
 
-def make_pattern(wanted: PatternTable | None, rolling_radius: float) -> Pattern | None:
+def make_pattern(table: PatternTable | None, rolling_radius: float) -> Pattern | None:
     """The pattern of a tire with this effective rolling radius (m); None for a slick.
 
     Raises InputError for an unusable file.
     """
-    if wanted is None:
+    if table is None:
         return None
     around = 2 * math.pi * rolling_radius
-    if wanted.file is not None:
-        return Pattern(around, heights=_heights(wanted))
-    starts = pitch_starts(wanted.pitches, wanted.pitch_lengths, wanted.seed, around)
-    return Pattern(around, wanted.groove, starts)
+    if table.file is not None:
+        return Pattern(around, heights=_heights(table))
+    starts = pitch_starts(table.pitches, table.pitch_lengths, table.seed, around)
+    return Pattern(around, table.groove, starts)
 
 
 def inputs(job: Job) -> list | None:
@@ -110,9 +110,9 @@ def fill(file: h5py.File, setup: ContactSetup) -> None:
         put(file, f"pattern/{name}", values, "m")
 
 
-def _heights(wanted: PatternTable) -> Heights:
-    path = Path(wanted.file)
-    heights = _image(path, wanted) if path.suffix.lower() == ".png" else _arrays(path)
+def _heights(table: PatternTable) -> Heights:
+    path = Path(table.file)
+    heights = _image(path, table) if path.suffix.lower() == ".png" else _arrays(path)
     depth, y = heights.depth, heights.y
     sound = depth.ndim == 2 and y.shape == depth.shape[1:] and len(y) > 1 and len(depth) > 1
     if not sound or not np.isfinite(depth).all() or not (np.diff(y) > 0).all():
@@ -138,7 +138,7 @@ def _arrays(path: Path) -> Heights:
         raise InputError(f"{path}: no pattern: arrays depth and y are needed ({problem})") from None
 
 
-def _image(path: Path, wanted: PatternTable) -> Heights:
+def _image(path: Path, table: PatternTable) -> Heights:
     """From an image: rows across the tire, from +y down; columns around it."""
     from matplotlib.image import imread
 
@@ -147,9 +147,9 @@ def _image(path: Path, wanted: PatternTable) -> Heights:
     except (OSError, ValueError, SyntaxError) as problem:
         raise InputError(f"{path}: no image that can be read ({problem})") from None
     bright = picture if picture.ndim == 2 else picture[..., :3].mean(axis=-1)
-    depth = wanted.depth * (1.0 - bright[::-1].T)
+    depth = table.depth * (1.0 - bright[::-1].T)
     rows = depth.shape[1]
-    return Heights(depth, wanted.width * ((np.arange(rows) + 0.5) / rows - 0.5))
+    return Heights(depth, table.width * ((np.arange(rows) + 0.5) / rows - 0.5))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -208,8 +208,8 @@ def points_of(job: Job, state: StaticState) -> str | Pitch:
     # So that the choice is the same with and without an error estimate of the load.
     extent = replace(state, fine_extent=None).footprint()
     speed = rolling_speed(job, state)
-    found = spacing(extent, nodes_within(state, 0.0), speed, job.scene.accuracy.up_to)
-    return "nodes" if found is None else Pitch(found, found)
+    pitch = spacing(extent, nodes_within(state, 0.0), speed, job.scene.accuracy.up_to)
+    return "nodes" if pitch is None else Pitch(pitch, pitch)
 
 
 def _slipping(job: Job, state: StaticState, setup: ContactSetup) -> ContactSetup:
@@ -227,8 +227,8 @@ def rolling_speed(job: Job, state: StaticState) -> float:
 
 def rolling_radius(job: Job, state: StaticState) -> float:
     """Effective rolling radius, m: from the scene, or else from the static state."""
-    given = job.scene.rotation.rolling_radius if job.scene.rotation else None
-    return given or state.rolling_radius()
+    radius = job.scene.rotation.rolling_radius if job.scene.rotation else None
+    return radius or state.rolling_radius()
 
 
 def components(job: Job) -> tuple[int, ...]:

@@ -49,7 +49,7 @@ PASS_BY = 7.5  # m: distance of the directivity
 KNOWN = 0.9  # least part of a total that lies in bands of known error
 
 
-def microphones(given: tuple, state: StaticState) -> tuple[list[str], np.ndarray]:
+def microphones(table: tuple, state: StaticState) -> tuple[list[str], np.ndarray]:
     """Names and places (k, 3) m of a scene's microphones beside the tire in its static state.
 
     cpx: ISO 11819-2, 0.2 m beside the undeformed sidewall, 0.1 m high, 0.2 m ahead and behind.
@@ -68,12 +68,14 @@ def microphones(given: tuple, state: StaticState) -> tuple[list[str], np.ndarray
             for place, sign in (("inner", -1), ("outer", 1))
         },
     }
-    found: dict[str, tuple[float, ...]] = {}
-    for one in given:
-        found |= (
-            known[one] if isinstance(one, str) else {f"{one[0]:g}, {one[1]:g}, {one[2]:g} m": one}
+    places: dict[str, tuple[float, ...]] = {}
+    for item in table:
+        places |= (
+            known[item]
+            if isinstance(item, str)
+            else {f"{item[0]:g}, {item[1]:g}, {item[2]:g} m": item}
         )
-    return list(found), np.array(list(found.values()))
+    return list(places), np.array(list(places.values()))
 
 
 def probes(names: list[str]) -> dict[str, tuple[int, int]]:
@@ -141,8 +143,8 @@ class RadiationStage(Computed[Paths]):
         frequency, size = solved_frequencies(up_to), elements_for(up_to, air)
         with record.timing("elements"):
             tire, rough = (sounding(self.static.product, table, size, by) for by in (1.0, COARSER))
-            for one in (tire, rough):
-                one.body.checked("sound")
+            for shape in (tire, rough):
+                shape.body.checked("sound")
         names, places = microphones(table.microphones, self.static.product)
         tire.body.check_microphones(places, "sound.microphones", names)
         every = np.vstack([places, FAR * directions()[0]])
@@ -152,8 +154,8 @@ class RadiationStage(Computed[Paths]):
         with record.timing("larger elements"):
             coarse = transfer(rough, places, frequency, air, comm, table.road)
         k = len(places)
-        kept: dict[str, Any] = {"frequency": frequency, "air": air}
-        near = Transfer(ahead=found[:, :k], distance=apart[:k], **kept)
+        values: dict[str, Any] = {"frequency": frequency, "air": air}
+        near = Transfer(ahead=found[:, :k], distance=apart[:k], **values)
         with record.timing("sources inside"):
             error = np.abs(source_errors(tire, near, places, table.road)).max(axis=0)
         record.headline |= {
@@ -173,8 +175,8 @@ class RadiationStage(Computed[Paths]):
             names=names,
             places=places,
             near=near,
-            far=Transfer(ahead=found[:, k:], distance=apart[k:], **kept),
-            coarse=Transfer(ahead=coarse, distance=apart[:k], **kept),
+            far=Transfer(ahead=found[:, k:], distance=apart[k:], **values),
+            coarse=Transfer(ahead=coarse, distance=apart[:k], **values),
             error=error,
             size=size,
         )
@@ -197,14 +199,14 @@ class RadiationStage(Computed[Paths]):
             speed=float(file.attrs["speed_of_sound"]), density=float(file.attrs["density"])
         )
         places = file["microphones"][:]
-        kept: dict[str, Any] = {"frequency": file["frequency"][:], "air": air}
-        near, far = (np.linalg.norm(one, axis=1) for one in (places, FAR * directions()[0]))
+        values: dict[str, Any] = {"frequency": file["frequency"][:], "air": air}
+        near, far = (np.linalg.norm(group, axis=1) for group in (places, FAR * directions()[0]))
         return Paths(
             names=[str(name) for name in file["microphones"].attrs["names"]],
             places=places,
-            near=Transfer(ahead=file["near"][:], distance=near, **kept),
-            far=Transfer(ahead=file["far"][:], distance=far, **kept),
-            coarse=Transfer(ahead=file["coarse"][:], distance=near, **kept),
+            near=Transfer(ahead=file["near"][:], distance=near, **values),
+            far=Transfer(ahead=file["far"][:], distance=far, **values),
+            coarse=Transfer(ahead=file["coarse"][:], distance=near, **values),
             error=file["error_of_sources_inside"][:],
             size=float(file.attrs["size"]),
         )
@@ -341,19 +343,19 @@ class SoundStage(WholeTire[SoundPressure]):
         """The air squeezed out of the footprint; None where it is not asked for or not known. Root process only."""
         table = self.job.scene.sound
         assert table is not None, "the stage runs with [sound] only"
-        wanted = lines.frequency[-1] >= SQUEEZED if table.air is None else table.air
-        if not wanted or self.contact is None or setup is None:
+        is_heard = lines.frequency[-1] >= SQUEEZED if table.air is None else table.air
+        if not is_heard or self.contact is None or setup is None:
             return None
         with record.timing("air of the footprint"):
-            given = tire, self.static.product, self.radiation.product.far
-            found = LeavingAir.of(self.job, setup, lines, *given)
-        if found is None:
+            arguments = tire, self.static.product, self.radiation.product.far
+            air = LeavingAir.of(self.job, setup, lines, *arguments)
+        if air is None:
             record.notes.append(
                 "the air squeezed out of the footprint is not in the sound: that needs contact points on a grid (contact.points) on a plane"
             )
             return None
-        record.indicators["mean gap in the footprint"] = (found.height, "m")
-        return found
+        record.indicators["mean gap in the footprint"] = (air.height, "m")
+        return air
 
     @cached_property
     def _errors(self) -> tuple[np.ndarray, np.ndarray]:
@@ -362,16 +364,16 @@ class SoundStage(WholeTire[SoundPressure]):
         Those of the vertical contact force, which drives it, and of the force on the axle, which the modes
         carry there as they do to the outer face: of its three directions by their power.
         """
-        found = self.spectra.product if self.spectra else None
-        if found is None or found.contact_level_error is None:
+        spectra = self.spectra.product if self.spectra else None
+        if spectra is None or spectra.contact_level_error is None:
             return np.zeros(0), np.zeros(0)
-        error = found.contact_level_error[:, 2]
-        if found.level_error is not None:
-            level = found.levels["third_octave/level"]
+        error = spectra.contact_level_error[:, 2]
+        if spectra.level_error is not None:
+            level = spectra.levels["third_octave/level"]
             share = 10 ** ((level - level.max(axis=1, keepdims=True)) / 10)
-            axle = (share * found.level_error).sum(axis=1) / share.sum(axis=1)
+            axle = (share * spectra.level_error).sum(axis=1) / share.sum(axis=1)
             error = np.hypot(error, axle)
-        return found.levels["third_octave/centre"], error
+        return spectra.levels["third_octave/centre"], error
 
     def write(self, file: h5py.File, product: SoundPressure) -> None:
         """All fields of the product."""
@@ -538,13 +540,13 @@ def _sound(
 
 def _intensities(heard: Heard, ears: np.ndarray) -> dict[str, Any]:
     """The fields of the intensity; `ears` (f,): the A-weighting as a factor of powers."""
-    found = probes(heard.paths.names)
-    if not found:
+    pairs = probes(heard.paths.names)
+    if not pairs:
         bands = np.zeros((0, len(heard.bands(np.zeros(len(heard.frequency)))[0])))
         lines = np.zeros((0, len(heard.frequency)))
         rest = {"intensity_index": bands, "total_intensity": np.zeros(0)}
         return {"probes": [], "intensity": lines, "intensity_level": bands, **rest}
-    inner, outer = (heard.pressure[[pair[k] for pair in found.values()]] for k in (0, 1))
+    inner, outer = (heard.pressure[[pair[k] for pair in pairs.values()]] for k in (0, 1))
     lines = intensity(inner, outer, heard.frequency, heard.paths.near.air.density)
     middle = np.abs((inner + outer) / 2) ** 2 / 2
     _, flux = heard.bands(lines.T)
@@ -557,7 +559,7 @@ def _intensities(heard: Heard, ears: np.ndarray) -> dict[str, Any]:
             for part in (weighted, (lines * ears).sum(axis=1) / HANN)
         ]
     return {
-        "probes": list(found),
+        "probes": list(pairs),
         "intensity": lines,
         "intensity_level": levels[0].T,
         "intensity_index": index.T,
@@ -581,7 +583,7 @@ def _of_elements(paths: Paths, centre: np.ndarray, coarser: np.ndarray) -> np.nd
     """Errors (k, b) dB of the boundary elements, by larger ones (b, k) dB and by sources inside."""
     elements = coarser.T / (COARSER**ORDER - 1)
     solved = paths.near.frequency[1:]
-    inside = np.array([np.interp(centre, solved, one) for one in paths.error]).reshape(
+    inside = np.array([np.interp(centre, solved, error) for error in paths.error]).reshape(
         len(paths.names), -1
     )
     return np.hypot(elements, inside)
@@ -612,7 +614,7 @@ def _weights(paths: Paths, tire: SoundingTire) -> np.ndarray:
     near = paths.near
     wave = 2 * np.pi * near.frequency[:, None, None]
     delay = np.exp(-1j * wave / near.air.speed * near.distance[:, None])
-    weight = np.stack([(tire.nodes @ one.T).T for one in near.ahead])
+    weight = np.stack([(tire.nodes @ column.T).T for column in near.ahead])
     return (1j * wave * near.air.density * delay * weight).astype(np.complex64)
 
 
@@ -654,11 +656,11 @@ def _shares(heard: Heard) -> tuple[np.ndarray, np.ndarray]:
 def _regions(tire: SoundingTire) -> np.ndarray:
     """Number of the region of each element, (e,)."""
     side, place = tire.body.normal[:, 1], tire.body.center
-    found = np.where(place[:, 0] >= 0, 0, 1)
-    found[place[:, 2] > tire.height] = 2
-    found[side > SIDE], found[side < -SIDE] = 3, 4
-    found[~tire.face] = 5
-    return found
+    region = np.where(place[:, 0] >= 0, 0, 1)
+    region[place[:, 2] > tire.height] = 2
+    region[side > SIDE], region[side < -SIDE] = 3, 4
+    region[~tire.face] = 5
+    return region
 
 
 def _told(record: Record, name: str, value: float, error: float, unit: str) -> None:
@@ -668,45 +670,45 @@ def _told(record: Record, name: str, value: float, error: float, unit: str) -> N
         record.headline[what] = (float(number), of) if known else ("unknown", "-")
 
 
-def _describe(record: Record, found: SoundPressure) -> None:
+def _describe(record: Record, sound: SoundPressure) -> None:
     """Levels at the microphones with their errors, the CPX level, and the sound power."""
-    for k, name in enumerate(found.names):
+    for k, name in enumerate(sound.names):
         for kind, total, error, unit in (
-            ("sound pressure level", found.total, found.total_error, "dB"),
+            ("sound pressure level", sound.total, sound.total_error, "dB"),
             (
                 "A-weighted sound pressure level",
-                found.total_weighted,
-                found.total_weighted_error,
+                sound.total_weighted,
+                sound.total_weighted_error,
                 "dB(A)",
             ),
         ):
             _told(record, f"{kind} at {name}", total[k], error[k], f"{unit} re 20 uPa")
     for name, unit in (("CPX", "dB(A) re 20 uPa"), ("OBSI", "dB(A) re 1 pW/m2")):
-        heard = [k for k, one in enumerate(found.names) if one.startswith(f"{name.lower()} ")]
+        heard = [k for k, one in enumerate(sound.names) if one.startswith(f"{name.lower()} ")]
         if not heard:
             continue
-        levels = found.total_weighted[heard] if name == "CPX" else found.total_intensity
+        levels = sound.total_weighted[heard] if name == "CPX" else sound.total_intensity
         mean = 10 * np.log10((10 ** (levels / 10)).mean())
         # That of the vibration is the same at all microphones: it does not average out.
-        error = found.total_weighted_error[heard].mean()
+        error = sound.total_weighted_error[heard].mean()
         _told(record, f"A-weighted {name} level", mean, error, unit)
-    if found.probes:
-        index = found.intensity_index
+    if sound.probes:
+        index = sound.intensity_index
         record.indicators["largest pressure-intensity index of a third octave"] = (
             float(index.max()) if index.size else math.nan,
             "dB",
         )
-    if found.of_elements.size:
-        largest = float(found.of_elements.max())
+    if sound.of_elements.size:
+        largest = float(sound.of_elements.max())
         record.indicators["largest error of a third octave by the boundary elements"] = (
             largest,
             "dB",
         )
     for name, value, unit in zip(
         ("sound power level", "A-weighted sound power level"),
-        found.total_power,
+        sound.total_power,
         ("dB re 1 pW", "dB(A) re 1 pW"),
         strict=True,
     ):
         _told(record, name, value, math.nan, unit)
-    record.headline["band"] = (f"{found.frequency[0]:.3g} to {found.frequency[-1]:.4g} Hz", "-")
+    record.headline["band"] = (f"{sound.frequency[0]:.3g} to {sound.frequency[-1]:.4g} Hz", "-")

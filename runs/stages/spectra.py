@@ -87,10 +87,10 @@ ROUNDING = 1e-12  # relative to the largest line: anything below is rounding
 
 def series(history: ContactHistory, start: int) -> dict[str, np.ndarray]:
     """The histories by level name from step `start` on: (n, d) in N, N m, and m for points."""
-    found = {"contact_level": history.total_force, "level": history.axle_force}
-    found |= {"hub_moment_level": history.wheel.get("hub_moment")}
-    found |= {"point_velocity_level": history.driven}
-    return {name: values[start:] for name, values in found.items() if values is not None}
+    histories = {"contact_level": history.total_force, "level": history.axle_force}
+    histories |= {"hub_moment_level": history.wheel.get("hub_moment")}
+    histories |= {"point_velocity_level": history.driven}
+    return {name: values[start:] for name, values in histories.items() if values is not None}
 
 
 def records_of(name: str, values: np.ndarray, further: Stretches | None) -> list[np.ndarray]:
@@ -108,7 +108,7 @@ def levels_of(
     with each line weighted; `…_spread` (b, 3, 2); densities (f, 3) or (f, k, 3). Of the mean power of the run's own record and
     of the windows of `further` stretches.
     """
-    found: dict[str, np.ndarray] = {}
+    levels: dict[str, np.ndarray] = {}
     held = further.held if further else (1,)
     for name, values in series(history, start).items():
         what, reference, _, _, rate = _KINDS[name]
@@ -122,16 +122,16 @@ def levels_of(
                 for window in chance.windows(record, len(values))
             ]
             centre, level = every[0][0], np.array([one for _, one in every])
-            found[f"third_octave/{name}{suffix}"] = chance.pooled(level).reshape(-1, *shape)
+            levels[f"third_octave/{name}{suffix}"] = chance.pooled(level).reshape(-1, *shape)
             spacing = 1 / (len(values) * history.step)
             if not weighted:
                 each, degrees = (chance.freedom(centre, spacing, h) for h in ((1,), held))
                 if len(every) >= chance.LEAST_WINDOWS:
                     wide = chance.spread(level, each, degrees)
-                    found[f"third_octave/{name}{SPREAD}"] = wide.reshape(-1, *shape, 2)
+                    levels[f"third_octave/{name}{SPREAD}"] = wide.reshape(-1, *shape, 2)
         welch = density(records, history.step, up_to, rate)
-        found[f"density/{what}"] = welch.density.reshape(-1, *shape)
-    return found | {
+        levels[f"density/{what}"] = welch.density.reshape(-1, *shape)
+    return levels | {
         "third_octave/centre": centre,
         "third_octave/nominal": spectra.nominal(centre),
         "third_octave/lines": spectra.lines(centre, spacing),
@@ -148,7 +148,7 @@ def levels_of(
 
 def describe(
     record: Record,
-    found: dict[str, np.ndarray],
+    levels: dict[str, np.ndarray],
     history: ContactHistory,
     start: int,
     up_to: float,
@@ -158,7 +158,7 @@ def describe(
 
     Totals are over all lines below `up_to` Hz and do not depend on which bands have a level.
     """
-    names = found["third_octave/nominal"]
+    names = levels["third_octave/nominal"]
     if len(names):
         record.headline["bands"] = (_named(names), "-")
     forces = series(history, start)
@@ -181,26 +181,26 @@ def describe(
                 (total, f"dB{letter} re 1 N") if total > SILENT else _CONSTANT
             )
         _warn_of_window(record, vertical, what)
-    _describe_chance(record, found)
-    narrow = spectra.nominal(found["third_octave/too_narrow"])
+    _describe_chance(record, levels)
+    narrow = spectra.nominal(levels["third_octave/too_narrow"])
     if len(narrow):
         record.headline["bands left out, narrower than three lines"] = (_named(narrow), "-")
 
 
-def _describe_chance(record: Record, found: dict[str, np.ndarray]) -> None:
+def _describe_chance(record: Record, levels: dict[str, np.ndarray]) -> None:
     """Record how far the lowest band of pooled stretches may be off by chance, by its lines and by the spread of the windows."""
-    wide = found.get(
-        f"third_octave/level{SPREAD}", found.get(f"third_octave/contact_level{SPREAD}")
+    wide = levels.get(
+        f"third_octave/level{SPREAD}", levels.get(f"third_octave/contact_level{SPREAD}")
     )
-    names = found["third_octave/nominal"]
+    names = levels["third_octave/nominal"]
     if wide is None or not len(names):
         return
-    worst = int(np.abs(found["third_octave/confidence"]).max(axis=1).argmax())
+    worst = int(np.abs(levels["third_octave/confidence"]).max(axis=1).argmax())
     name = f"third octave {names[worst]:g} Hz by chance, 95 %"
-    by_lines, by_spread = found["third_octave/confidence"][worst], wide[worst, 2]
+    by_lines, by_spread = levels["third_octave/confidence"][worst], wide[worst, 2]
     record.headline[f"{name}, at most"] = (float(np.abs(by_lines).max()), "dB")
     if np.isfinite(by_spread).all():
-        record.headline[f"{name}, by the spread of {int(found['third_octave/windows'].sum())} windows"] = (
+        record.headline[f"{name}, by the spread of {int(levels['third_octave/windows'].sum())} windows"] = (
             float(np.abs(by_spread).max()),
             "dB",
         )  # fmt: skip
@@ -236,11 +236,11 @@ def _named(bands: np.ndarray) -> str:
     return f"{bands[0]:g} to {bands[-1]:g} Hz" if len(bands) > 1 else f"{bands[0]:g} Hz"
 
 
-def write(file: h5py.File, found: dict[str, np.ndarray]) -> None:
-    """Write all datasets of `found`."""
+def write(file: h5py.File, levels: dict[str, np.ndarray]) -> None:
+    """Write all datasets of `levels`."""
     for name in UNITS:
-        if name in found:
-            put(file, name, found[name], UNITS[name])
+        if name in levels:
+            put(file, name, levels[name], UNITS[name])
 
 
 def read(file: h5py.File) -> dict[str, np.ndarray]:
@@ -356,21 +356,21 @@ class SpectraStage(Computed[Spectra]):
         bars = self.accuracy.product
         if not bars.by_cause.get("contact_force"):
             return f"unknown: {', '.join(dict.fromkeys(bars.absent.values()))}"
-        found = bars.levels("contact_force", centre)
-        if found is None or not np.isfinite(found).any():
+        errors = bars.levels("contact_force", centre)
+        if errors is None or not np.isfinite(errors).any():
             return f"unknown: its companions end after {bars.window:.3g} s, too short for third octaves"
         left_out = (f"by the {cause} ({reason})" for cause, reason in bars.absent.items())
         return ", ".join(("without the part", *left_out)) if bars.absent else ""
 
     def _limit(self, record: Record, step: float) -> Limit:
         """The lowest frequency limit of the model, with its cause."""
-        found = all_limits(self.setup.product, self.rotating.product, step)
-        limit = lowest(found)
+        limits = all_limits(self.setup.product, self.rotating.product, step)
+        limit = lowest(limits)
         record.headline["valid up to"] = (limit.frequency, "Hz")
         record.headline["limited by"] = (limit.cause, "-")
         others = ", ".join(
             f"{other.cause} would allow {other.frequency:.4g} Hz"
-            for other in found
+            for other in limits
             if other != limit
         )
         console.say(f"  spectra end at {limit.frequency:.4g} Hz, {limit.cause}; {others}")

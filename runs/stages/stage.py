@@ -201,15 +201,15 @@ class PipelinePart(ABC, Generic[P]):
     @classmethod
     def with_inputs(cls, job: Job, done: Mapping[str, Result]) -> PipelinePart | None:
         """The part with its inputs from `done`; None if a required input is missing."""
-        given: dict[str, Any] = {}
+        parts: dict[str, Any] = {}
         for item in fields(cls):
             if item.name == "job":
                 continue
             if item.name in done:
-                given[item.name] = done[item.name]
+                parts[item.name] = done[item.name]
             elif item.default is MISSING:
                 return None
-        return cls(job=job, **given)
+        return cls(job=job, **parts)
 
 
 class Shared(PipelinePart[P]):

@@ -51,11 +51,11 @@ def fill_cords(file: h5py.File, state: StaticState) -> None:
 
 def read_cords(file: h5py.File) -> dict:
     """The fields of a static state that `fill` wrote."""
-    found = {
+    cords = {
         name: CordForce(*(group[part][:] for part in _UNITS))
         for name, group in file.get("cords", {}).items()
     }
-    return {"cords": found, "mass": float(file.attrs["mass"])}
+    return {"cords": cords, "mass": float(file.attrs["mass"])}
 
 
 def cord_headline(state: StaticState) -> dict[str, tuple[float, str]]:
@@ -247,9 +247,9 @@ class StaticStage(Computed[StaticState]):
         try:
             pressed = self._press(loader, rolling, initial)
         except ConvergenceError as error:
-            kept = self._keep_last(loader)
+            journal = self._keep_last(loader)
             cause = with_cause(error, loader, rolling, lambda other: self._press(other, rolling))
-            raise ConvergenceError(f"{cause}{kept}") from None
+            raise ConvergenceError(f"{cause}{journal}") from None
         if pressed is not loader:
             equilibrium.cost.take(pressed.equilibrium.cost)
             loader.newton_steps = pressed.newton_steps
@@ -341,28 +341,28 @@ def _estimate(record: Record, state: StaticState, loader: LoadStepper) -> Static
     """Report the load error from finer elements; returns the state, their footprint. Collective."""
     if state.pull is not None:  # estimated without friction: the load's error is the same with it
         loader.equilibrium.solve(loader.equilibrium.road_height)
-    found = load_error(loader, state.rolling)
-    if isinstance(found, str):
-        console.say(f"  error of the load not estimated: {found}")
+    error = load_error(loader, state.rolling)
+    if isinstance(error, str):
+        console.say(f"  error of the load not estimated: {error}")
         return state
-    whole = found.bulk is not None
+    whole = error.bulk is not None
     what = "estimated error of the load" + ("" if whole else " by the footprint's elements")
-    record.indicators[what] = (100 * found.relative, "%")
-    to = f"ever smaller elements: {found.load:.5g} N" if found.signed else "of unknown sign"
-    rest = f"{100 * found.bulk:.2g} %" if whole else f"not estimated: {UNKNOWN}"
+    record.indicators[what] = (100 * error.relative, "%")
+    to = f"ever smaller elements: {error.load:.5g} N" if error.signed else "of unknown sign"
+    rest = f"{100 * error.bulk:.2g} %" if whole else f"not estimated: {UNKNOWN}"
     console.say(
-        f"  {what} at this height of the road: {100 * found.relative:.2g} % ({to}); of "
-        f"the footprint's elements {100 * found.footprint:.2g} %, of the rest {rest}; {found.unknowns} unknowns with finer elements there"
+        f"  {what} at this height of the road: {100 * error.relative:.2g} % ({to}); of "
+        f"the footprint's elements {100 * error.footprint:.2g} %, of the rest {rest}; {error.unknowns} unknowns with finer elements there"
     )
-    if found.relative > COARSE:
+    if error.relative > COARSE:
         record.warnings.append(
-            f"the load may be off by {100 * found.relative:.2g} %: take smaller elements "
+            f"the load may be off by {100 * error.relative:.2g} %: take smaller elements "
             "(tire.segments, tire.elements_arc, tire.footprint_size)"
         )
     for name in _EXTENT[:2]:
         size = getattr(state.footprint(), name)
         record.indicators[f"footprint {name} on the elements of the run"] = (size, "m")
-    return state if state.pull is not None else replace(state, fine_extent=found.extent)
+    return state if state.pull is not None else replace(state, fine_extent=error.extent)
 
 
 def _show(progress) -> None:

@@ -62,7 +62,7 @@ def slides(job: Job, state: StaticState, stuck: RoadStiffness) -> dict[str, Curv
     stiffness, friction = job.scene.stiffness, job.scene.static.friction
     if state.pull is None or not friction or not stiffness.slide_steps:
         return {}  # friction 0 resists nothing: no displacement to slide over
-    found: dict[str, Curve] = {}
+    curves: dict[str, Curve] = {}
     for axis, name in enumerate(AXES):
         slide = Slide(job.tire.body, state, friction, axis)
         start = slide.start(wheel_slip(job.scene))
@@ -83,8 +83,8 @@ def slides(job: Job, state: StaticState, stuck: RoadStiffness) -> dict[str, Curv
             points.append(point)
             console.say(f"  {name}: {_told(point, slide.rolls)}")
         columns = {key: np.array([getattr(point, key) for point in points]) for key in _COLUMNS}
-        found[name] = columns | {"start": np.array(start)}
-    return found
+        curves[name] = columns | {"start": np.array(start)}
+    return curves
 
 
 def _told(point: Slid, rolls: bool) -> str:
@@ -105,9 +105,9 @@ def units(rolls: bool) -> dict[str, str]:
     }
 
 
-def fill(file: h5py.File, found: Mapping[str, Curve], rolls: bool) -> None:
+def fill(file: h5py.File, curves: Mapping[str, Curve], rolls: bool) -> None:
     """Write `slide/<axis>/...`."""
-    for name, curve in found.items():
+    for name, curve in curves.items():
         for key, unit in units(rolls).items():
             put(file, f"slide/{name}/{key}", curve[key], unit)
 
@@ -126,9 +126,9 @@ def half_way(curve: Curve) -> float:
     return float(half / np.interp(half, force[: last + 1], moved[: last + 1]))
 
 
-def describe(record: Record, found: Mapping[str, Curve], rolls: bool) -> None:
+def describe(record: Record, curves: Mapping[str, Curve], rolls: bool) -> None:
     """Record the headline figures."""
-    for name, curve in found.items():
+    for name, curve in curves.items():
         force = float(curve["force"].max())
         if rolls:
             title = "cornering stiffness" if name == "lateral" else "longitudinal slip stiffness"
@@ -183,10 +183,10 @@ class StiffnessStage(Computed[Stiffness]):
             slides = self._slides(record, stuck)
         finally:
             body.set_displacement(state.displacement)
-        found = replace(_result(points, state, stuck), slides=slides)
-        _describe(record, found, stuck)
+        result = replace(_result(points, state, stuck), slides=slides)
+        _describe(record, result, stuck)
         describe(record, slides, state.travel is not None)
-        return found
+        return result
 
     def _stuck(self, record: Record, nodes: np.ndarray, centre: np.ndarray) -> RoadStiffness:
         """Stiffness of the present footprint; `nodes` are this process's own. Collective."""
@@ -281,8 +281,8 @@ def _vertical(curve: dict[str, np.ndarray], state: StaticState) -> tuple[float, 
     return state.load, float(slopes(deflection[order], load[order], np.array([own]))[0])
 
 
-def _describe(record: Record, found: Stiffness, stuck: RoadStiffness | None) -> None:
-    curve, figures = found.curve, found.figures
+def _describe(record: Record, result: Stiffness, stuck: RoadStiffness | None) -> None:
+    curve, figures = result.curve, result.figures
     record.headline |= {
         "deflections": (len(curve["load"]), "-"),
         "largest deflection": (float(curve["deflection"][-1]), "m"),

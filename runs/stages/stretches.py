@@ -90,16 +90,16 @@ class StretchesStage(Computed[Stretches]):
             settled = self._settled()
         roads = list(stretches(road, settled, plan, more * history.step))
         with record.timing("time loops"):
-            found = self._rolled(roads, more, grown)
-        return Stretches(length=length, **found)
+            rolled = self._rolled(roads, more, grown)
+        return Stretches(length=length, **rolled)
 
     def _plan(self, record: Record, length: int) -> StretchPlan:
         """How many stretches of how many windows; recorded, with the chance that they leave."""
         history, scene = self.contact.product, self.job.scene
         limit = model_limit(self.setup.product, self.rotating.product, history.step).frequency
-        spacing, wanted = 1 / (length * history.step), scene.accuracy.chance_db
+        spacing, decibels = 1 / (length * history.step), scene.accuracy.chance_db
         bands = asked(spacing, limit)
-        plan = planned(bands, spacing, wanted)
+        plan = planned(bands, spacing, decibels)
         room = _with_room(scene.road, self.setup.product, plan, length, history.step)
         left = largest(freedom(bands, spacing, room.all_windows)) if len(bands) else np.nan
         record.headline |= {
@@ -118,9 +118,9 @@ class StretchesStage(Computed[Stretches]):
             f"  {room.stretches} stretches of {room.windows} half-overlapping windows of {length * history.step:.4g} s: "
             f"third octaves from {lowest} on are within {left:.3g} dB of the road's by the number of their lines"
         )  # fmt: skip
-        if left > wanted:
+        if left > decibels:
             record.warnings.append(
-                f"levels of the road are known within {left:.3g} dB from {lowest} on, not {wanted:g} dB: the road ends, or "
+                f"levels of the road are known within {left:.3g} dB from {lowest} on, not {decibels:g} dB: the road ends, or "
                 f"more than {plan.stretches} stretches would be needed. Take a longer road, a longer time.duration, or a "
                 "larger accuracy.chance_db"
             )
@@ -139,22 +139,22 @@ class StretchesStage(Computed[Stretches]):
     def _rolled(self, roads: list[ContactSetup], count: int, grown: int) -> Forces:
         """Forces (r, n, ...) by the names of `Stretches`, of `count` steps less the first `grown`. Collective."""
         response, comm = self.greens.product.contact, self.job.comm
-        kept = response.resolved(self.contact.product.step)
-        together = sharers(kept, comm)
+        resolved = response.resolved(self.contact.product.step)
+        together = sharers(resolved, comm)
         alone = together.size < comm.size
         mine = range(comm.rank if alone else 0, len(roads), comm.size if alone else 1)
-        found, error = dict[int, Forces](), None
+        rolled, error = dict[int, Forces](), None
         try:
             with console.ProgressBar(self.name, count * len(mine)) as bar:
                 for number in mine:
-                    found[number] = self._forces(roads[number], count, grown, together, bar)
+                    rolled[number] = self._forces(roads[number], count, grown, together, bar)
         except (ConvergenceError, InputError) as told:
             error = told
-        failed = [one for one in comm.allgather(error) if one is not None]
+        failed = [failure for failure in comm.allgather(error) if failure is not None]
         if failed:
             raise failed[0]
         every = [
-            broadcast(comm, found.get(number), number % comm.size if alone else 0)
+            broadcast(comm, rolled.get(number), number % comm.size if alone else 0)
             for number in range(len(roads))
         ]
         if not every:
@@ -173,8 +173,8 @@ class StretchesStage(Computed[Stretches]):
         history, response = self.contact.product, self.greens.product.contact
         scheme = recursive(history.scheme)
         parts: dict[str, list[Array]] = {}
-        given = self.job, setup, response, history.step, count, scheme, comm
-        for block in blocks(*given):
+        arguments = self.job, setup, response, history.step, count, scheme, comm
+        for block in blocks(*arguments):
             told = {"contact_force": block.total_force, "axle_force": block.axle_force}
             told |= self._read(setup, block.reading)
             for name, values in told.items():
@@ -190,11 +190,11 @@ class StretchesStage(Computed[Stretches]):
             return {}
         forces = len(self.job.scene.force)
         points, wheel = np.split(readings, [3 * forces], axis=1)
-        found = {"driven": points.reshape(-1, forces, 3)} if forces else {}
+        values = {"driven": points.reshape(-1, forces, 3)} if forces else {}
         if corner.readings(self.job):
             moment = corner.parts(wheel, corner.standing_moment(setup.patch))["hub_moment"]
-            found["hub_moment"] = moment
-        return found
+            values["hub_moment"] = moment
+        return values
 
 
 def stretches(
@@ -225,14 +225,14 @@ def _with_room(
     if road.drum_radius is not None or setup.rolled.speed <= 0:
         left = 0.0  # a drum comes round again
 
-    def fits(one: StretchPlan) -> bool:
-        duration = run_in(setup, road) + (steps(one.windows, length) + 1) * step
-        return one.stretches * (setup.rolled.speed * duration + x1 - x0) <= left
+    def fits(plan: StretchPlan) -> bool:
+        duration = run_in(setup, road) + (steps(plan.windows, length) + 1) * step
+        return plan.stretches * (setup.rolled.speed * duration + x1 - x0) <= left
 
     if fits(plan):
         return plan
     numbers = [2**k for k in range(plan.stretches.bit_length())]
     smaller = [StretchPlan(n, w) for n in numbers for w in range(1, MOST_WINDOWS + 1)]
     most = plan.stretches * plan.windows
-    held = [one for one in smaller if one.stretches * one.windows <= most and fits(one)]
-    return max(held, key=lambda one: one.stretches * one.windows, default=StretchPlan(0, 0))
+    held = [plan for plan in smaller if plan.stretches * plan.windows <= most and fits(plan)]
+    return max(held, key=lambda plan: plan.stretches * plan.windows, default=StretchPlan(0, 0))

@@ -69,9 +69,9 @@ class VibrationStage(WholeTire[Vibration]):
             return None
         surface = Surface.of(state.points, self.job.tire.lattice.quads())
         shape = Basis.of(self.rotating.product).face(len(state.points))
-        found = _seen(shape, surface, state, lines.frequency, lines.amplitude)
-        record.headline |= _headline(found, surface)
-        return found
+        vibration = _seen(shape, surface, state, lines.frequency, lines.amplitude)
+        record.headline |= _headline(vibration, surface)
+        return vibration
 
 
 def _seen(
@@ -86,7 +86,7 @@ def _seen(
     heard = lines * 10 ** (a_weighting(frequency) / 10)
     _, weighted = band_sums(frequency, heard)
     fits = max(int(_LARGEST // (16 * shape.shape[0])), 1)
-    kept = np.sort(np.argsort(-velocity)[:fits])
+    nodes = np.sort(np.argsort(-velocity)[:fits])
     return Vibration(
         frequency=frequency,
         velocity=velocity,
@@ -95,8 +95,8 @@ def _seen(
         power_level=decibels(radiated_power(square, surface.area), POWER),
         weighted=decibels(radiated_power(weighted, surface.area), POWER),
         velocity_weighted=decibels(weighted, VELOCITY**2),
-        shapes_at=frequency[kept],
-        displacement=(a[kept] @ shape.T).reshape(len(kept), -1, 3),
+        shapes_at=frequency[nodes],
+        displacement=(a[nodes] @ shape.T).reshape(len(nodes), -1, 3),
         points=state.points,
         total_velocity=_total(lines, VELOCITY**2),
         total_power=_total(radiated_power(lines, surface.area), POWER),
@@ -114,14 +114,14 @@ def _total(square: np.ndarray, reference: float) -> float:
     return float(decibels(square.sum(), reference))
 
 
-def _headline(found: Vibration, surface: Surface) -> dict[str, tuple[float, str]]:
+def _headline(vibration: Vibration, surface: Surface) -> dict[str, tuple[float, str]]:
     """Totals over all lines."""
     return {
         "area of the outer face": (surface.area, "m2"),
-        "velocity level": (found.total_velocity, "dB re 1 nm/s"),
-        "equivalent radiated power": (found.total_power, "dB re 1 pW"),
-        "A-weighted equivalent radiated power": (found.total_weighted, "dB(A) re 1 pW"),
-        "strongest line": (float(found.frequency[found.velocity.argmax()]), "Hz"),
+        "velocity level": (vibration.total_velocity, "dB re 1 nm/s"),
+        "equivalent radiated power": (vibration.total_power, "dB re 1 pW"),
+        "A-weighted equivalent radiated power": (vibration.total_weighted, "dB(A) re 1 pW"),
+        "strongest line": (float(vibration.frequency[vibration.velocity.argmax()]), "Hz"),
     }
 
 
@@ -147,20 +147,20 @@ class MotionStage(WholeTire[Motion]):
 
     def compute(self, record: Record) -> Motion | None:
         """The outer face at the stored instants; None but on the root process. Collective."""
-        made: list[Motion] = []
+        motions: list[Motion] = []
         basis, forces = self.taken_in()
-        on_root(self.job.comm, lambda: made.append(self._seen(basis, forces())))
-        if not made:
+        on_root(self.job.comm, lambda: motions.append(self._seen(basis, forces())))
+        if not motions:
             return None
-        size = float(np.linalg.norm(made[0].displacement, axis=2).max(initial=0.0))
-        record.headline["instants"] = (len(made[0].time), "-")
+        size = float(np.linalg.norm(motions[0].displacement, axis=2).max(initial=0.0))
+        record.headline["instants"] = (len(motions[0].time), "-")
         record.headline["largest displacement of the face"] = (size, "m")
-        return made[0]
+        return motions[0]
 
     def _seen(self, basis: Basis, forces: PatchForces) -> Motion:
         points = self.static.product.points
         stride = max(int(1 / (_PER_PERIOD * self.band * forces.step)), 1)
-        kept = range(len(forces.time) - 1, -1, -stride)[:_INSTANTS][::-1]
-        time, q = forces.time[kept], replayed(basis, forces, kept)
+        instants = range(len(forces.time) - 1, -1, -stride)[:_INSTANTS][::-1]
+        time, q = forces.time[instants], replayed(basis, forces, instants)
         field = (q @ basis.face(len(points)).T).reshape(len(time), -1, 3)
         return Motion(time=time, displacement=field.astype("f4"), points=points)

@@ -79,8 +79,8 @@ class PatchForces:
         with h5py.File(self.job.path("contact")) as file:
             if names[0] not in file:
                 return np.zeros(self.seen.shape[1])
-            found = np.hstack(self._on_nodes(file, *(file[name][:][None] for name in names)))[0]
-        return found @ self.seen[: len(found)]
+            columns = np.hstack(self._on_nodes(file, *(file[name][:][None] for name in names)))[0]
+        return columns @ self.seen[: len(columns)]
 
     @property
     def sudden(self) -> np.ndarray:
@@ -168,13 +168,13 @@ class LinesOfRun(OfRun[Lines | None], Shared[Lines | None]):
 
     def make(self) -> Lines | None:
         """On the root process, None on the others. Collective."""
-        made: list[Lines] = []
+        lines: list[Lines] = []
         basis, forces = self.taken_in()
         spectra = self.spectra.product if self.spectra else None
         top = spectra.limit.frequency if spectra else self.band
         left_out = spectra.left_out if spectra else 0.0
-        on_root(self.job.comm, lambda: made.append(_lines(basis, forces(), left_out, top)))
-        return made[0] if made else None
+        on_root(self.job.comm, lambda: lines.append(_lines(basis, forces(), left_out, top)))
+        return lines[0] if lines else None
 
 
 def _lines(basis: Basis, forces: PatchForces, left_out: float, top: float) -> Lines:
@@ -198,16 +198,16 @@ def _lines(basis: Basis, forces: PatchForces, left_out: float, top: float) -> Li
 
 
 def transformed(
-    values: np.ndarray, step: float, wanted: np.ndarray
+    values: np.ndarray, step: float, indices: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Amplitude and spectrum (f, d), as those of `Lines`, of values (n, d) at the `wanted` lines (mask or numbers)."""
+    """Amplitude and spectrum (f, d), as those of `Lines`, of values (n, d) at the lines `indices` (mask or numbers)."""
     faded = signal.windows.tukey(len(values), 2 * FADE)[:, None]
     amplitude, spectrum = [], []
     for k in range(0, values.shape[1], _AT_ONCE):
         part = values[:, k : k + _AT_ONCE]
         part = part - part.mean(axis=0)
-        amplitude.append(amplitudes(part, step)[1][wanted])
-        spectrum.append(np.fft.rfft(faded * part, axis=0)[wanted] / len(values))
+        amplitude.append(amplitudes(part, step)[1][indices])
+        spectrum.append(np.fft.rfft(faded * part, axis=0)[indices] / len(values))
     return np.hstack(amplitude), np.hstack(spectrum)
 
 
@@ -218,8 +218,8 @@ class WholeTire(OfRun[P], Computed[P]):
     reads: ClassVar[tuple[str, ...]] = ("force", "time", "greens.band")
 
 
-def replayed(basis: Basis, forces: PatchForces, wanted: Collection[int]) -> np.ndarray:
-    """The coordinates (g, m) m kg^1/2 at the ends of the `wanted` steps, by the run's own scheme.
+def replayed(basis: Basis, forces: PatchForces, numbers: Collection[int]) -> np.ndarray:
+    """The coordinates (g, m) m kg^1/2 at the ends of the steps `numbers`, by the run's own scheme.
 
     The states are integrated once more under the forces of the run, which are known by now. Root
     process only.
@@ -229,10 +229,10 @@ def replayed(basis: Basis, forces: PatchForces, wanted: Collection[int]) -> np.n
     always = forces.always
     begun = always + forces.sudden, forces.pushes(), always
     arguments = response, forces.step, recursive(forces.scheme), *begun
-    found = np.empty((len(wanted), len(unit)))
+    values = np.empty((len(numbers), len(unit)))
     number = filled = 0
     for moved in marched(*arguments):
-        some = [k for k in range(len(moved)) if number + k in wanted]
-        found[filled : filled + len(some)] = moved[some]
+        some = [k for k in range(len(moved)) if number + k in numbers]
+        values[filled : filled + len(some)] = moved[some]
         filled, number = filled + len(some), number + len(moved)
-    return found
+    return values

@@ -84,16 +84,16 @@ class Ended:
         return f"{self.member.name}: {outcome} after {console.seconds(self.seconds)}{more}"
 
 
-def concurrent(sweep: Sweep, wanted: int) -> tuple[int, str]:
+def concurrent(sweep: Sweep, processes: int) -> tuple[int, str]:
     """How many members run at a time, and what limits it if fewer than wanted."""
     cores = os.cpu_count() or 1
     largest = max(sum(memory(sweep.load(member)).values()) for member in sweep.members)
     room = int(available_memory() // (largest * sweep.processes))
     allowed = {"cores": max(cores // sweep.processes, 1), "memory": max(room, 1)}
     limit = min(allowed, key=lambda name: allowed[name])
-    if allowed[limit] >= wanted:
-        return wanted, ""
-    return allowed[limit], f"{limit}: {allowed[limit]} of the {wanted} wanted"
+    if allowed[limit] >= processes:
+        return processes, ""
+    return allowed[limit], f"{limit}: {allowed[limit]} of the {processes} wanted"
 
 
 def run_members(sweep: Sweep, folder: Path, at_a_time: int) -> list[Ended]:
@@ -117,27 +117,27 @@ def _dispatch(sweep: Sweep, folder: Path, at_a_time: int, failures: Path) -> lis
     ended: list[Ended] = []
     try:
         while waiting or any(worker.member for worker in workers):
-            for one in [worker for worker in workers if worker.crashed]:
-                workers.remove(one)
-                one.close()
+            for crashed in [worker for worker in workers if worker.crashed]:
+                workers.remove(crashed)
+                crashed.close()
             while waiting and len(workers) < at_a_time:
                 started += 1
                 workers.append(_Worker(sweep, folder, started, failures))
-            for one in workers:
-                if not one.member and waiting:
-                    one.take(waiting.pop(0))
+            for crashed in workers:
+                if not crashed.member and waiting:
+                    crashed.take(waiting.pop(0))
             time.sleep(_LOOK)
-            for one in workers:
-                if (how := one.ended()) is not None:
+            for crashed in workers:
+                if (how := crashed.ended()) is not None:
                     ended.append(how)
                     console.say(f"  [{len(ended)}/{len(sweep.members)}] {how.line}")
     finally:
-        for one in workers:
-            one.end()
-        for one in workers:
-            one.close()
+        for crashed in workers:
+            crashed.end()
+        for crashed in workers:
+            crashed.close()
     order = {member.name: k for k, member in enumerate(sweep.members)}
-    return sorted(ended, key=lambda one: order[one.member.name])
+    return sorted(ended, key=lambda worker: order[worker.member.name])
 
 
 class _Worker:
@@ -259,34 +259,34 @@ class Queue:
     @classmethod
     def of(cls, sweep: Sweep) -> Queue:
         """The batch system of the sweep's [queue] table, or Slurm with its [slurm] options."""
-        given = dict(sweep.queue)
-        if not given:
+        values = dict(sweep.queue)
+        if not values:
             return cls(directives=sweep.slurm)
-        missing, unknown = sorted(_TABLE - given.keys()), sorted(given.keys() - _TABLE - _MORE)
+        missing, unknown = sorted(_TABLE - values.keys()), sorted(values.keys() - _TABLE - _MORE)
         if missing or unknown:
             wrong = f"needs {missing[0]}" if missing else f"has no key {unknown[0]}"
             raise InputError(
                 f"sweep: [queue] {wrong}; its keys are {', '.join(sorted(_TABLE | _MORE))}"
             )
-        path = sweep.folder / str(given["template"])
+        path = sweep.folder / str(values["template"])
         try:
             text = path.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
             raise InputError(f"sweep: queue.template {path} cannot be read: {error}") from None
-        if not _has_group(str(given.get("number", cls.number))):
+        if not _has_group(str(values.get("number", cls.number))):
             raise InputError(
-                f"sweep: queue.number = {given['number']!r} is not a pattern with a group in round brackets, as in "
+                f"sweep: queue.number = {values['number']!r} is not a pattern with a group in round brackets, as in "
                 '"Job <([0-9]+)>"'
             )
-        words: dict[str, Any] = {key: str(value) for key, value in given.items()}
-        found = cls(**words | {"template": text})
+        words: dict[str, Any] = {key: str(value) for key, value in values.items()}
+        queue = cls(**words | {"template": text})
         try:
-            found.submission(path, 1, ["1"])
+            queue.submission(path, 1, ["1"])
         except (LookupError, ValueError) as error:
             raise InputError(
                 f"sweep: [queue] submit, array or after is not a command line with {{count}} and {{jobs}} in their places: {error!r}"
             ) from None
-        return found
+        return queue
 
     def submission(self, script: Path, count: int | None, before: Sequence[str]) -> list[str]:
         """The command line that submits a script as an array of `count` after jobs `before`."""
@@ -299,12 +299,12 @@ class Queue:
 
     def numbered(self, said: str) -> str:
         """The job number in the output of `submit`. Raises ConvergenceError if there is none."""
-        found = re.search(self.number, said)
-        if found is None:
+        match = re.search(self.number, said)
+        if match is None:
             raise ConvergenceError(
                 f"sweep: {self.submit} printed {said.strip()!r}, in which queue.number = {self.number!r} finds no job"
             )
-        return found.group(1)
+        return match.group(1)
 
 
 def _has_group(pattern: str) -> bool:
@@ -399,10 +399,10 @@ def _script(
     return path
 
 
-def _directives(given: Mapping[str, Any]) -> str:
+def _directives(settings: Mapping[str, Any]) -> str:
     """The lines of the [slurm] table: account, partition, time, ...; a flag is true or false."""
     lines = []
-    for key, value in given.items():
+    for key, value in settings.items():
         if key in _OWN:
             advice = "give processes" if key == "ntasks" else "leave it out"
             raise InputError(f"sweep: slurm.{key} is set by the program: {advice}")
@@ -454,7 +454,7 @@ def _run_here(family: Sweep, folder: Path, at_once: int, only_gather: bool) -> N
         if limit:
             console.say(f"{number} member(s) at a time, limited by {limit}")
         ended = run_members(family, folder, number)
-        failed = [one.line for one in ended if one.status]
+        failed = [member.line for member in ended if member.status]
     _gather(family, folder, failed)
     if failed:
         raise ConvergenceError(

@@ -62,13 +62,13 @@ class Member:
 
     def overrides(self) -> list[str]:
         """The settings as arguments of --set; the scene takes the member's name."""
-        given = [f"{key}={literal(value)}" for key, value in self.settings.items()]
-        return [*given, f"name={literal(self.name)}"]
+        items = [f"{key}={literal(value)}" for key, value in self.settings.items()]
+        return [*items, f"name={literal(self.name)}"]
 
 
-def check_keys(where: str, given: Mapping[str, Any], known: set[str]) -> None:
+def check_keys(where: str, keys: Mapping[str, Any], known: set[str]) -> None:
     """Raise InputError for a key that is not known."""
-    for key in given:
+    for key in keys:
         if key not in known:
             raise InputError(f"{where}: unknown key {key}; known here: {', '.join(sorted(known))}")
 
@@ -87,10 +87,10 @@ def planned(path: Path, raw: Mapping[str, Any]) -> tuple[tuple[str, ...], list[M
 
 def _tables(path: Path, raw: Mapping[str, Any], name: str) -> list[dict[str, Any]]:
     """An array of tables; empty if absent."""
-    found = raw.get(name, [])
-    if not isinstance(found, list) or not all(isinstance(one, dict) for one in found):
+    tables = raw.get(name, [])
+    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
         raise InputError(f"{path}: {name} must be written [[{name}]], one for each")
-    return found
+    return tables
 
 
 def _crossed(path: Path, raw: Mapping[str, Any], plan: str) -> tuple[tuple[str, ...], list[Member]]:
@@ -116,17 +116,17 @@ def _check_count(path: Path, count: int) -> None:
 
 def _listed(path: Path, raw: Mapping[str, Any]) -> tuple[tuple[str, ...], list[Member]]:
     members = []
-    for number, one in enumerate(_tables(path, raw, "member"), start=1):
-        name, settings = str(one.get("name", f"{number:03d}")), one.get("set", {})
-        check_keys(f"{path}: member {name}", one, {"name", "set"})
+    for number, table in enumerate(_tables(path, raw, "member"), start=1):
+        name, settings = str(table.get("name", f"{number:03d}")), table.get("set", {})
+        check_keys(f"{path}: member {name}", table, {"name", "set"})
         if not isinstance(settings, dict):
             raise InputError(
                 f"{path}: member {name}: set must be a table of keys and values, "
                 f'such as {{ "static.load" = 300.0 }}, not {described(settings)}'
             )
-        given = list(_keyed(settings))
-        _check_apart(f"{path}: member {name}", [key for key, _ in given])
-        members.append(Member(name, dict(given)))
+        names = list(_keyed(settings))
+        _check_apart(f"{path}: member {name}", [key for key, _ in names])
+        members.append(Member(name, dict(names)))
     if not members:
         raise InputError(f'{path}: plan = "list" needs [[member]] tables')
     _check_count(path, len(members))
@@ -219,10 +219,10 @@ def _hypercube(
 
 
 def _range(where: str, axis: Mapping[str, Any]) -> tuple[float, float]:
-    given = axis.get("range")
+    limits = axis.get("range")
     try:
-        if isinstance(given, list) and len(given) == 2:
-            low, high = (finite(end) for end in given)
+        if isinstance(limits, list) and len(limits) == 2:
+            low, high = (finite(end) for end in limits)
             if low < high:
                 return low, high
     except ValueError as error:
@@ -319,10 +319,10 @@ def read(path: Path) -> Sweep:
 
 
 def _table(path: Path, raw: Mapping[str, Any], key: str) -> dict[str, Any]:
-    found = raw.get(key, {})
-    if not isinstance(found, dict):
+    table = raw.get(key, {})
+    if not isinstance(table, dict):
         raise InputError(f"{path}: {key} must be a table, written [{key}]")
-    return found
+    return table
 
 
 def _absolute(settings: Mapping[str, Any], folder: Path) -> dict[str, Any]:

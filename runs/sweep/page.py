@@ -125,17 +125,17 @@ def _place(key: tuple[str, str]) -> tuple[int, tuple[int, str], float]:
 
 def _banded(name: str) -> tuple[str, float | None]:
     """The quantity and the band (Hz) of a third octave; None as the band of any other figure."""
-    found = re.fullmatch(r"([^:]+), ([\d.e+]+) Hz", name)
-    return (found[1], float(found[2])) if found else (name, None)
+    match = re.fullmatch(r"([^:]+), ([\d.e+]+) Hz", name)
+    return (match[1], float(match[2])) if match else (name, None)
 
 
 def _settings(sweep: Sweep, member: Member) -> dict[str, Any]:
     """The member's value of every axis; where it sets none, that of its resolved scene."""
-    found = dict(member.settings)
-    if len(found) < len(sweep.axes):
+    settings = dict(member.settings)
+    if len(settings) < len(sweep.axes):
         scene = tomllib.loads(dumps(sweep.load(member)))
-        found = {key: _value(scene, parts(key)) for key in sweep.axes} | found
-    return found
+        settings = {key: _value(scene, parts(key)) for key in sweep.axes} | settings
+    return settings
 
 
 def _value(scene: Any, path: Sequence[str]) -> Any:
@@ -167,15 +167,15 @@ def _figures(run: RunResults) -> dict[tuple[str, str], float]:
             value = entry.get("value")
             if isinstance(value, int | float) and not isinstance(value, bool):
                 figures[f"{stage}: {name}", entry.get("unit", "-")] = float(value)
-    for one in band_levels(run):
-        every = one.band, one.level, one.error, one.freedom
+    for level in band_levels(run):
+        every = level.band, level.level, level.error, level.freedom
         for band, value, error, freedom in zip(*every, strict=True):
             if np.isfinite(value):
-                figures[f"{one.name}, {band:g} Hz", one.unit] = float(value)
+                figures[f"{level.name}, {band:g} Hz", level.unit] = float(value)
             if np.isfinite(error):
-                figures[f"{ERROR}{one.name}, {band:g} Hz", "dB"] = float(error)
+                figures[f"{ERROR}{level.name}, {band:g} Hz", "dB"] = float(error)
             if np.isfinite(freedom):
-                figures[f"{FREEDOM}{one.name}, {band:g} Hz", "-"] = float(freedom)
+                figures[f"{FREEDOM}{level.name}, {band:g} Hz", "-"] = float(freedom)
     return figures
 
 
@@ -263,7 +263,7 @@ def levels(table: Gathered, quantity: str) -> Levels | None:
         for mark in (ERROR, FREEDOM)
     )
     groups = _alike(table)
-    found = [_pooled(level[each], error[each], freedom[each]) for each in groups.values()]
+    pooled = [_pooled(level[each], error[each], freedom[each]) for each in groups.values()]
     return Levels(
         quantity=quantity,
         unit=own[0].unit,
@@ -272,7 +272,7 @@ def levels(table: Gathered, quantity: str) -> Levels | None:
             int(np.isfinite(level[members]).any(axis=1).sum()) for members in groups.values()
         ),
         bands=tuple(f"{_banded(column.name)[1]:g} Hz" for column in own),
-        **{name: np.array([one[name] for one in found]) for name in found[0]},
+        **{name: np.array([band[name] for band in pooled]) for name in pooled[0]},
     )
 
 
@@ -296,20 +296,20 @@ def _pooled(level: Array, error: Array, freedom: Array) -> dict[str, Array]:
     A numerical error is that of the mean of independent ones.
     """
     bands = level.shape[1]
-    found = {name: np.full((bands, *more), np.nan) for name, more in _OF_GROUP.items()}
+    pooled = {name: np.full((bands, *more), np.nan) for name, more in _OF_GROUP.items()}
     for band in range(bands):
         there = np.isfinite(level[:, band])
         if not there.any():
             continue
-        kept, own, degrees = level[there, band], error[there, band], freedom[there, band]
-        found["level"][band] = chance.pooled(kept[:, None])[0]
+        levels, own, degrees = level[there, band], error[there, band], freedom[there, band]
+        pooled["level"][band] = chance.pooled(levels[:, None])[0]
         known = own[np.isfinite(own)]
         if len(known):
-            found["error"][band] = np.sqrt((known**2).sum()) / len(kept)
-        found["chance"][band] = confidence(degrees.sum())
+            pooled["error"][band] = np.sqrt((known**2).sum()) / len(levels)
+        pooled["chance"][band] = confidence(degrees.sum())
         one = np.ones(1)
-        found["spread"][band] = chance.spread(kept[:, None], one, len(kept) * one)[0]
-    return found
+        pooled["spread"][band] = chance.spread(levels[:, None], one, len(levels) * one)[0]
+    return pooled
 
 
 def write_page(table: Gathered, folder: Path, title: str, failed: Sequence[str]) -> Path:
@@ -335,22 +335,22 @@ def _setting(value: object) -> str:
 
 def _page_figures(table: Gathered) -> list[Drawing]:
     axes = numeric(table.settings)
-    found = []
+    figures = []
     quantities = dict.fromkeys(_banded(column.name)[0] for column in table.columns)
     for what in filter(is_drawn, quantities):
-        found += _of_bands(table, what)
+        figures += _of_bands(table, what)
     chosen = _chosen(table)
     for key, values in axes.items():
         if chosen and len(set(values[np.isfinite(values)].tolist())) > 1:
             text = f"Results over {key}; lines join members that are equal in all other keys."
             lines = _lines(table, key, values)
-            found.append(drawing(partial(_against, key, values, lines, chosen), text, WIDE))
+            figures.append(drawing(partial(_against, key, values, lines, chosen), text, WIDE))
     if len(axes) == 2:
         (first, a), (second, b) = axes.items()
         for column in chosen[:2]:
             text = f"{column.name} over both axes."
-            found.append(drawing(partial(_map, first, a, second, b, column), text, WIDE))
-    return found
+            figures.append(drawing(partial(_map, first, a, second, b, column), text, WIDE))
+    return figures
 
 
 def _of_bands(table: Gathered, what: str) -> list[Drawing]:
@@ -359,17 +359,17 @@ def _of_bands(table: Gathered, what: str) -> list[Drawing]:
     text = f"Third octaves: {what}."
     if len(table.names) > CURVES:
         text += f" The first {CURVES} of {len(table.names)} members."
-    found = [drawing(partial(_spectra, bands, table.names), text, WIDE)]
+    figures = [drawing(partial(_spectra, bands, table.names), text, WIDE)]
     compared = levels(table, what)
     if compared is not None and max(compared.seeds) > 1:
         text = (
             f"Third octaves: {what}, mean power over all seeds. Thin lines: its chance, 95 %, by the spread of the "
             f"seeds.{marks_told([BandMarks(compared.level, compared.error, compared.chance)])}"
         )
-        found.append(drawing(partial(_of_seeds, compared), text, WIDE))
+        figures.append(drawing(partial(_of_seeds, compared), text, WIDE))
     if compared is not None and len(compared.with_bands) > 1:
-        found.append(drawing(partial(_differences, compared), _about(compared), WIDE))
-    return found
+        figures.append(drawing(partial(_differences, compared), _about(compared), WIDE))
+    return figures
 
 
 def _lines(table: Gathered, key: str, values: Array) -> list[list[int]]:

@@ -115,9 +115,9 @@ def _rows(speed: float) -> Iterator[list]:
                 ]
 
 
-def _off(found: np.ndarray, exact: np.ndarray) -> tuple[float, float]:
+def _off(forces: np.ndarray, exact: np.ndarray) -> tuple[float, float]:
     """Relative L2 error and largest error, %."""
-    far = found - exact
+    far = forces - exact
     mean = np.linalg.norm(far) / np.linalg.norm(exact)
     return 100 * float(mean), 100 * float(np.abs(far).max() / np.abs(exact).max())
 
@@ -136,8 +136,8 @@ def _full(tires: Tires) -> AxleResult:
     full = wheel.rotating_stiffness, wheel.rotating_damping
     motion = tires.motions.rim_motion(wheel.speed != 0)
     beside = np.vstack([wheel.operators.carried, *motion.moments(wheel.speed)])
-    found = receptance(wheel.operators, *full, none, loads, FREQUENCY, beside=beside)
-    carried, static, rate, mass = np.split(found, 4, axis=1)
+    receptances = receptance(wheel.operators, *full, none, loads, FREQUENCY, beside=beside)
+    carried, static, rate, mass = np.split(receptances, 4, axis=1)
     s = 2j * np.pi * FREQUENCY[:, None, None]
     corner = tires.modes.projection.wheel
     moment = corner.rigid(loads)[:, MOMENTS].T - s**2 * mass - s * rate - static
@@ -162,6 +162,6 @@ def _free_rim(tires: Tires) -> Iterator[AxleResult]:
     wheel, modes = wheel_of(free, tires.wheel.turning), solved(free.operators, count=max(COUNTS))
     for count in COUNTS:
         began = time.perf_counter()
-        given = modes.first(count), loads, FREQUENCY, motions.rim_motion(wheel.speed != 0)
-        force, moment = np.split(by_free_rim(wheel, *given), 2, axis=1)
+        arguments = modes.first(count), loads, FREQUENCY, motions.rim_motion(wheel.speed != 0)
+        force, moment = np.split(by_free_rim(wheel, *arguments), 2, axis=1)
         yield AxleResult("free rim", count, force, moment, time.perf_counter() - began)

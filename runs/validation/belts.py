@@ -101,10 +101,10 @@ def _run(mesh: dict[str, int]) -> list[Table]:
         tires = Tires(next(iter(scenes.values())), Path(folder))
         for name, scene in scenes.items():
             tires.change(scene)
-            found = compare(tires, STEPS, CHOICES, ("contact force", "axle force"))
+            comparison = compare(tires, STEPS, CHOICES, ("contact force", "axle force"))
             points = len(tires.trial.setup.patch.points)
-            tables.append(found.table(f"{name}: {points} contact points, {tires.setting}"))
-            rows += [found.verdict(name, *target, tires.modes_seconds) for target in TARGETS]
+            tables.append(comparison.table(f"{name}: {points} contact points, {tires.setting}"))
+            rows += [comparison.verdict(name, *target, tires.modes_seconds) for target in TARGETS]
     note = (
         "Damping by modal strain energy in both: the full finite elements damp each of these modes as the "
         "modal run does, and what lies beyond at the rate of the highest."

@@ -44,11 +44,11 @@ class RollingStrip:
 
         `residual`: number of further orders of both kinds that respond statically (0: none).
         """
-        kept = self._waves(points, around, across)
+        waves = self._waves(points, around, across)
         if not residual:
-            return kept
+            return waves
         more = self._waves(points, around + residual, across + residual)
-        return replace(kept, residual=more.static() - kept.static())
+        return replace(waves, residual=more.static() - waves.static())
 
     def horizontal_response(
         self, points: Array, around: int, across: int, stiff: float

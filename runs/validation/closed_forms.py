@@ -76,8 +76,8 @@ def _tube() -> Iterator[tuple]:
         points = body.lattice.points(np.arange(body.lattice.size))
         inner = (np.hypot(points[:, 0], points[:, 2]) < A + 1e-3) & (abs(points[:, 1]) < 1e-3)
         moved = (points + body.displacement())[inner]
-        found = float(np.hypot(moved[:, 0], moved[:, 2]).mean())
-        yield f"thick Mooney tube at {p:.0f} Pa, growth of its inner radius", "m", found - A, a - A
+        radius = float(np.hypot(moved[:, 0], moved[:, 2]).mean())
+        yield f"thick Mooney tube at {p:.0f} Pa, growth of its inner radius", "m", radius - A, a - A
 
 
 def _ring(speed: float) -> Iterator[tuple]:
@@ -104,7 +104,7 @@ def _ring(speed: float) -> Iterator[tuple]:
     rotation = operators.rotation() if speed else None
     projection = project(modes, rotation, operators.carried, COMM)
     states = rotating(*matrices(projection, speed, (0.0, 0.0), "full"))
-    found = _bending_waves(
+    waves = _bending_waves(
         body.lattice.points(body.ids), modes.vectors @ states.right, states.eigenvalue
     )
     bending = E * h**2 / (12 * density * R**4)
@@ -114,7 +114,7 @@ def _ring(speed: float) -> Iterator[tuple]:
         for sign in (1, -1) if speed else (1,):
             closed = (turn + sign * root) / (2 * np.pi)
             name = f"thin free ring at {speed:g} rad/s, n = {n} (Endo)"
-            yield name, "Hz", abs(found[n][sign]), abs(closed)
+            yield name, "Hz", abs(waves[n][sign]), abs(closed)
 
 
 def _bending_waves(points: np.ndarray, shape: np.ndarray, eigenvalue: np.ndarray) -> dict:
@@ -128,15 +128,15 @@ def _bending_waves(points: np.ndarray, shape: np.ndarray, eigenvalue: np.ndarray
     field = shape.reshape(len(points), 3, -1)
     radial = np.sin(angle)[:, None] * field[:, 0] - np.cos(angle)[:, None] * field[:, 2]
     in_plane = np.linalg.norm(field[:, 1], axis=0) < 0.1 * np.linalg.norm(radial, axis=0)
-    found = {}
+    waves = {}
     for n in (2, 3, 4):
         parts = np.array([np.exp(-1j * k * angle) @ radial for k in (n, -n)]) / len(points)
         whole = np.sqrt((np.abs(radial) ** 2).mean(axis=0))
         ours = in_plane & (eigenvalue.imag > 0) & (np.linalg.norm(parts, axis=0) > 0.9 * whole)
         ways = np.where(np.abs(parts[0]) < np.abs(parts[1]), 1, -1)
         signed = np.sort((ways * eigenvalue.imag)[ours]) / (2 * np.pi)
-        found[n] = {-1: float(signed[0]), 1: float(signed[-1])}
-    return found
+        waves[n] = {-1: float(signed[0]), 1: float(signed[-1])}
+    return waves
 
 
 def _soft_modes(operators: Operators) -> Modes:
@@ -161,27 +161,27 @@ def _soft_modes(operators: Operators) -> Modes:
 
 def _oscillator() -> Iterator[tuple]:
     """u'' + u' + u = 1 (appendix D): 1 - e^{-t/2} (cos w t + sin w t/sqrt 3), w = sqrt 3/2."""
-    one = np.ones((1, 1))
+    unit = np.ones((1, 1))
     states = standing(Projection(squares=np.ones(1), momentum=np.ones((3, 1))), (1.0, 0.0))
     tire = Recursion(
-        response=couple(states, one, one, np.ones((3, 1))), step=0.7, scheme="linear", comm=COMM
+        response=couple(states, unit, unit, np.ones((3, 1))), step=0.7, scheme="linear", comm=COMM
     )
     tire.start(np.ones(1))
     for k in range(1, 6):
-        found = float((tire.predict() + tire.same_step @ np.ones(1))[0])
+        place = float((tire.predict() + tire.same_step @ np.ones(1))[0])
         tire.advance(np.ones(1))
         t, w = 0.7 * k, np.sqrt(3) / 2
         if k in (1, 5):
             closed = 1 - np.exp(-t / 2) * (np.cos(w * t) + np.sin(w * t) / np.sqrt(3))
-            yield f"oscillator of appendix D after {k} steps of 0.7 s", "m", found, float(closed)
+            yield f"oscillator of appendix D after {k} steps of 0.7 s", "m", place, float(closed)
 
 
 def golden_car_rows() -> Iterator[tuple]:
     """Real and imaginary parts of both poles, against the polynomial of the car."""
-    for number, (found, exact) in enumerate(zip(poles(), exact_poles(), strict=True), 1):
+    for number, (pole, exact) in enumerate(zip(poles(), exact_poles(), strict=True), 1):
         for part, one, other in (
-            ("real", found.real, exact.real),
-            ("imaginary", found.imag, exact.imag),
+            ("real", pole.real, exact.real),
+            ("imaginary", pole.imag, exact.imag),
         ):
             yield f"golden car, pole {number}, {part} part", "1/s", one, other
 
@@ -242,7 +242,7 @@ def run() -> list[Table]:
     """One table of all cases."""
     rows = [
         [case, found, exact, unit, 100 * abs(found / exact - 1)]
-        for one in (
+        for rows in (
             tire_rows,
             golden_car_rows,
             contact.normal_rows,
@@ -251,7 +251,7 @@ def run() -> list[Table]:
             contact.grooved_rows,
             contact.static_friction_rows,
         )
-        for case, unit, found, exact in one()
+        for case, unit, found, exact in rows()
     ]
     columns = [("case", ""), ("computed", "-"), ("exact", "-"), ("unit", ""), ("error", "%")]
     notes = [

@@ -99,13 +99,13 @@ def _half_space(points: np.ndarray, half_sizes: np.ndarray) -> ActiveSet:
 
 
 def _love() -> Iterator[tuple]:
-    one = np.float64(1.0)
+    unit = np.float64(1.0)
     for name, place, share in (("centre", 0.0, 1.0), ("corner", 1.0, 0.5)):
-        found = float(rectangle_potential(np.array(place), np.array(place), one, one))
+        potential = float(rectangle_potential(np.array(place), np.array(place), unit, unit))
         yield (
             f"uniform pressure on a square, {name} (Love)",
             "-",
-            found,
+            potential,
             share * exact.LOVE_SQUARE_CENTRE,
         )
 
@@ -132,8 +132,8 @@ def _cylinder() -> Iterator[tuple]:
     points, half_sizes = _cells(1.2 * half_width, 40.0, 120, 1)
     force = _half_space(points, half_sizes).solve(points[:, 0] ** 2 / (2 * radius) - 2e-3)
     closed = exact.hertz_cylinder(force.sum() / 80.0, radius, MODULUS)
-    found = float((force / (4 * half_sizes[0].prod())).max())
-    yield "cylinder, pressure in the middle (Hertz)", "Pa", found, closed.peak_pressure
+    pressure = float((force / (4 * half_sizes[0].prod())).max())
+    yield "cylinder, pressure in the middle (Hertz)", "Pa", pressure, closed.peak_pressure
 
 
 def _punch() -> tuple:
@@ -143,11 +143,11 @@ def _punch() -> tuple:
         points, half_sizes = _cells(side, side, n, n)
         loads.append(_half_space(points, half_sizes).solve(np.full(n * n, -approach)).sum())
     coarse, middle, fine = loads
-    found = fine - (fine - middle) ** 2 / ((fine - middle) - (middle - coarse))
+    limit = fine - (fine - middle) ** 2 / ((fine - middle) - (middle - coarse))
     return (
         "rigid square punch, load",
         "N",
-        float(found),
+        float(limit),
         exact.square_punch_load(approach, side, MODULUS),
     )
 
@@ -181,9 +181,9 @@ def _brush() -> Iterator[tuple]:
     edges = np.clip(np.stack([x - pitch / 2, x + pitch / 2]) / HALF, -1, 1)
     normal = 0.75 * LOAD * np.diff(edges - edges**3 / 3, axis=0)[0]
     for slip in (0.01, 0.1, 1.0):
-        found = _steady(x, normal, slip, tread * pitch, np.zeros((len(x), len(x))))
+        force = _steady(x, normal, slip, tread * pitch, np.zeros((len(x), len(x))))
         closed = exact.brush_force(slip, FRICTION, LOAD, HALF, tread)
-        yield f"rolling brush, slip {slip:g} (Pacejka)", "N", found, closed
+        yield f"rolling brush, slip {slip:g} (Pacejka)", "N", force, closed
 
 
 def _carter() -> Iterator[tuple]:
@@ -255,9 +255,9 @@ def shear_rows() -> Iterator[tuple]:
         yield name, "-", bonded(0.0, cells), exact
     for nu, table in KALKER.items():
         for cells in CELLS:
-            for k, (found, exact) in enumerate(zip(creep(nu, cells), table, strict=True)):
+            for k, (coefficient, exact) in enumerate(zip(creep(nu, cells), table, strict=True)):
                 name = f"rolling, C{('11', '22', '23')[k]}, nu = {nu:g}, {cells} cells (Kalker)"
-                yield name, "-", found, exact
+                yield name, "-", coefficient, exact
 
 
 class Disc:
@@ -332,8 +332,8 @@ def bonded(nu: float, cells: int) -> float:
     brush = Brush(BrushLaw(np.inf, kind="spring"), disc.x, disc.line, 0.0, 1.0)
     friction = BrushFriction(brush, np.zeros((3 * count, 3 * count)), None, disc.shear(nu))
     gap, touching, none = np.full(count, -1e-3), np.ones(count, dtype=bool), np.zeros(count)
-    found = friction.solve(solver, gap, touching, none, np.zeros(2 * count))[0]
-    return float(found.sum() / solver.solve(gap, touching).sum())
+    force = friction.solve(solver, gap, touching, none, np.zeros(2 * count))[0]
+    return float(force.sum() / solver.solve(gap, touching).sum())
 
 
 def creep(nu: float, cells: int) -> tuple[float, float, float]:
@@ -454,8 +454,8 @@ def grooved_rows() -> Iterator[tuple]:
         force.mean(),
         GROOVED_LOAD * (1 - WIDTH * PITCHES / AROUND),
     )
-    for order, found in zip((1, 2, 3), orders(force), strict=True):
-        yield f"patterned tread, order {order} of its pitches", "N", found, by_hand(order)
+    for order, value in zip((1, 2, 3), orders(force), strict=True):
+        yield f"patterned tread, order {order} of its pitches", "N", value, by_hand(order)
 
 
 def orders(force: np.ndarray) -> np.ndarray:
@@ -497,7 +497,7 @@ def rolled(pattern: Pattern | None, steps: int) -> tuple[np.ndarray, Patch]:
         carried = np.where(begun > 0, free, patch.force)
         setup = replace(setup, patch=replace(patch, force=carried, gap=patch.gap + lifted))
     run = roll(Rigid(len(patch.points)), ActiveSet(bed), setup.patch, setup.drive, STEP, steps)
-    return np.array([one.force.sum() for one in run]), setup.patch
+    return np.array([row.force.sum() for row in run]), setup.patch
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -608,7 +608,7 @@ def static_friction_rows() -> Iterator[tuple]:
     for pushed in standing(STIFF):
         name = f"roller pushed sideways to {pushed.share:.2f} of sliding, traction in the middle (Cattaneo, Mindlin)"
         yield name, "-", pushed.in_the_middle, 1 - np.sqrt(1 - pushed.share)
-    for share, found in rolling(STIFF, (0.2, 0.6)):
+    for share, value in rolling(STIFF, (0.2, 0.6)):
         closed = exact.carter_force(
             share * STATIC_FRICTION * STATIC_HALF / STIFF.outer,
             STATIC_FRICTION,
@@ -618,7 +618,7 @@ def static_friction_rows() -> Iterator[tuple]:
         name = (
             f"roller at {share:g} of the creepage that slides, force over that of sliding (Carter)"
         )
-        yield name, "-", found, closed
+        yield name, "-", value, closed
     thick, thin = (over_brush(replace(LAYER, thickness=thickness)) for thickness in (4e-3, 2e-3))
     name = "roller with a layer that sticks, force over that of bristles, from 4 and 2 mm to none (brush)"
     yield name, "-", 2 * thin - thick, 1.0
@@ -639,8 +639,8 @@ class Pressed:
 
     def rubbing(self, sliding: Sliding) -> RubbingEquilibrium:
         """The problem with friction, starting from the state without."""
-        given = self.body, AT_REST, self.friction, sliding
-        problem = plane(RubbingEquilibrium(*given))
+        arguments = self.body, AT_REST, self.friction, sliding
+        problem = plane(RubbingEquilibrium(*arguments))
         problem.road.take(self._without.contact_force(), self._without.road_height)
         return problem
 
@@ -692,15 +692,15 @@ class RollingCase:
         self._pressed, radius = pressed, pressed.roller.outer
         self._sliding = Passing(pressed.body, radius)
         self._problem = pressed.rubbing(self._sliding)
-        found = root_scalar(
+        root = root_scalar(
             lambda trial: self(trial).share,
             method="secant",
             x0=radius,
             x1=radius * (1 - 1e-5),
             xtol=1e-9 * radius,
         )
-        _check(found.converged)
-        self.free = float(found.root)
+        _check(root.converged)
+        self.free = float(root.root)
 
     def __call__(self, travel: float) -> Pushed:
         """The state at that travel, m per radian."""
@@ -719,8 +719,8 @@ def over_brush(roller: Roller, creepage: float = 1e-3, half: float = 0.02) -> fl
     h, width, young = roller.thickness, roller.width, roller.youngs_modulus
     load = young / h * 2 * half**3 / 3 / roller.outer * width
     drag = RollingCase(Pressed(roller, load, friction := 10.0))
-    found = drag(drag.free * (1 - creepage)).share * friction * load
-    return found / (young / 2 / h * creepage * 2 * half**2 * width)
+    force = drag(drag.free * (1 - creepage)).share * friction * load
+    return force / (young / 2 / h * creepage * 2 * half**2 * width)
 
 
 def _check(fine: bool) -> None:

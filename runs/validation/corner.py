@@ -132,25 +132,25 @@ def _run(base: Path, text: str) -> tuple[dict[str, np.ndarray], dict]:
     with console.quiet():
         run_scene(scene, out, MPI.COMM_SELF, until="contact", fresh=False, petsc_options=[])
     with h5py.File(out / "contact.h5") as file:
-        kept = {name: file[name][:] for name in ("axle_force", "total_force")}
+        series = {name: file[name][:] for name in ("axle_force", "total_force")}
     summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
-    return kept, summary["stages"]
+    return series, summary["stages"]
 
 
 def run() -> list[Table]:
     """One table per case, and which choices are within 1 %."""
     tables, rows = [], []
-    modes, made = max(choice.modes for choice in CHOICES), {}
+    modes, runs = max(choice.modes for choice in CHOICES), {}
     with tempfile.TemporaryDirectory() as folder:
         for number, (name, (speed, road)) in enumerate(CASES.items()):
             scene = SCENE.format(speed=speed, road=road, modes=modes, **MESH)
-            if speed not in made:
+            if speed not in runs:
                 (place := Path(folder) / str(number)).mkdir()
-                made[speed] = Tires(scene, place)
-            tires = made[speed]
+                runs[speed] = Tires(scene, place)
+            tires = runs[speed]
             tires.change(scene)
-            found = compare(tires, STEPS, CHOICES, ("contact force", "axle force"))
-            tables.append(found.table(f"{name}: {tires.setting}"))
-            rows.append(found.verdict(name, WITHIN, 1.0, tires.modes_seconds))
+            comparison = compare(tires, STEPS, CHOICES, ("contact force", "axle force"))
+            tables.append(comparison.table(f"{name}: {tires.setting}"))
+            rows.append(comparison.verdict(name, WITHIN, 1.0, tires.modes_seconds))
     asked = verdicts("Wheel on its corner: targets", rows, [])
     return [*tables, asked, table()]

@@ -59,8 +59,8 @@ def beside(tires: Tires) -> tuple[float, ...]:
     iterations per step, ratio of run times. Collective."""
     linear = follow(tires.trial, *tires.full(STEP))
     tire, *given = tires.nonlinear(STEP)
-    found = follow(tires.trial, tire, *given)
-    one, other = (h.values["contact force"] for h in (linear, found))
+    history = follow(tires.trial, tire, *given)
+    one, other = (h.values["contact force"] for h in (linear, history))
     rest = float(tires.run.static.normal_force.sum())
     off = [
         100 * float(np.linalg.norm(one[:, axis] - other[:, axis]) / np.linalg.norm(beyond))
@@ -68,4 +68,4 @@ def beside(tires: Tires) -> tuple[float, ...]:
     ]
     largest = (float(abs(h[:, axis]).max()) for axis in (2, 0) for h in (one, other))
     turns = tire.turns / len(one)
-    return *off, *largest, turns, found.seconds / linear.seconds
+    return *off, *largest, turns, history.seconds / linear.seconds

@@ -254,8 +254,8 @@ class Tires(Elements):
             self._responses[key] = self.response(*key), time.perf_counter() - began
         response, seconds = self._responses[key]
         began = time.perf_counter()
-        kept = response.resolved(choice.step)
-        tire = Recursion(response=kept, step=choice.step, scheme="linear", comm=self.job.comm)
+        resolved = response.resolved(choice.step)
+        tire = Recursion(response=resolved, step=choice.step, scheme="linear", comm=self.job.comm)
         return tire, choice.step, seconds + time.perf_counter() - began
 
     def response(self, count: int, residual: str, counted: bool = True) -> Response:
@@ -266,8 +266,8 @@ class Tires(Elements):
             self._rolling[count] = rolling_modes(few, turning, self.job.comm)
         rolling, points = self._rolling[count], self.probes
         points = points.on_face if counted else points
-        given = points.outputs, points.loads, residual, lambda: rolling.basis
-        return make_response(lambda: self.wheel, rolling, *given).response
+        arguments = points.outputs, points.loads, residual, lambda: rolling.basis
+        return make_response(lambda: self.wheel, rolling, *arguments).response
 
 
 @dataclass(frozen=True)
@@ -372,11 +372,11 @@ def compare(
 ) -> Comparison:
     """Full finite elements at the steps (s), and the choices, on the tires' present road."""
     trial = tires.trial
-    found = Comparison([follow(trial, *tires.full(step)) for step in steps], counts)
+    comparison = Comparison([follow(trial, *tires.full(step)) for step in steps], counts)
     for choice in choices:
         alike = (follow(trial, *tires.modal(choice)) for _ in range(TIMES))
-        found.add(choice, min(alike, key=lambda history: history.seconds))
-    return found
+        comparison.add(choice, min(alike, key=lambda history: history.seconds))
+    return comparison
 
 
 def verdicts(title: str, rows: list[list], notes: list[str]) -> Table:

@@ -68,10 +68,10 @@ def run() -> list[Table]:
         tires = Tires(scenes[0], Path(folder))
         for amplitude, scene in zip(AMPLITUDES, scenes, strict=True):
             tires.change(scene)
-            found = compare(tires, STEPS, CHOICES, QUANTITIES)
+            comparison = compare(tires, STEPS, CHOICES, QUANTITIES)
             name = f"flat road moved by {1e3 * amplitude:g} mm at 50 Hz"
-            tables.append(found.table(f"Standing, {name}: {tires.setting}"))
-            rows.append(found.verdict(name, 0.005, 1.0, tires.modes_seconds))
+            tables.append(comparison.table(f"Standing, {name}: {tires.setting}"))
+            rows.append(comparison.verdict(name, 0.005, 1.0, tires.modes_seconds))
     return [*tables, verdicts("Moved flat road: targets", rows, []), _linearised()]
 
 
@@ -104,11 +104,11 @@ def _against_large_motions(tires: Tires) -> Iterator[list]:
         ("full FE, linear", tires.full(step)),
         ("modes", tires.modal(LINEARISED)),
     ):
-        found = follow(trial, *tire)
+        history = follow(trial, *tire)
         errors = []
         for quantity in QUANTITIES:
-            pair = exact.values[quantity], found.values[quantity]
+            pair = exact.values[quantity], history.values[quantity]
             far = distance(*pair, SMALL["duration"])
             errors += [percent(far.mean), percent(far.worst)]
-        times = digits(exact.seconds), digits(found.seconds)
+        times = digits(exact.seconds), digits(history.seconds)
         yield [f"{load.min():.0f} to {load.max():.0f}", name, *errors, *times]

@@ -93,5 +93,5 @@ def _seconds(history: FullHistory) -> float:
 
 def _levels(history: FullHistory, name: str) -> tuple[np.ndarray, np.ndarray]:
     centre, level = third_octaves(history.values[f"{name} force"][:, 2:], history.step, 2 * BAND[1])
-    kept = (centre > BAND[0]) & (centre < BAND[1])
-    return centre[kept], level[kept, 0]
+    inside = (centre > BAND[0]) & (centre < BAND[1])
+    return centre[inside], level[inside, 0]

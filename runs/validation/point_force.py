@@ -61,12 +61,12 @@ def run() -> list[Table]:
             scene = SCENE.format(frequency=frequency, damping=damping, modes=modes, **MESH)
             tires = Tires(scene, Path(folder))
             full = [_history(*tires.full(step, RADIUS), frequency) for step in STEPS]
-            found = Comparison(full, ("displacement", "axle force"))
+            comparison = Comparison(full, ("displacement", "axle force"))
             for choice in CHOICES:
-                found.add(choice, _history(*tires.modal(choice), frequency))
+                comparison.add(choice, _history(*tires.modal(choice), frequency))
         what = f"Point force of 1 N at {frequency:g} Hz ({name})"
-        tables.append(found.table(f"{what}: {tires.setting}"))
-        rows.append(found.verdict(what, 0.005, 1.0, tires.modes_seconds))
+        tables.append(comparison.table(f"{what}: {tires.setting}"))
+        rows.append(comparison.verdict(what, 0.005, 1.0, tires.modes_seconds))
     return [*tables, verdicts("Point force: targets", rows, [])]
 
 

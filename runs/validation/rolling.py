@@ -99,19 +99,19 @@ def _run(mesh: dict[str, int], steps: Sequence[float], roads: dict[str, str]) ->
         tires = Tires(next(iter(scenes.values())), Path(folder))
         for name, scene in scenes.items():
             tires.change(scene)
-            found = compare(tires, steps, CHOICES, ("contact force", "axle force"))
+            comparison = compare(tires, steps, CHOICES, ("contact force", "axle force"))
             points = len(tires.trial.setup.patch.points)
-            tables.append(found.table(f"{name}: {points} contact points, {tires.setting}"))
-            tables[-1].notes.append(_beyond(found))
-            rows += [found.verdict(name, *target, tires.modes_seconds) for target in TARGETS]
-            apart += _directions(name, found)
+            tables.append(comparison.table(f"{name}: {points} contact points, {tires.setting}"))
+            tables[-1].notes.append(_beyond(comparison))
+            rows += [comparison.verdict(name, *target, tires.modes_seconds) for target in TARGETS]
+            apart += _directions(name, comparison)
     return [*tables, verdicts("Rolling at 100 rad/s: targets", rows, []), _by_direction(apart)]
 
 
-def _directions(name: str, found: Comparison) -> list[list]:
+def _directions(name: str, comparison: Comparison) -> list[list]:
     """Along and away from the road: what the forces vary by, N, and how far finer steps and modes change that, %."""
-    exact, coarser = found.full[-1].history, found.full[-2].history
-    same = [run for run in found.modal if run.history.step == exact.step] or found.modal
+    exact, coarser = comparison.full[-1].history, comparison.full[-2].history
+    same = [run for run in comparison.modal if run.history.step == exact.step] or comparison.modal
     modes = min(same, key=lambda run: run.error)
     rows = []
     for force in ("contact force", "axle force"):
@@ -146,11 +146,11 @@ def _by_direction(rows: list[list]) -> Table:
     return Table("Rolling at 100 rad/s: direction by direction", columns, rows, notes)
 
 
-def _beyond(found: Comparison) -> str:
+def _beyond(comparison: Comparison) -> str:
     """Force above the band, which the nonlinear contact partly transfers into it."""
-    force = found.full[-1].history.values["contact force"][:, 2]
+    force = comparison.full[-1].history.values["contact force"][:, 2]
     power = np.abs(np.fft.rfft(force - force.mean())) ** 2
-    frequency = np.fft.rfftfreq(len(force), found.full[-1].history.step)
+    frequency = np.fft.rfftfreq(len(force), comparison.full[-1].history.step)
     within, above = (
         np.sqrt(2 * power[part].sum()) / len(force)
         for part in (frequency <= BAND, frequency > BAND)

@@ -82,8 +82,8 @@ def _row(tires: Tires, response: Response, exact: FullHistory, tread, residual, 
     return [tread / 1e6, residual, step, shown, chosen, off[chosen], *off.values()]
 
 
-def _off(duration: float, exact: FullHistory, found: FullHistory | None) -> float | str:
-    if found is None:
+def _off(duration: float, exact: FullHistory, history: FullHistory | None) -> float | str:
+    if history is None:
         return "unbounded"
-    one, other = exact.values["contact force"], found.values["contact force"]
+    one, other = exact.values["contact force"], history.values["contact force"]
     return digits(100 * distance(one, other, duration).mean)

@@ -35,7 +35,7 @@ def run() -> list[Table]:
     for half in LONG:
         share = np.array([patch_share(wave, half) for wave in range(WAVES + 1)])
         static, *others = share @ answers
-        ratios = [float(one / static) for one in others]
+        ratios = [float(other / static) for other in others]
         rows.append(
             [round(float(np.degrees(2 * half))), round(1e9 * float(static), 1), *_rounded(ratios)]
         )
@@ -66,14 +66,14 @@ def _rounded(values: list[float]) -> list[float]:
 def _of_wave(ring: InflatedRing, wave: int, lowest: float) -> list[float]:
     """Flexibilities, m rad/N, of one wave: static moduli, modes, and moduli at the wave's frequency at each speed."""
     weights = ring.patch(0.0, WIDE)
-    found = ring.modes(wave, weights)
-    stored = np.array([np.diag(part).real for part in found.parts])
-    own = found.squares + own_moduli(found.squares, stored, ring.kinds)[0]
-    slow = found.squares + own_moduli(found.squares, stored, ring.kinds, UP_TO / 2)[0]
+    standing = ring.modes(wave, weights)
+    stored = np.array([np.diag(part).real for part in standing.parts])
+    own = standing.squares + own_moduli(standing.squares, stored, ring.kinds)[0]
+    slow = standing.squares + own_moduli(standing.squares, stored, ring.kinds, UP_TO / 2)[0]
     squares = np.where(own <= (2 * np.pi * UP_TO) ** 2, own, slow)
-    push = np.abs(found.push) ** 2
-    rest = found.flexibility - (push / found.squares).sum()
-    modes = (push / squares).sum() + rest * (found.squares[-1] / slow[-1])
+    push = np.abs(standing.push) ** 2
+    rest = standing.flexibility - (push / standing.squares).sum()
+    modes = (push / squares).sum() + rest * (standing.squares[-1] / slow[-1])
     waves = (ring.resting(wave, weights, speed, lowest).real for speed in SPEEDS)
     return [ring.flexibility(wave, weights), float(modes), *waves]
 
@@ -88,7 +88,7 @@ def _in_loop(title: str, resting: np.ndarray) -> Table:
         loop = np.diag(response.static() + response.residual) / static
         modes = np.diag(response.without_slow().static() + response.residual) / static
         for k, half in enumerate(LONG):
-            ratios = [float(one) for one in (modes[k], loop[k], wanted[k])]
+            ratios = [float(level) for level in (modes[k], loop[k], wanted[k])]
             off = 100 * (ratios[1] / ratios[2] - 1)
             rows.append(
                 [speed, round(float(np.degrees(2 * half))), *_rounded(ratios), round(off, 2)]

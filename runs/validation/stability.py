@@ -253,14 +253,14 @@ def modal_rows() -> list[list]:
     )
     loader = LoadStepper(Equilibrium(body), lambda progress: None)
     loader.inflate(2e5)
-    found = [_double(Operators(body, 2e5)), _negative(body)]
+    rows = [_double(Operators(body, 2e5)), _negative(body)]
     loader.deflect(0.003)
     operators = Operators(body, 2e5)
     modes = _modes(operators)
     projection = project(modes, operators.rotation(), operators.carried, MPI.COMM_SELF)
-    found += [_damped(projection, gamma) for gamma in DAMPING]
-    found.append(_past_critical(projection))
-    return [["modal", *row] for row in found]
+    rows += [_damped(projection, gamma) for gamma in DAMPING]
+    rows.append(_past_critical(projection))
+    return [["modal", *row] for row in rows]
 
 
 def _modes(operators: Operators) -> Modes:
@@ -318,10 +318,10 @@ def _past_critical(projection: Projection) -> list:
 
 def greens_rows() -> list[list]:
     """(package, case, result, how it was caught)."""
-    found = [_greens_damped(name, value) for name, value in MODAL_DAMPING.items()]
-    found += [_defective(split) for split in (0.0, 1e-13, 1e-10, 1e-6)]
-    found += [_long(), _limits()]
-    return [["greens", *row] for row in found]
+    rows = [_greens_damped(name, value) for name, value in MODAL_DAMPING.items()]
+    rows += [_defective(split) for split in (0.0, 1e-13, 1e-10, 1e-6)]
+    rows += [_long(), _limits()]
+    return [["greens", *row] for row in rows]
 
 
 def _responses(damping: float) -> list[Response]:
@@ -419,10 +419,10 @@ def _limits() -> list:
     """A state that turns 1e-12 to 1e4 radians per step, against its closed form."""
     worst = 0.0
     for turn in (1e-12, 1e-8, 1e-4, 1e4):
-        one = np.ones((1, 1))
+        unit = np.ones((1, 1))
         modes = standing(Projection(squares=np.ones(1), momentum=np.ones((3, 1))), (0.0, 0.0))
         tire = Recursion(
-            response=couple(modes, one, one, np.ones((3, 1))),
+            response=couple(modes, unit, unit, np.ones((3, 1))),
             step=turn,
             scheme="linear",
             comm=MPI.COMM_SELF,
@@ -487,14 +487,14 @@ def outcomes() -> list[RolledCase]:
     return [thrown_up(), *(rolled(case) for case in cases()), one_mode(), many_points()]
 
 
-def table(found: list[RolledCase]) -> Table:
+def table(cases: list[RolledCase]) -> Table:
     """Figures of all cases."""
     columns = [("case", ""), ("steps", "-"), ("largest load", "N"), ("variation of the load", "-"),
                ("worst residual", "-"), ("left the road", "-"), ("refused", "")]  # fmt: skip
     rows = [
         [e.name, e.steps, "", "", "", "", e.refused] if e.refused
         else [e.name, e.steps, e.load, e.growth, e.residual, e.left, ""]
-        for e in found
+        for e in cases
     ]  # fmt: skip
     notes = [
         "A made-up tire of 8 kg on a periodic strip, 500 N. Variation of the load: in the last tenth of "
@@ -717,12 +717,12 @@ def combined_rows(names: list[str] | None = None) -> list[list]:
         ]
 
 
-def _ended(one: Combination, folder: Path) -> tuple[str, str]:
+def _ended(combination: Combination, folder: Path) -> tuple[str, str]:
     """The result, and how it was caught."""
     from tireroad.runs.scene.load import load
 
-    text = _BASE.format(**vars(one))
-    if one.tread == "winkler":
+    text = _BASE.format(**vars(combination))
+    if combination.tread == "winkler":
         text = text.replace("youngs_modulus = 1e7\n", "")
     (folder / "scene.toml").write_text(text)
     try:

@@ -51,7 +51,9 @@ def modules(package: str) -> dict[str, ModuleType]:
     Some also have run_large(): the same on a mesh that takes too long to wait for.
     """
     path = importlib.import_module(package).__path__
-    names = [found.name for found in pkgutil.walk_packages(path, f"{package}.") if not found.ispkg]
+    names = [
+        module.name for module in pkgutil.walk_packages(path, f"{package}.") if not module.ispkg
+    ]
     loaded = {name.rpartition(".")[2]: importlib.import_module(name) for name in names}
     return {name: loaded[name] for name in sorted(loaded) if hasattr(loaded[name], "ABOUT")}
 
@@ -132,11 +134,9 @@ def _left(results: dict[str, list[Table]], out: Path | None) -> str:
     if out is None:
         return "nothing is kept; with --out FILE.json what is finished is written there"
     finished = f"{', '.join(results)} in {out}" if results else "nothing in the file of --out"
-    kept = out.with_suffix(".kept")
-    if kept.is_dir():
-        return (
-            f"kept are {finished}, and cases of the last one in {kept}: the same command continues"
-        )
+    folder = out.with_suffix(".kept")
+    if folder.is_dir():
+        return f"kept are {finished}, and cases of the last one in {folder}: the same command continues"
     return f"kept are {finished}; name those that remain, with another --out"
 
 

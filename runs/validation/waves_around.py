@@ -43,18 +43,24 @@ def run() -> list[Table]:
     ring = InflatedRing(radial(SIZE), ALONG, 2, PRESSURE)
     weights = ring.patch(0.0, HALF[0])
     exact = level(ring.receptance(weights, HALF[1], FREQUENCY, ANGLES, WAVES), FREQUENCY)
-    found = [_summed(_of_elements(ring, weights, count)) for count in ELEMENTS]
-    found += [_summed(answers) for answers in zip(*_of_modes(ring, weights), strict=True)]
-    off = [level(H, FREQUENCY) - exact for H in found]
+    elements = [_summed(_of_elements(ring, weights, count)) for count in ELEMENTS]
+    elements += [_summed(answers) for answers in zip(*_of_modes(ring, weights), strict=True)]
+    off = [level(H, FREQUENCY) - exact for H in elements]
     names = [f"{360 / count:.1f}\u00b0 elements" for count in ELEMENTS]
     columns = [("frequency", "Hz"), ("complex moduli, Fourier series", "dB")]
-    columns += [(name, "dB more") for name in [*names, *(f"modes: {one}" for one in MODES)]]
+    columns += [(name, "dB more") for name in [*names, *(f"modes: {count}" for count in MODES)]]
     return [
         Table(
             f"Crown of {SIZE}, {PRESSURE / 1e3:.0f} kPa, standing: {np.degrees(angle):.0f}\u00b0 from the force",
             columns,
             [
-                [f, *(round(float(x), 1) for x in (exact[row, k], *(one[row, k] for one in off)))]
+                [
+                    f,
+                    *(
+                        round(float(x), 1)
+                        for x in (exact[row, k], *(value[row, k] for value in off))
+                    ),
+                ]
                 for row, f in enumerate(FREQUENCY)
             ],
             [
@@ -77,14 +83,14 @@ def _of_modes(ring: InflatedRing, weights: Array) -> Iterator[list[Array]]:
     """For each wave the answers (f,) of `MODES`."""
     circular = 2 * np.pi * FREQUENCY
     for wave in range(WAVES + 1):
-        found = ring.modes(wave, weights)
-        stored = np.array([np.diag(part).real for part in found.parts])
-        rise, loss = own_moduli(found.squares, stored, ring.kinds)
-        own = found.squares + rise
+        modes = ring.modes(wave, weights)
+        stored = np.array([np.diag(part).real for part in modes.parts])
+        rise, loss = own_moduli(modes.squares, stored, ring.kinds)
+        own = modes.squares + rise
         few = slice(int(np.count_nonzero(own <= (2 * np.pi * UP_TO) ** 2)))
-        squares, push, own = found.squares[few], found.push[few], np.sqrt(own[few])
-        rest = found.flexibility - float((np.abs(push) ** 2 / squares).sum())
-        parts, unit = [part[few, few] for part in found.parts], np.eye(len(push))
+        squares, push, own = modes.squares[few], modes.push[few], np.sqrt(own[few])
+        rest = modes.flexibility - float((np.abs(push) ** 2 / squares).sum())
+        parts, unit = [part[few, few] for part in modes.parts], np.eye(len(push))
         moduli = [kind.spectrum.modulus(own / (2 * np.pi)) for kind in ring.kinds]
         coupled, lost = np.diag(squares).astype(complex), np.zeros_like(parts[0])
         for kind, part, g in zip(ring.kinds, parts, moduli, strict=True):
@@ -137,8 +143,8 @@ class _Cell:
 
         def own_rows(matrix: PETSc.Mat) -> tuple[Array, Array, Array, Array]:
             csr = sparse.csr_matrix(matrix.getValuesCSR()[::-1], shape=matrix.getSize())
-            found = (turn[rows] @ csr @ turn.T).tocoo()
-            return found.row, column.ravel()[found.col], apart[found.col], found.data
+            block = (turn[rows] @ csr @ turn.T).tocoo()
+            return block.row, column.ravel()[block.col], apart[block.col], block.data
 
         compounds = operators.compounds()
         self._kinds: list[Kind] = [compound.kind for compound in compounds]
@@ -151,7 +157,7 @@ class _Cell:
         """w . (K_n*(omega) - omega^2 M)^-1 w (f,), m rad/N, as of InflatedRing.receptance."""
         load = np.zeros(self._size, complex)
         load[::3] = np.outer(self._around(wave), self._across).ravel()
-        whole, *parts = (self._of(wave, one) for one in (self._whole, *self._parts))
+        whole, *parts = (self._of(wave, part) for part in (self._whole, *self._parts))
         out = np.empty(len(FREQUENCY), complex)
         for k, f in enumerate(FREQUENCY):
             matrix = whole - sparse.diags((2 * np.pi * f) ** 2 * self._mass)

@@ -68,8 +68,8 @@ class IsoProfile:
         if chunk.size and chunk.min() == chunk.max():
             return self._within(int(chunk.flat[0]), place)
         out = np.empty(place.shape)
-        for one in np.unique(chunk):
-            out[chunk == one] = self._within(int(one), place[chunk == one])
+        for index in np.unique(chunk):
+            out[chunk == index] = self._within(int(index), place[chunk == index])
         return out
 
     def lattice(self, x: Array, y: Array) -> Array:

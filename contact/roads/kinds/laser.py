@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tireroad.contact.roads.grid import Grid
 from tireroad.contact.roads.kinds.measured import CODES, MISSING_DOC
 from tireroad.contact.roads.meaning import UNITS, ReadAs
-from tireroad.contact.roads.profile_file import HEIGHTS, Given, check_relief, read_profile
+from tireroad.contact.roads.profile_file import HEIGHTS, ProfileKeys, check_relief, read_profile
 from tireroad.contact.roads.random_texture import cleaned, memory, widened
 from tireroad.contact.roads.road import Levelled, road_kind
 from tireroad.contact.roads.under_tire import DEVIATION, mean_profile_depth
@@ -124,41 +124,41 @@ class LaserFile(Levelled):
             raise InputError(f"{source}: no such file")
         if path.suffix.lower() not in ENDINGS:
             raise InputError(f"{source}: the ending {path.suffix!r} is not {', '.join(ENDINGS)}")
-        given = Given(self.length_unit, self.height_unit, self.missing, self.pitch)
-        found = read_profile(path, source, given)
-        profile, notes = found.heights, list(found.notes)
-        if found.assumed:
+        keys = ProfileKeys(self.length_unit, self.height_unit, self.missing, self.pitch)
+        measured = read_profile(path, source, keys)
+        profile, notes = measured.heights, list(measured.notes)
+        if measured.assumed:
             check_relief(profile, HEIGHTS, source)
-        if found.x is None:
-            pitch = found.pitch or self.pitch
+        if measured.x is None:
+            pitch = measured.pitch or self.pitch
             if pitch is None:
                 pitch = PITCH
                 notes.append(f"heights every {1e3 * pitch:g} mm: assumed (road.pitch)")
             every = ReadAs("x", "none in the file", f"every {1e3 * pitch:g} mm")
-            return _Line(profile, pitch), notes, (*found.readings, every)
-        x = found.x
+            return _Line(profile, pitch), notes, (*measured.readings, every)
+        x = measured.x
         if not np.isfinite(x).all():
-            line = int(found.lines[np.flatnonzero(~np.isfinite(x))[0]])
+            line = int(measured.lines[np.flatnonzero(~np.isfinite(x))[0]])
             raise InputError(f"{source}, line {line}: x is missing")
         pitch = (x[-1] - x[0]) / (len(x) - 1)
-        if found.x_assumed and 0 < pitch < _FINEST:
+        if measured.x_assumed and 0 < pitch < _FINEST:
             raise InputError(
                 f"{source}: heights every {1e6 * pitch:.3g} um, {x[-1] - x[0]:.3g} m long, where x is read in mm: is it in m? "
                 "Say road.length_unit"
             )
         off = np.abs(x - x[0] - pitch * np.arange(len(x)))
         # Both ends are rounded, too. Few places tell no rounding from uneven steps.
-        rounded = 2.1 * found.rounding if len(x) >= _MANY else 0.0
+        rounded = 2.1 * measured.rounding if len(x) >= _MANY else 0.0
         steps = np.abs(np.diff(x) - pitch)
         if not (pitch > 0 and (steps.max() < _EVEN * pitch or off.max() <= rounded)):
             worst = int(steps.argmax())
             raise InputError(
-                f"{source}, line {int(found.lines[worst + 1])}: x must ascend in even steps, within {100 * _EVEN:g} % or "
+                f"{source}, line {int(measured.lines[worst + 1])}: x must ascend in even steps, within {100 * _EVEN:g} % or "
                 f"its last digit, and here goes on by {x[worst + 1] - x[worst]:.4g} m where {pitch:.4g} m is usual"
             )
         if steps.max() >= _EVEN * pitch:
             notes.append(f"x is rounded; its even steps are {1e3 * pitch:.5g} mm")
-        return _Line(profile, float(pitch), float(x[0])), notes, found.readings
+        return _Line(profile, float(pitch), float(x[0])), notes, measured.readings
 
     def _resampled(self, profile: Array, pitch: float, source: str) -> tuple[Array, float]:
         """Without waves shorter than `shortest_wave` (ISO 16610-21), sampled at a quarter of it."""

@@ -39,10 +39,10 @@ def weights(mu: tuple[float, ...], alpha: tuple[float, ...]) -> tuple[tuple[floa
     columns = [p**2 * x**p for p in POWERS]
     columns += [x * (x - t) / (x + t) ** 3 for t in POLES]
     table = np.array(columns).T / scale[:, None]
-    wanted = terms.sum(axis=1) / scale
+    target = terms.sum(axis=1) / scale
     size = np.linalg.norm(table, axis=0)
-    found = np.linalg.lstsq(table / size, wanted, rcond=1e-13)[0]
-    error = float(np.abs(table / size @ found - wanted).max())
+    found = np.linalg.lstsq(table / size, target, rcond=1e-13)[0]
+    error = float(np.abs(table / size @ found - target).max())
     return tuple((found / size).tolist()), error
 
 

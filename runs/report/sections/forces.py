@@ -145,15 +145,15 @@ def _road_drawn(wavelength: NDArray, level: NDArray, labels: tuple[str, str]) ->
 def add(results: Results, section: Section, names: list[str]) -> None:
     """Add the curves of response.h5, by momentum and by the free rim, if it has them."""
     name = "response.h5"
-    frequency, found = (
+    frequency, values = (
         results.optional(name, f"transmissibility/{part}") for part in ("frequency", "momentum")
     )
-    if frequency is None or found is None or not len(frequency):
+    if frequency is None or values is None or not len(frequency):
         return
     other = results.optional(name, "transmissibility/free_rim")
     dashed = "" if other is None else "; dashed: by modes of a tire with a free rim"
     section.show(
-        transmissibilities(frequency, found, other, names),
+        transmissibilities(frequency, values, other, names),
         f"Force on the axle per force at the point, by momentum{dashed}.",
     )
     turning, held = (
@@ -164,7 +164,7 @@ def add(results: Results, section: Section, names: list[str]) -> None:
             transmissibilities(frequency, turning, held, names, "dB re 1 N m/N"),
             "Moment on the axle, about its centre, per force at the point.",
         )
-    for what, one, by_momentum in (("force", other, found), ("moment", held, turning)):
+    for what, one, by_momentum in (("force", other, values), ("moment", held, turning)):
         if one is not None and by_momentum is not None:
             apart = np.linalg.norm(one - by_momentum) / np.linalg.norm(by_momentum)
             fact = f"axle {what} by the free rim off that by momentum"
@@ -209,12 +209,12 @@ def contact(results: Results) -> Section:
     time, total = results.array(name, "time"), results.array(name, "total_force")
     if not len(time):
         raise Absent(f"{name} holds no step yet")
-    wanted = (("road", ""), ("scheme", ""), ("step", "s"), ("speed", "rad/s"))
+    keys = (("road", ""), ("scheme", ""), ("step", "s"), ("speed", "rad/s"))
     axle, active = results.optional(name, "axle_force"), results.optional(name, "active")
     low = _valid(results, {"contact": total, "axle": axle})
     vertical = low.forces["contact"][:, 2]
     section.facts = [("simulated", quantity(float(time[-1]), "s")), ("steps", quantity(len(time)))]
-    section.facts += attributes(results, name, wanted)
+    section.facts += attributes(results, name, keys)
     section.facts += low.facts
     picture = figures.forces(time, low.forces["contact"], low.forces.get("axle"), active)
     drawn = histories(time, low.forces, active)
@@ -385,10 +385,10 @@ def response(results: Results) -> Section:
         picture = figures.receptance(frequency, pairs)
         levels = {label: figures.decibels(values) for label, values in pairs}
         labels = "frequency in Hz", "receptance in dB re 1 m/N"
-        kept = frequency > 0
-        curves = {label: level[kept] for label, level in levels.items()}
+        above_zero = frequency > 0
+        curves = {label: level[above_zero] for label, level in levels.items()}
         drawn = live.charts(
-            live.chart(frequency[kept], curves, labels, figures.CYCLE, log=True, height=300)
+            live.chart(frequency[above_zero], curves, labels, figures.CYCLE, log=True, height=300)
         )
         section.show(picture, "Receptance: displacement at i along its force per N at j.", drawn)
     driven = len(results.scene.get("force", []))

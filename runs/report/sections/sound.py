@@ -54,9 +54,9 @@ def sound(results: Results) -> Section:
         ("sound power", f"{power[0]:.1f} dB, {power[1]:.1f} dB(A) re 1 pW, error unknown")
     )
     centre = results.array(FILE, "third_octave/centre")
-    for name, one in zip(names, results.array(FILE, "signal/pressure"), strict=True):
+    for name, signal in zip(names, results.array(FILE, "signal/pressure"), strict=True):
         rate = float(results.dataset(FILE, "signal/pressure").attrs["rate"])
-        data, full = wave_file(joined(one, max(round(LISTEN * rate), len(one))), rate)
+        data, full = wave_file(joined(signal, max(round(LISTEN * rate), len(signal))), rate)
         uri = f"data:audio/wav;base64,{b64encode(data).decode()}"
         section.sounds.append((f"{name}: full scale is {full:g} Pa", uri))
     if len(centre) < FEWEST_BANDS:
@@ -154,7 +154,7 @@ def _sources(results: Results, section: Section, name: str, centre: NDArray) -> 
     label = "sound pressure level in dB re 20 µPa"
     drawn = live.bars(
         [f"{c:g}" for c in nominal(centre)],
-        {one: (level[:, k], unknown[:, k]) for k, one in enumerate(keys)},
+        {key: (level[:, k], unknown[:, k]) for k, key in enumerate(keys)},
         ("third-octave band in Hz", label),
         CYCLE[: len(keys)],
         ends=level_range(level),

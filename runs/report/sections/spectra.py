@@ -32,10 +32,12 @@ _MORE = (  # third octaves, their quantity, reference
 def add(results: Results, section: Section) -> None:
     """Add the trials of search.json, if the run began with a search and the file is readable."""
     with suppress(OSError, ValueError, KeyError, TypeError):
-        wanted = _wanted(results.scene)
-        trials = [one for one in read_trials(results.directory / NAME) if one.found is not None]
-        if wanted is not None and trials:
-            _show(section, wanted, trials)
+        table = _wanted(results.scene)
+        trials = [
+            trial for trial in read_trials(results.directory / NAME) if trial.found is not None
+        ]
+        if table is not None and trials:
+            _show(section, table, trials)
 
 
 def _wanted(scene: Mapping[str, Any]) -> AccuracyTable | None:
@@ -43,24 +45,24 @@ def _wanted(scene: Mapping[str, Any]) -> AccuracyTable | None:
     return None if table.target is None and table.target_db is None else table
 
 
-def _show(section: Section, wanted: AccuracyTable, trials: list[Trial]) -> None:
-    over = [_errors(trial, wanted) for trial in trials]
+def _show(section: Section, table: AccuracyTable, trials: list[Trial]) -> None:
+    over = [_errors(trial, table) for trial in trials]
     cost = np.array([sum(trial.seconds.values()) for trial in trials])
     section.facts += [
-        ("searched for", wanted.aim()),
+        ("searched for", table.aim()),
         ("trials of the search", str(len(trials))),
         ("they took", quantity(float(sum(trial.spent for trial in trials)), "s")),
     ]
     section.show(
-        trade(cost, np.array([worst(one)[0] for one in over]), np.array([_shares(o) for o in over])),
+        trade(cost, np.array([worst(value)[0] for value in over]), np.array([_shares(o) for o in over])),
         "The search: estimated error over the one asked for, against the cost of a run with the settings of each "
         f"trial, in the order tried; marks: the part of each cause. A search continues to 1/{MARGIN:g}.",
     )  # fmt: skip
 
 
-def _errors(trial: Trial, wanted: AccuracyTable) -> NDArray:
+def _errors(trial: Trial, table: AccuracyTable) -> NDArray:
     assert trial.found is not None
-    return trial.found.over(wanted)
+    return trial.found.over(table)
 
 
 def _shares(over: NDArray) -> NDArray:
@@ -131,13 +133,13 @@ def _one_line(frequency: float, force: NDArray, of: str) -> tuple[str, str]:
 
 
 def _lines(frequency: NDArray, force: NDArray, of: str) -> dict:
-    kept = frequency > 0
-    level = figures.decibels(force[kept])
+    above_zero = frequency > 0
+    level = figures.decibels(force[above_zero])
     level = np.where(level < level.max(initial=-1e3) - figures.RANGE_DB, np.nan, level)
     curves = dict(zip(figures.COMPONENTS, level.T, strict=True))
     labels = "frequency in Hz", f"{of} in dB re 1 N"
     return live.charts(
-        live.chart(frequency[kept], curves, labels, figures.COLOURS, log=True, height=300)
+        live.chart(frequency[above_zero], curves, labels, figures.COLOURS, log=True, height=300)
     )
 
 

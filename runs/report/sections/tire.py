@@ -106,9 +106,9 @@ def static(results: Results) -> Section:
         pace = quantity(3.6 * speed * radius, "km/h")
         section.facts.append(("travelling speed", pace))
     section.facts += friction(results)
-    taken = results.attribute(name, "from_file")
-    if taken:
-        section.listing = "What the run takes from the tire's file, and what not", str(taken)
+    text = results.attribute(name, "from_file")
+    if text:
+        section.listing = "What the run takes from the tire's file, and what not", str(text)
     points, quads = results.array(name, "surface/points"), results.array(name, "surface/quads")
     moved, road = (
         results.array(name, "surface/displacement"),
@@ -203,8 +203,8 @@ def modes(results: Results) -> Section:
     frequency = results.array(name, "frequency")
     top = quantity(float(frequency.max()), "Hz")
     section.facts = [("modes", quantity(len(frequency))), ("highest frequency", top)]
-    wanted = (("inertia_count", ""), ("rigid_modes", ""))
-    section.facts += attributes(results, name, wanted)
+    keys = (("inertia_count", ""), ("rigid_modes", ""))
+    section.facts += attributes(results, name, keys)
     duct(results, section)
     called = _named(results, name)
     columns = {
@@ -246,7 +246,7 @@ def _named(results: Results, file: str) -> dict[str, list[str]]:
     carried = results.array(file, "effective_mass")[:LISTED]
     return {
         "name": list(name[:LISTED]),
-        "damping": [ratio(one) for one in results.array(file, "damping")[:LISTED]],
+        "damping": [ratio(value) for value in results.array(file, "damping")[:LISTED]],
         "waves around": [str(n) for n in results.array(file, "wave_number")[:LISTED]],
         "effective mass at the hub": [_carried(row, carried) for row in carried],
         "motion": list(results.array(file, "motion")[:LISTED]),
@@ -261,12 +261,12 @@ def ratio(value: float) -> str:
 def _carried(row: NDArray, every: NDArray) -> str:
     """The larger ones of the effective masses (6,), beside the largest of all modes (m, 6)."""
     largest = [np.nanmax(every[:, part], initial=0.0) for part in (slice(0, 3), slice(3, 6))]
-    found = [
+    forces = [
         f"{row[k]:.3g} {unit}{axis}"
         for k, (unit, axis) in enumerate(_ALONG)
         if row[k] >= _WORTH * largest[k // 3] > 0
     ]
-    return ", ".join(found) or "–"
+    return ", ".join(forces) or "–"
 
 
 def stiffness(results: Results) -> Section:
@@ -293,7 +293,7 @@ def stiffness(results: Results) -> Section:
     return section
 
 
-def _slides(results: Results, made: Section) -> None:
+def _slides(results: Results, section: Section) -> None:
     """Add force over road displacement or slip, for a tire with friction."""
     rolls = results.attribute("static.h5", "travel") is not None
     curves = {}
@@ -307,8 +307,8 @@ def _slides(results: Results, made: Section) -> None:
     if not curves:
         return
     for name, (_, force) in curves.items():
-        made.facts.append((f"largest {name} force", quantity(float(force.max()), "N")))
-    made.show(
+        section.facts.append((f"largest {name} force", quantity(float(force.max()), "N")))
+    section.show(
         slid(curves, "slip of the wheel" if rolls else "way of the road, mm"),
         "Force along and across the road with friction, "
         + (

@@ -102,12 +102,12 @@ def fingerprint(tire: TireTable) -> str:
     own = own_section(tire)
     mesh = own.mesh
     faces = (mesh.outer, mesh.tread, mesh.inner, mesh.rim, *mesh.plies.values())
-    found = hashlib.sha256()
+    digest = hashlib.sha256()
     for array in (mesh.nodes, mesh.cells, mesh.region, *faces):
-        found.update(np.ascontiguousarray(array).tobytes())
+        digest.update(np.ascontiguousarray(array).tobytes())
     plies = [{k: v for k, v in vars(ply).items() if k != "sides"} for ply in own.plies]
-    found.update(repr((mesh.regions, own.rubbers, plies)).encode())
-    return found.hexdigest()
+    digest.update(repr((mesh.regions, own.rubbers, plies)).encode())
+    return digest.hexdigest()
 
 
 def check_regions(tire: TireTable, own: OwnSection) -> None:
@@ -157,8 +157,8 @@ def _of_file(tire: TireTable, rubber: Rubber | None) -> Material:
     if rubber is None:
         return Material(law=wall.law, density=wall.density, **losses_of(tire, wall.law))
     density = wall.density if rubber.density is None else rubber.density
-    made = compound(rubber.model, density, **rubber.coefficients)
-    return replace(made, **losses_of(tire, made.law) | _small_motions(rubber))
+    material = compound(rubber.model, density, **rubber.coefficients)
+    return replace(material, **losses_of(tire, material.law) | _small_motions(rubber))
 
 
 def _wall(tire: TireTable) -> MaterialTable:
@@ -211,13 +211,13 @@ def own_cords(tire: TireTable) -> list[Cords]:
     """The cords on the lines of the file: from [[tire.cords]] of that name, else from the file."""
     from tireroad.fem.tire.cords import Cords
 
-    given = {cords.name: cords_of(cords) for cords in given_cords(tire)}
+    lines = {cords.name: cords_of(cords) for cords in given_cords(tire)}
     found = [
         Cords(**{key: value for key, value in vars(ply).items() if key != "sides"})
         for ply in own_section(tire).plies
-        if ply.name not in given
+        if ply.name not in lines
     ]
-    return found + list(given.values())
+    return found + list(lines.values())
 
 
 def described(tire: TireTable) -> list[str]:
@@ -243,7 +243,11 @@ def described(tire: TireTable) -> list[str]:
 
 
 def _shown(value: float | tuple[float, ...]) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else " ".join(f"{one:.4g}" for one in value)
+    return (
+        f"{value:.4g}"
+        if isinstance(value, float)
+        else " ".join(f"{number:.4g}" for number in value)
+    )
 
 
 def _in_words(tire: TireTable, name: str, rubber: Rubber | None) -> str:
@@ -326,8 +330,8 @@ class FileSection(SectionKind):
 
     def angles(self, tire: TireTable) -> dict[str, float]:
         own = own_section(tire).plies
-        given = {line.name: line.angle for line in given_cords(tire)}
-        return {ply.name: float(np.degrees(ply.angle)) for ply in own} | given
+        angles = {line.name: line.angle for line in given_cords(tire)}
+        return {ply.name: float(np.degrees(ply.angle)) for ply in own} | angles
 
     def coarser(self, tire: TireTable) -> FileSection:
         """The file's own elements: there are no others."""

@@ -113,8 +113,8 @@ class RadialSection(SectionKind):
         try:
             construction = self.construction
         except InputError as problem:
-            found = re.match(r"tire\.(\w+) (.*)", str(problem), re.DOTALL)
-            key, text = found.groups() if found else ("size", str(problem))
+            match = re.match(r"tire\.(\w+) (.*)", str(problem), re.DOTALL)
+            key, text = match.groups() if match else ("size", str(problem))
             source.add(("tire", key), text)
             return
         lines = [line.name for line in construction.cords]
@@ -144,16 +144,16 @@ class RadialSection(SectionKind):
         compounds = {
             name: compound_table(
                 name,
-                one.law,
+                part.law,
                 _MODEL,
-                one.density,
+                part.density,
                 {
-                    "dynamic": one.dynamic,
-                    "loss_factor": one.loss_factor,
-                    "exponent": one.spectrum.exponent,
+                    "dynamic": part.dynamic,
+                    "loss_factor": part.loss_factor,
+                    "exponent": part.spectrum.exponent,
                 },
             )
-            for name, one in own.items()
+            for name, part in own.items()
         }
         return Parts(compounds, lines, {}, {}, whole=self.built_in)
 
@@ -245,16 +245,16 @@ def _check_parts(
 ) -> None:
     """Note unknown or repeated names of parts, and keys for what follows from the tire's size."""
     known = {name.upper() for name in names}
-    for place, one in enumerate(given):
+    for place, part in enumerate(given):
         path = ("tire", table, str(place))
-        own = (one.name or "").upper()
+        own = (part.name or "").upper()
         if own and own not in known:
             source.add((*path, "name"), f"must be one of {', '.join(names)} in a radial tire")
         elif own in [(other.name or "").upper() for other in given[:place]]:
-            taken = f'name = "{one.name}" is taken' if own else "is the second without a name"
-            source.add(path, taken)
+            text = f'name = "{part.name}" is taken' if own else "is the second without a name"
+            source.add(path, text)
         for key in ("arc", "depth", "side"):
-            if (value := getattr(one, key, None)) not in (None, _TORUS.get((table, key))):
+            if (value := getattr(part, key, None)) not in (None, _TORUS.get((table, key))):
                 source.add((*path, key), _fixed(value, names, named=bool(own)))
 
 

@@ -138,7 +138,7 @@ class TorusSection(SectionKind):
         """Check that a line of cords lies within the wall and has a unique name."""
         cords, place = tire.cords[which], ("tire", "cords", str(which))
         depth, (low, high) = _place(cords)
-        taken = [other.name for other in tire.cords[:which]]
+        names = [other.name for other in tire.cords[:which]]
         wall = f"tire.thickness = {self.thickness:g} m"
         problems = (
             ("arc", low >= high, f"= [{low:g}, {high:g}] must ascend"),
@@ -161,7 +161,7 @@ class TorusSection(SectionKind):
             ),
             (
                 "name",
-                cords.name in taken,
+                cords.name in names,
                 f'= "{cords.name}" is that of an earlier line (absent: "ply"): give each line its own',
             ),
             (

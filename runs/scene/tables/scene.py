@@ -251,9 +251,9 @@ def axle_of(scene: Scene) -> Axle | None:
     )
 
 
-def check_axle(given: AxleTable, scene: Scene, raw: Raw, error: Where) -> None:
+def check_axle(table: AxleTable, scene: Scene, raw: Raw, error: Where) -> None:
     """Raise an error for an unstable corner, and for settings incompatible with a moving wheel."""
-    if given.kind == "fixed":
+    if table.kind == "fixed":
         return
     try:
         axle = axle_of(scene)
@@ -261,12 +261,12 @@ def check_axle(given: AxleTable, scene: Scene, raw: Raw, error: Where) -> None:
         raise error(("axle",), str(problem).removeprefix("axle: ")) from None
     if axle is None:
         return
-    if given.kind == "free" and any(k > 2 for k in axle.moving):
+    if table.kind == "free" and any(k > 2 for k in axle.moving):
         raise error(
             ("axle", "locked"),
             'must hold rx, ry and rz of kind = "free": nothing else keeps the wheel upright',
         )
-    if given.kind == "corner":
+    if table.kind == "corner":
         _check_springs(axle, error)
     _check_company(scene, axle, error)
 
@@ -482,12 +482,12 @@ class StiffnessTable:
     )
 
 
-def deflections(wanted: StiffnessTable, own: float | None) -> list[float]:
+def deflections(table: StiffnessTable, own: float | None) -> list[float]:
     """The deflections (m) to compute; `own` is that of the scene's static state."""
-    if wanted.deflections:
-        return list(wanted.deflections)
-    last = wanted.up_to or _BEYOND * own
-    return (last * np.arange(1, wanted.steps + 1) / wanted.steps).tolist()
+    if table.deflections:
+        return list(table.deflections)
+    last = table.up_to or _BEYOND * own
+    return (last * np.arange(1, table.steps + 1) / table.steps).tolist()
 
 
 def check_stiffness(stiffness: StiffnessTable, scene: Scene, raw: Raw, error: Where) -> None:

@@ -199,11 +199,11 @@ class SectionKind(Parameters):
 
     def has_losses(self, tire: TireTable) -> bool:
         """Whether any compound has a loss factor."""
-        return any(one.loss_factor for one in self.rubbers(tire).values())
+        return any(rubber.loss_factor for rubber in self.rubbers(tire).values())
 
     def varies(self, tire: TireTable) -> bool:
         """Whether any modulus depends on frequency."""
-        return any(one.spectrum != CONSTANT for one in self.rubbers(tire).values())
+        return any(rubber.spectrum != CONSTANT for rubber in self.rubbers(tire).values())
 
     def fingerprint(self, tire: TireTable) -> str | None:
         """Hash of what a run takes from the section's files; None without files."""
@@ -499,8 +499,8 @@ def losses_of(part: TireTable | RegionTable, law: MaterialLaw) -> dict[str, Any]
     if part.prony_shares or part.prony_times:
         return dict(zip(_SMALL_MOTIONS, prony(part.prony_shares, part.prony_times), strict=True))
     spectrum = None if part.exponent is None else power_law(part.exponent)
-    given = dict(zip(_SMALL_MOTIONS, (part.dynamic, part.loss_factor, spectrum), strict=True))
-    return {key: value for key, value in given.items() if value is not None}
+    values = dict(zip(_SMALL_MOTIONS, (part.dynamic, part.loss_factor, spectrum), strict=True))
+    return {key: value for key, value in values.items() if value is not None}
 
 
 def changed(compound: Material, region: RegionTable | None) -> Material:
@@ -544,7 +544,7 @@ def master_curve(file: str) -> tuple[float, float, Spectrum]:
 def check_series(tire: TireTable, source: Source) -> None:
     """Note Prony series and master curves that are none, or that stand beside an exponent."""
     parts: list[tuple[tuple[str, ...], TireTable | RegionTable]] = [(("tire",), tire)]
-    parts += [(("tire", "region", str(n)), one) for n, one in enumerate(tire.region)]
+    parts += [(("tire", "region", str(n)), region) for n, region in enumerate(tire.region)]
     for path, part in parts:
         ways: dict[str, tuple[str, Callable[[], object]]] = {}
         if part.prony_shares or part.prony_times:

@@ -30,7 +30,7 @@ class Impulse(Output):
             return {}
         response = seen.response
         with record.timing("impulse responses"):
-            found: Curves = {"impulse": (seen.along(response.impulse(seen.time)), "m/(N s)")}
+            curves: Curves = {"impulse": (seen.along(response.impulse(seen.time)), "m/(N s)")}
         if response.residual.any():
-            found["impulse_at_once"] = seen.along(response.residual[None])[0], "m/N"
-        return found
+            curves["impulse_at_once"] = seen.along(response.residual[None])[0], "m/N"
+        return curves

@@ -95,11 +95,11 @@ class Transmissibility(Output):
         loads, _ = seen.points()
         total = loads.toarray().reshape(loads.shape[0], -1, 3).sum(axis=1).T
         with record.timing("transmissibility"):
-            found = by_momentum(seen.response, total, frequency)
-        peak = np.unravel_index(np.abs(found).argmax(), found.shape)
-        record.headline["largest force on the axle per force"] = (float(np.abs(found[peak])), "-")
+            ratio = by_momentum(seen.response, total, frequency)
+        peak = np.unravel_index(np.abs(ratio).argmax(), ratio.shape)
+        record.headline["largest force on the axle per force"] = (float(np.abs(ratio[peak])), "-")
         record.headline["force on the axle is largest at"] = (float(frequency[peak[0]]), "Hz")
-        curves: Curves = {FREQUENCY: (frequency, "Hz"), MOMENTUM: (found, "-")}
+        curves: Curves = {FREQUENCY: (frequency, "Hz"), MOMENTUM: (ratio, "-")}
         moment = seen.moments(frequency)
         if moment is not None:
             curves[MOMENT] = moment, "m"
@@ -110,9 +110,9 @@ class Transmissibility(Output):
             highest = min(highest, top)
             force, turning = np.split(other, 2, axis=1)
             curves |= {FREE_RIM: (force, "-"), FREE_RIM_MOMENT: (turning, "m")}
-            for what, one, by_momenta in (("force", force, found), ("moment", turning, moment)):
+            for what, values, by_momenta in (("force", force, ratio), ("moment", turning, moment)):
                 if by_momenta is not None:
-                    compare(record, f"axle {what}", apart(one, by_momenta), self.to)
+                    compare(record, f"axle {what}", apart(values, by_momenta), self.to)
         if self.to > LIMIT * highest:
             record.warnings.append(
                 f"output.transmissibility goes to {self.to:g} Hz; beyond {LIMIT * highest:.4g} Hz, half the highest mode, "
@@ -132,6 +132,6 @@ def compare(record: Record, what: str, off: float, to: float) -> None:
         )
 
 
-def apart(one: np.ndarray, other: np.ndarray) -> float:
+def apart(left: np.ndarray, other: np.ndarray) -> float:
     """Relative distance of two transmissibilities, as root mean squares over all entries."""
-    return float(np.linalg.norm(one - other) / np.linalg.norm(other))
+    return float(np.linalg.norm(left - other) / np.linalg.norm(other))

@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from tireroad.contact.results.error_bars import bars
 from tireroad.runs.files.cache import Cache
-from tireroad.runs.stages.accuracy import Given, companions, figures, model_limit
+from tireroad.runs.stages.accuracy import ReferenceRun, companions, figures, model_limit
 from tireroad.runs.stages.rolling import ContactForces, first_step, recursive
 from tireroad.runs.validation.tables import Table
 from tireroad.tests.bench.parts.effectivity import RANGE, SMALL, Effectivity
@@ -85,11 +85,11 @@ def _figure(
     return Effectivity(**where, figure=name, true=true, estimated=estimated, small=small)
 
 
-def _given(own: Driven) -> tuple[Given, float, float]:
+def _given(own: Driven) -> tuple[ReferenceRun, float, float]:
     """What the companion repeats, the time (s) from which runs are compared, and the limit (Hz)."""
     done = own.done
     history = done.done["contact"].product
-    given = Given(
+    given = ReferenceRun(
         job=done.job,
         static=done.done["static"],
         setup=done.setup,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tireroad.contact.roads.grid_file import read_grid
-from tireroad.contact.roads.profile_file import Given, read_profile
+from tireroad.contact.roads.profile_file import ProfileKeys, read_profile
 
 N = 200
 X = 10.0 + 2e-3 * np.arange(N)  # m
@@ -84,7 +84,7 @@ def test_a_profile_is_read(tmp_path: Path, form: str, written: str) -> None:
 def test_a_single_column_is_read(tmp_path: Path, line: str) -> None:
     for above in (f"# {line}\n", f"{line}\n# height in mm\n", f"{line}\n"):
         (tmp_path / "road.txt").write_text(above + "\n".join(f(ROUGH, 1e-3, 5)), "utf-8")
-        found = read_profile(tmp_path / "road.txt", "F", Given(pitch=2e-3))
+        found = read_profile(tmp_path / "road.txt", "F", ProfileKeys(pitch=2e-3))
         np.testing.assert_allclose(found.heights, ROUGH, atol=2e-7)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tireroad.contact.roads.profile_file import Given, read_profile
+from tireroad.contact.roads.profile_file import ProfileKeys, read_profile
 from tireroad.contact.roads.road import ROADS
 from tireroad.fem.errors import InputError
 
@@ -26,7 +26,7 @@ def lines(form: str, comma: bool = False) -> list[str]:
 def read(path: Path, text: str | bytes, **more):
     file = path / "line.csv"
     file.write_bytes(text if isinstance(text, bytes) else text.encode())
-    return read_profile(file, "road.file line.csv", Given(**more))
+    return read_profile(file, "road.file line.csv", ProfileKeys(**more))
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import pytest
 from tireroad.contact.roads.grid_file import read_grid
 from tireroad.contact.roads.meaning import unit_of
 from tireroad.contact.roads.missing import codes
-from tireroad.contact.roads.profile_file import Given, Profile, read_profile
+from tireroad.contact.roads.profile_file import Profile, ProfileKeys, read_profile
 from tireroad.fem.errors import InputError
 
 X = 1e-3 * np.arange(120)
@@ -27,7 +27,7 @@ def profile(path: Path, head: str, x: float = 1e-3, z: float = 1e-3, **given: An
     """The profile X, Z in units of x and z m under lines of text."""
     rows = "".join(f"{a / x:.9g};{b / z:.9g}\n" for a, b in zip(X, Z, strict=True))
     (path / "road.csv").write_text(head + rows, encoding="utf-8")
-    return read_profile(path / "road.csv", "F", Given(**given))
+    return read_profile(path / "road.csv", "F", ProfileKeys(**given))
 
 
 @pytest.mark.parametrize("unit", UNITS)
@@ -92,7 +92,7 @@ def test_a_column_that_counts_by_any_name(tmp_path: Path, name: str, first: int)
     (tmp_path / "road.csv").write_text(f"{name};z [mm]\n{rows}", encoding="utf-8")
     with pytest.raises(InputError, match=r"road\.pitch"):
         read_profile(tmp_path / "road.csv", "F")
-    found = read_profile(tmp_path / "road.csv", "F", Given(pitch=1e-3))
+    found = read_profile(tmp_path / "road.csv", "F", ProfileKeys(pitch=1e-3))
     assert found.x is None
     np.testing.assert_allclose(found.heights, Z, atol=1e-9)
 
@@ -292,11 +292,11 @@ def test_a_height_that_is_missing_in_a_single_column(tmp_path: Path, word: str) 
     (tmp_path / "road.csv").write_text("z [mm]\n" + "\n".join(rows) + "\n\n")
     if not word:
         with pytest.raises(InputError, match="line 4[1-4]: is empty"):
-            read_profile(tmp_path / "road.csv", "F", Given(pitch=1e-3))
+            read_profile(tmp_path / "road.csv", "F", ProfileKeys(pitch=1e-3))
         (tmp_path / "road.csv").write_text("z [mm]\n\n" + "\n\n".join(rows[:40]) + "\n\n")
-        assert len(read_profile(tmp_path / "road.csv", "F", Given(pitch=1e-3)).heights) == 40
+        assert len(read_profile(tmp_path / "road.csv", "F", ProfileKeys(pitch=1e-3)).heights) == 40
         return
-    found = read_profile(tmp_path / "road.csv", "F", Given(pitch=1e-3)).heights
+    found = read_profile(tmp_path / "road.csv", "F", ProfileKeys(pitch=1e-3)).heights
     assert np.flatnonzero(np.isnan(found)).tolist() == [40, 41, 42]
 
 

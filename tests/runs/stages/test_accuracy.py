@@ -19,7 +19,7 @@ from tireroad.runs.pipeline import run_scene
 from tireroad.runs.process import console
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.accuracy import (
-    Given,
+    ReferenceRun,
     _dealt,
     backed,
     coarser,
@@ -197,9 +197,9 @@ def sinks(patch, response, wall=None) -> float:
     )
 
 
-def _given(whole) -> Given:
+def _given(whole) -> ReferenceRun:
     _, done = whole
-    return Given(
+    return ReferenceRun(
         job=done.job,
         static=done.done["static"],
         setup=done.setup,
