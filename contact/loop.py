@@ -735,7 +735,7 @@ class Loop:
         return self.tire.snapshot() | self.contact.state() | memory
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
-        """Continue with the same bits as without interruption, on the same number of processes."""
+        """Restore the state; results are bitwise those of an uninterrupted run on as many processes."""
         self.tire.restore(state)
         self.contact.set_state(state)
         if self.memory:

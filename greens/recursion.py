@@ -224,7 +224,7 @@ class Spread:
         return every[rank - self.idle :: owners] if rank >= self.idle else every[:0]
 
 
-def sharers(response: Response, comm: MPI.Comm) -> MPI.Comm:
+def loop_communicator(response: Response, comm: MPI.Comm) -> MPI.Comm:
     """The processes worth distributing a loop over: all of `comm`, or each one by itself.
     Collective.
 

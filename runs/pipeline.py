@@ -32,7 +32,8 @@ from tireroad.runs.scene.choices import with_modal
 from tireroad.runs.scene.estimate import Estimate, duration, estimate, memory_of
 from tireroad.runs.scene.plan import meets_road, skipped
 from tireroad.runs.scene.resolved import dumps
-from tireroad.runs.scene.rules import check_road, keep, made
+from tireroad.runs.scene.road_cache import keep, road_of
+from tireroad.runs.scene.rules import check_road
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.stages.accuracy import STATIC_TO_GREENS, AccuracyStage, begin_ahead
 from tireroad.runs.stages.contact import ContactStage
@@ -72,7 +73,7 @@ PARTS: tuple[type[PipelinePart], ...] = (
 
 
 def share(surface: RoadKind, comm: MPI.Comm) -> None:
-    """Make the road of a file available on every process, where `made` finds it.
+    """Make the road of a file available on every process, where `road_of` finds it.
 
     Heights in memory are sent as buffers; a file, the user's or a temporary one, is opened by each
     process, which reads what it drives over. A process that cannot open it reads the road file
@@ -85,7 +86,7 @@ def share(surface: RoadKind, comm: MPI.Comm) -> None:
     road, error = None, None
     if node.rank == 0:
         try:
-            road = made(surface)
+            road = road_of(surface)
         except InputError as told:
             error = told
     failed = [failure for failure in comm.allgather(error) if failure is not None]

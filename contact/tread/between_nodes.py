@@ -31,7 +31,7 @@ _CORNERS = (-1, -1), (-1, 1), (1, -1), (1, 1)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Backed(TreadLaw):
+class OuterRubber(TreadLaw):
     """A tread `law` on a compliant `wall`, for forces normal to the road."""
 
     law: TreadLaw

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tireroad.fem.decks.compounds import SYSTEMS
 from tireroad.runs.scene.plan import meets_road
-from tireroad.runs.scene.rules import made
+from tireroad.runs.scene.road_cache import road_of
 from tireroad.runs.scene.sections.file import FileSection, own_section
 from tireroad.runs.scene.tables.scene import Scene
 
@@ -40,7 +40,7 @@ def _of_road(scene: Scene) -> list[Row]:
     if scene.road is None or not scene.road.surface.files:
         return []
     name = " > ".join(file.name for file in scene.road.surface.files)
-    road = made(scene.road.surface)
+    road = road_of(scene.road.surface)
     rows = [
         (name, reading.quantity, reading.place, reading.unit, reading.remark)
         for reading in getattr(road, "readings", ())

@@ -8,11 +8,12 @@ from typing import Any, NamedTuple
 
 from tireroad.contact.roads.grid import Grid
 from tireroad.contact.roads.kinds.shapes import Edges
-from tireroad.contact.roads.road import RoadKind, placed
+from tireroad.contact.roads.road import placed
 from tireroad.contact.roads.under_tire import Road, begun_at, is_level, moved_start, shown
 from tireroad.fem.errors import InputError
 from tireroad.greens.residuals import names, residual_of
 from tireroad.runs.scene.outputs import Output, check_steps
+from tireroad.runs.scene.road_cache import road_of
 from tireroad.runs.scene.schema import Source, Where
 from tireroad.runs.scene.tables.contact import ContactTable, PatternTable, TimeTable, check_tread
 from tireroad.runs.scene.tables.scene import (
@@ -43,7 +44,6 @@ BESIDE, LOOKED = 0.5, 20.0
 
 # Least ratio of an inside drum's radius to the tire's outer radius that leaves room to press it.
 _ROOM = 1.15
-_MADE: dict[tuple, Road] = {}  # only the last road
 MOST_SPEEDS = 10_000
 
 
@@ -72,7 +72,7 @@ def check_road(scene: Scene) -> None:
     """
     if scene.road is None:
         return
-    road = made(scene.road.surface)
+    road = road_of(scene.road.surface)
     if scene.contact is not None and scene.time is not None:
         _check_extent(scene, road)
 
@@ -81,7 +81,7 @@ def remarks(scene: Scene) -> list[str]:
     """Remarks of `check` on a road that can be driven on."""
     if scene.road is None or scene.contact is None:
         return []
-    road = made(scene.road.surface)
+    road = road_of(scene.road.surface)
     start = begun_at(road, scene.road.start)
     notes = [f"road: {moved_start(start)}"] if start != (scene.road.start or 0.0) else []
     if scene.motion.kind != "linear" and not any(confined(scene)):
@@ -144,25 +144,6 @@ def without_relief(road: RoadTable, first: float, last: float) -> str:
         f'the road (kind = "{road.kind}") has no relief under the run, which passes over x = {shown(first)} to '
         f"{shown(last)} m: nothing on it moves the tire; change {key} or time.duration"
     )
-
-
-def made(surface: RoadKind) -> Road:
-    """The road of a scene; the last one is kept, since reading a file may take seconds."""
-    road = _MADE.get(_which(surface))
-    return road or keep(surface, surface.make())
-
-
-def keep(surface: RoadKind, road: Road) -> Road:
-    """Keep a road, in place of the last one; returns it."""
-    _MADE.clear()
-    _MADE[_which(surface)] = road
-    return road
-
-
-def _which(surface: RoadKind) -> tuple:
-    """The road and the state of its files, which may have been rewritten."""
-    states = [file.stat() for file in surface.files if file.is_file()]
-    return surface, *((state.st_ino, state.st_size, state.st_mtime_ns) for state in states)
 
 
 def _check_extent(scene: Scene, road: Road) -> None:

@@ -16,7 +16,8 @@ from tireroad.contact.roads.under_tire import begun_at
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections.mesh2d import SectionMesh
 from tireroad.fem.wheel import SHAPE_TOLERANCE
-from tireroad.runs.scene.rules import least_travel, made
+from tireroad.runs.scene.road_cache import road_of
+from tireroad.runs.scene.rules import least_travel
 from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.scene.tables.scene import Scene
 
@@ -224,7 +225,7 @@ def road_height(scene: Scene) -> float:
     lift = abs(motion.amplitude) if motion.kind != "none" else 0.0
     surface, side = scene.road.surface, 0.1 + abs(scene.road.lateral)
     try:
-        road = made(surface)
+        road = road_of(surface)
         start = begun_at(road, scene.road.start)
         # Bounds of a long texture take time; those of a single obstacle do not.
         travel = least_travel(scene)
@@ -242,7 +243,7 @@ def road_height(scene: Scene) -> float:
 def road_memory(scene: Scene) -> dict[str, float]:
     """Bytes taken while the road is made, if significant."""
     try:
-        taken = getattr(made(scene.road.surface), "making", 0.0)
+        taken = getattr(road_of(scene.road.surface), "making", 0.0)
     except InputError:
         return {}
     return {"making the road": taken} if taken else {}
@@ -307,7 +308,7 @@ def _steps(scene: Scene, modes: int) -> int:
     step = min(time.duration / LEAST_STEPS, TURN / fastest_state(scene, modes))
     travel = least_travel(scene)
     if scene.in_contact and travel > 0:
-        spacing, points = made(scene.road.surface).spacing, scene.contact.points
+        spacing, points = road_of(scene.road.surface).spacing, scene.contact.points
         spacing = max(spacing, points.dx) if isinstance(points, Pitch) else spacing
         step = min(step, spacing / 8 / (travel / time.duration))
     return math.ceil(time.duration / min(step, _shortest_period(scene) / 16))

@@ -31,7 +31,7 @@ from tireroad.contact.results.spectra import Limit, limits, lowest, pitch, wide_
 from tireroad.contact.rolling import bristles
 from tireroad.contact.setup import ContactSetup, on_shape
 from tireroad.contact.tread.between_nodes import (
-    Backed,
+    OuterRubber,
     before_equilibrium,
     on_nodes,
     over_rectangles,
@@ -43,7 +43,7 @@ from tireroad.fem.sections.mesh2d import Ring
 from tireroad.fem.static.load_error import carried_over
 from tireroad.fem.static.state import StaticState
 from tireroad.greens.fewer_modes import of_fewer_modes
-from tireroad.greens.recursion import sharers
+from tireroad.greens.recursion import loop_communicator
 from tireroad.greens.response import Response
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.disk import Refused
@@ -132,7 +132,7 @@ def backed(job: Job, static: StaticState, setup: ContactSetup, response: Respons
     residual = response.residual.copy()
     residual[:count, :count] -= known
     patch = before_equilibrium(patch, known, static.normal_force[patch.index])
-    spec = TreadContact(law=Backed(law=contact.law, wall=wall), solver=contact.solver)
+    spec = TreadContact(law=OuterRubber(law=contact.law, wall=wall), solver=contact.solver)
     return Backing(spec, replace(setup, patch=patch), replace(response, residual=residual))
 
 
@@ -759,7 +759,9 @@ class AccuracyStage(Computed[Accuracy]):
         coarse = _attempted(record, "coarser mesh", lambda: reference.on_coarser_mesh)
         if isinstance(coarse, ConvergenceError | InputError):
             told_by["mesh"] = coarse
-        alone = sharers(reference.response.resolved(reference.step), comm).size < comm.size
+        alone = (
+            loop_communicator(reference.response.resolved(reference.step), comm).size < comm.size
+        )
         left = [cause for cause in _LONGEST_FIRST if cause not in told_by]
         if not alone:
             for cause in left:

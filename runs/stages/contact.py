@@ -36,7 +36,7 @@ from tireroad.fem.static.footprint import Footprint
 from tireroad.fem.static.state import StaticState
 from tireroad.greens.coupling import Wheel
 from tireroad.greens.large_motion import LargeTire
-from tireroad.greens.recursion import Recursion, sharers
+from tireroad.greens.recursion import Recursion, loop_communicator
 from tireroad.greens.response import Response
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes
@@ -526,7 +526,11 @@ class ContactStage(Stage[ContactHistory]):
         with console.quiet():
             shortest = shortest_excitation(self.job.scene, self.setup.product)
             plan = planned(self.job, Record(), self.greens.product.contact, shortest)
-        return plan if sharers(plan.response, self.job.comm).size < self.job.comm.size else None
+        return (
+            plan
+            if loop_communicator(plan.response, self.job.comm).size < self.job.comm.size
+            else None
+        )
 
     def _foreseen(self, plan: Planned) -> ContactHistory:
         """Steps and scheme of the loop, before it has any forces. Not collective."""

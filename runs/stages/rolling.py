@@ -17,7 +17,7 @@ from tireroad.contact.patch import Patch
 from tireroad.contact.results.chatter import LARGE, Chosen, choose, oscillation
 from tireroad.contact.rolling import bristles, make_loop, rolling_steadily
 from tireroad.contact.setup import ContactSetup
-from tireroad.greens.recursion import Convolution, Recursion, sharers
+from tireroad.greens.recursion import Convolution, Recursion, loop_communicator
 from tireroad.greens.response import Response
 from tireroad.runs.process import console
 from tireroad.runs.scene.physics import run_in_time
@@ -132,7 +132,7 @@ def integration(job: Job, plan: Planned, scheme: str) -> Integration:
     if scheme == "convolution":
         tire = Convolution(response=plan.response, step=plan.step, steps=plan.steps)
     else:
-        comm = sharers(plan.response, job.comm)
+        comm = loop_communicator(plan.response, job.comm)
         tire = Recursion(
             response=plan.response, step=plan.step, scheme=scheme, comm=comm, look_ahead=True
         )
@@ -203,7 +203,7 @@ def forces(
     if the road touches outside the patch. Collective on `comm`.
     """
     setup = rolling_steadily(contact or job.scene.contact, setup, response, step)
-    comm = sharers(response.resolved(step), comm)
+    comm = loop_communicator(response.resolved(step), comm)
     rolled = blocks(job, setup, response, step, steps, scheme, comm, contact)
     both = [(block.total_force, block.axle_force) for block in rolled]
     total, axle = map(np.concatenate, zip(*both, strict=True))

@@ -31,7 +31,7 @@ from tireroad.modal.corner import HUB_MOMENTS, READINGS, widened
 from tireroad.runs.files import store
 from tireroad.runs.files.store import put
 from tireroad.runs.scene.physics import wheel_slip
-from tireroad.runs.scene.rules import made
+from tireroad.runs.scene.road_cache import road_of
 from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.scene.tables.contact import PatternTable
 from tireroad.runs.scene.tables.scene import rolls_freely
@@ -183,7 +183,7 @@ def scene_setup(job: Job, state: StaticState, surface: TreadSurface | None = Non
     setup = contact_setup(
         state,
         job.tire.lattice,
-        placed(made(scene.road.surface), scene.road.surface, scene.road),
+        placed(road_of(scene.road.surface), scene.road.surface, scene.road),
         Rolled(
             speed=rolling_speed(job, state),
             duration=run_time(scene.time),

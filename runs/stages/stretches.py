@@ -27,11 +27,11 @@ from tireroad.contact.setup import ContactSetup
 from tireroad.fem.collective import broadcast
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.static.state import StaticState
-from tireroad.greens.recursion import sharers
+from tireroad.greens.recursion import loop_communicator
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import attribute, dataset
 from tireroad.runs.process import console
-from tireroad.runs.scene.rules import made
+from tireroad.runs.scene.road_cache import road_of
 from tireroad.runs.scene.tables.scene import RoadTable
 from tireroad.runs.stages import corner
 from tireroad.runs.stages.accuracy import equilibrated, model_limit
@@ -140,7 +140,7 @@ class StretchesStage(Computed[Stretches]):
         """Forces (r, n, ...) by the names of `Stretches`, of `count` steps less the first `grown`. Collective."""
         response, comm = self.greens.product.contact, self.job.comm
         resolved = response.resolved(self.contact.product.step)
-        together = sharers(resolved, comm)
+        together = loop_communicator(resolved, comm)
         alone = together.size < comm.size
         mine = range(comm.rank if alone else 0, len(roads), comm.size if alone else 1)
         rolled, error = dict[int, Forces](), None
@@ -206,7 +206,7 @@ def stretches(
     for number in range(1, plan.stretches + 1):
         surface, table = road.surface.another(number), road
         if surface is None:
-            own = made(road.surface)
+            own = road_of(road.surface)
             begun = begun_at(own, road.start) + setup.rolled.travel + x1 - x0
             table = replace(road, start=begun + (number - 1) * (rolled.travel + x1 - x0))
         under = placed(surface.make() if surface else own, surface or road.surface, table)
@@ -219,7 +219,7 @@ def _with_room(
     """As many of the planned stretches and windows as the rest of the road holds; all where it is drawn or endless."""
     if not plan.stretches or road.surface.another(1) is not None:
         return plan
-    own, (x0, x1, _, _) = made(road.surface), setup.patch.extent
+    own, (x0, x1, _, _) = road_of(road.surface), setup.patch.extent
     _, end = getattr(own, "measured", own.extent[0])
     left = end - begun_at(own, road.start) - setup.rolled.travel - x1
     if road.drum_radius is not None or setup.rolled.speed <= 0:

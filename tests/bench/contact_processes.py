@@ -17,7 +17,7 @@ from tireroad.contact.loop import Drive, roll
 from tireroad.contact.solver.active_set import make_solver
 from tireroad.contact.tread.compliance import half_space_compliance
 from tireroad.fem.errors import ConvergenceError
-from tireroad.greens.recursion import SHARED_FROM, Recursion, sharers
+from tireroad.greens.recursion import SHARED_FROM, Recursion, loop_communicator
 from tireroad.runs.validation.cases import RollingStrip, oval_patch
 from tireroad.runs.validation.tables import Table
 
@@ -74,7 +74,7 @@ def measured(states: int, side: int, comm: MPI.Comm) -> dict:
     """Seconds per step (median over blocks), mean load N, sizes. Collective."""
     patch = oval_patch((side, side), (0.16 / side, 0.12 / side), 500.0)
     response = RollingStrip(speed=SPEED).response(patch.points, max(states // 20, 1), 10)
-    sharing = sharers(response, comm)
+    sharing = loop_communicator(response, comm)
     tire = Recursion(response=response, step=STEP, scheme="linear", comm=sharing, look_ahead=True)
     tread = half_space_compliance(patch.points[:, :2], patch.half_sizes, 5e6, 0.45)
     drive = Drive(_wavy, lambda t: 0.0, SPEED)

@@ -11,7 +11,7 @@ from test_recursion import STEPS, march, some_force
 
 from tireroad.contact.loop import RootSolve, Solved
 from tireroad.greens import recursion
-from tireroad.greens.recursion import Recursion, sharers
+from tireroad.greens.recursion import Recursion, loop_communicator
 
 
 @pytest.mark.mpi
@@ -81,10 +81,10 @@ def test_looking_ahead_changes_nothing(scheme) -> None:
 def test_a_small_loop_is_not_shared_out(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each process takes all of it, and a large one its part: the same motion, the same states at a checkpoint."""
     response, force = make(speed=60.0).response(), some_force(4)
-    assert sharers(response, MPI.COMM_WORLD).size == 1
+    assert loop_communicator(response, MPI.COMM_WORLD).size == 1
     monkeypatch.setattr(recursion, "SHARED_FROM", 0.0)
     found = []
-    for comm in (MPI.COMM_SELF, sharers(response, MPI.COMM_WORLD)):
+    for comm in (MPI.COMM_SELF, loop_communicator(response, MPI.COMM_WORLD)):
         tire = Recursion(response=response, step=1e-3, scheme="linear", comm=comm)
         tire.keep_samples()
         moved, states = march(tire, force), [state for state, *_ in tire.samples()]
@@ -102,6 +102,6 @@ def test_processes_that_round_otherwise_do_not_share_a_loop(
     """Nodes of two kinds: each process would go on by its own rounding, and wait for messages that never come."""
     response = make(speed=60.0).response()
     monkeypatch.setattr(recursion, "SHARED_FROM", 0.0)
-    assert sharers(response, MPI.COMM_WORLD).size == MPI.COMM_WORLD.size
+    assert loop_communicator(response, MPI.COMM_WORLD).size == MPI.COMM_WORLD.size
     monkeypatch.setattr(recursion, "_kernels", lambda: f"kernels of {MPI.COMM_WORLD.rank}")
-    assert sharers(response, MPI.COMM_WORLD).size == 1
+    assert loop_communicator(response, MPI.COMM_WORLD).size == 1

@@ -15,7 +15,7 @@ from tireroad.contact.roads.kinds.measured import GridFile
 from tireroad.contact.roads.road import RoadKind
 from tireroad.fem.errors import InputError
 from tireroad.runs.pipeline import share
-from tireroad.runs.scene.rules import made
+from tireroad.runs.scene.road_cache import road_of
 
 COMM = MPI.COMM_WORLD
 X, Y = 5e-4 * np.arange(400), 5e-4 * np.arange(200)
@@ -87,7 +87,7 @@ def test_one_process_reads_and_all_have_the_same_bits(monkeypatch, folder, kind:
     monkeypatch.setattr(grid, "PIECE", 5000)  # more than that goes to a temporary file
     read = counted(monkeypatch, surface)
     share(surface, COMM)
-    road = made(surface)
+    road = road_of(surface)
     assert np.array_equal(road.prepare(*strip).height(x, y), alone)
     assert COMM.allreduce(len(read)) == 1
 
@@ -95,21 +95,21 @@ def test_one_process_reads_and_all_have_the_same_bits(monkeypatch, folder, kind:
 def test_the_process_that_reads_keeps_its_own(folder: Path) -> None:
     """A copy in its place would close the temporary file that the others are about to open by its number."""
     surface = written(folder, "csv")
-    own = made(surface) if COMM.rank == 0 else None
+    own = road_of(surface) if COMM.rank == 0 else None
     share(surface, COMM)
-    assert own is None or made(surface) is own
+    assert own is None or road_of(surface) is own
 
 
 def test_a_file_written_anew_is_read_anew(folder: Path) -> None:
     surface = written(folder, "npz")
     share(surface, COMM)
-    before = made(surface).prepare(*STRIP).highest(*STRIP)
+    before = road_of(surface).prepare(*STRIP).highest(*STRIP)
     COMM.Barrier()
     if COMM.rank == 0:
         np.savez(folder / "npz.npz", x=X, y=Y, z=2 * Z)
     COMM.Barrier()
     share(surface, COMM)
-    assert made(surface).prepare(*STRIP).highest(*STRIP) == 2 * before
+    assert road_of(surface).prepare(*STRIP).highest(*STRIP) == 2 * before
 
 
 def test_all_processes_are_told_of_a_damaged_file(folder: Path) -> None:
@@ -119,7 +119,7 @@ def test_all_processes_are_told_of_a_damaged_file(folder: Path) -> None:
     COMM.Barrier()
     with pytest.raises(InputError, match="is it complete"):
         share(surface, COMM)
-        made(surface)
+        road_of(surface)
 
 
 def test_a_process_that_cannot_open_the_others_file_reads_by_itself(monkeypatch, folder) -> None:
@@ -130,4 +130,4 @@ def test_a_process_that_cannot_open_the_others_file_reads_by_itself(monkeypatch,
         grid.FileRows, "__reduce__", lambda self: (grid.FileRows, (Path("/nowhere"), self._packed))
     )
     share(surface, COMM)
-    assert np.isfinite(made(surface).prepare(*STRIP).highest(*STRIP))
+    assert np.isfinite(road_of(surface).prepare(*STRIP).highest(*STRIP))

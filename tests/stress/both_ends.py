@@ -25,7 +25,7 @@ from scene_makers import BASES, SIZES, needed, write_files
 from tireroad.fem.errors import InputError
 from tireroad.runs.check import explain
 from tireroad.runs.scene.load import load
-from tireroad.runs.scene.rules import made
+from tireroad.runs.scene.road_cache import _LAST
 from tireroad.runs.scene.schema import walk
 from tireroad.runs.scene.tables.scene import Scene
 
@@ -50,7 +50,7 @@ def ends(name: str, key) -> Iterator[str]:
 def accepted(folder: Path, changed: list[str]) -> str | None:
     """The first scene that goes with the values, written to the folder; None where none does."""
     path = folder / "run.toml"
-    made.cache_clear()  # a road kept here would count as the run's memory
+    _LAST.clear()  # a road kept here would count as the run's memory
     for name, (text, _) in BASES.items():
         path.write_text(text)
         with suppress(InputError):

@@ -6,7 +6,7 @@ from scipy import sparse
 
 from tireroad.contact.patch import Patch
 from tireroad.contact.tread.between_nodes import (
-    Backed,
+    OuterRubber,
     before_equilibrium,
     on_nodes,
     over_rectangles,
@@ -66,7 +66,7 @@ def test_a_mesh_that_is_a_half_space_is_one_again(between):
 def test_a_tread_on_a_wall_is_softer_by_that():
     made, _ = patch(2)
     law = HalfSpace(youngs_modulus=1e7, poisson_ratio=0.49)
-    both = matrix(made, Backed(law=law, wall=wall).influence(1.0))
+    both = matrix(made, OuterRubber(law=law, wall=wall).influence(1.0))
     assert both == pytest.approx(matrix(made, law.influence(1.0)) + matrix(made, wall))
 
 
