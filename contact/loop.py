@@ -24,7 +24,8 @@ from tireroad.contact.solver.projected_cg import ProjectedCG
 from tireroad.contact.solver.stick_slip import BrushFriction, CompressedRows
 from tireroad.contact.tread.memory import TreadMemory
 from tireroad.fem.errors import ConvergenceError, InputError
-from tireroad.greens.recursion import LoadedColumns, ahead_of_mean
+from tireroad.greens.recursion import LoadedColumns
+from tireroad.greens.schemes import SCHEMES
 
 _ROUNDING = 1e-9  # of the number of steps: a duration that is a multiple of the step stays one
 
@@ -775,7 +776,7 @@ class DrivenTire:
     `history` (n + 1, k) N at the steps from t = 0 on; `directions` (k, 3) of unit length. After
     each `advance`: `reading` (r,) m; `work` (J) of the prescribed forces so far (trapezoidal rule);
     `lead`, the additional work of the mean forces that the `scheme` applies during the steps
-    (greens.recursion.ahead_of_mean).
+    (greens.schemes.Scheme.ahead_of_mean).
     """
 
     def __init__(
@@ -795,7 +796,7 @@ class DrivenTire:
         self.ahead = looking_ahead(tire)
         self._beside = LoadedColumns(self._same[self._seen :])
         # The force that `history` begins with was there before.
-        self._ahead = ahead_of_mean(scheme, np.concatenate([history[:1], history]))
+        self._ahead = SCHEMES[scheme].ahead_of_mean(np.concatenate([history[:1], history]))
         self._step = 0
         self._along = np.zeros(history.shape[1])
         self.work = self.lead = 0.0

@@ -26,8 +26,9 @@ from tireroad.fem.nonlinear.force import RestoringForce
 from tireroad.fem.nonlinear.reduced import ReducedForce, at_nodes, extra_loads
 from tireroad.greens.basis import Basis, Probes
 from tireroad.greens.coupling import Wheel
-from tireroad.greens.recursion import LoadedColumns, Recursion, ahead_of_mean
+from tireroad.greens.recursion import LoadedColumns, Recursion
 from tireroad.greens.response import Response
+from tireroad.greens.schemes import SCHEMES
 from tireroad.modal.corner import READINGS
 from tireroad.modal.solver.slicing import Modes
 
@@ -226,7 +227,9 @@ class LargeTire:
     def advance(self, force: Array) -> None:
         """Set the contact forces (c,) N at the end of the step."""
         way = self._now - self._read
-        ahead = ahead_of_mean(self._scheme, np.stack([self._older, self._before, self.s]))[0]
+        ahead = SCHEMES[self._scheme].ahead_of_mean(np.stack([self._older, self._before, self.s]))[
+            0
+        ]
         self.stored += 0.5 * float((self.s + self._before) @ way)
         self.lead -= float(ahead @ way)
         self._read = self._now

@@ -9,17 +9,7 @@ phi1(x) = (e^x - 1)/x, phi2(x) = (e^x - 1 - x)/x^2. With the force constant at i
 and b1 = h phi1. Cost: one pass over output and input,
 4 q (r + k) flops and 16 q (r + k) bytes.
 
-The schemes differ in the force within a step, from the forces f_n at its end, f_{n-1} and f_{n-2}:
-
-    linear     from f_{n-1} to f_n: second order; a contact that the step does not resolve chatters
-    damped     (9 f_n + 6 f_{n-1} + f_{n-2}) / 16 throughout: second order; damps such a contact
-    constant   f_n throughout: first order, as forces half a step early; never gains energy from
-               contact
-
-Of the means a f_n + b f_{n-1} + c f_{n-2} that are of second order, a = 1/2 + c, b = 1/2 - 2 c, the
-error is (1/8 + c) h^2 f'' and the work that springs lose on an oscillation of angle t a step is as
-2 c (1 - cos t)^2 >= 0, whatever the tire. With c = 1/16 a mass bouncing on a spring of stiffness k
-loses at least 2.5 % of its amplitude a step from k h^2 / m = 2 to 10^3.
+Other forces within a step are declared in greens.schemes.
 """
 
 from __future__ import annotations
@@ -39,16 +29,9 @@ from tireroad.fem.collective import allgather_rows, same_on_all
 from tireroad.fem.compiled import library
 from tireroad.fem.errors import InputError
 from tireroad.greens.response import Response
+from tireroad.greens.schemes import SCHEMES
 
 _C = library(Path(__file__).with_suffix(".c"))
-
-DAMPED = 1 / 16
-# Parts of f_{n-1} and f_{n-2} in the earlier force l of a step, z_n = e^{sh} z_{n-1} + b0 P l + b1 P f_n.
-EARLIER = {
-    "linear": (1.0, 0.0),
-    "damped": (0.5 - 2 * DAMPED, DAMPED),
-    "constant": (1.0, 0.0),
-}
 
 NO_BLOCK = {name: np.zeros(0) for name in ("block_state", "block_force", "block_before")}
 # Bytes of both matrices; smaller ones fit the caches, and processes would only wait.
@@ -69,7 +52,7 @@ class Block:
         block, push = response.block, response.block_input
         self._output = np.vstack([response.block_output, response.inertia[1]])
         self._decay, self._old, self._new = block_steps(block, push, step, scheme)
-        self._parts, self._held = EARLIER[scheme], response.held_block()
+        self._parts, self._held = SCHEMES[scheme].earlier, response.held_block()
         size, forces = push.shape
         self.state = np.zeros(size)
         self._force = self._before = np.zeros(forces)
@@ -132,22 +115,13 @@ def block_steps(
     wide[size : size + forces, size + forces :] = np.eye(forces)
     moved = linalg.expm(wide)[:size]
     first, second = moved[:, size : size + forces], moved[:, size + forces :]
-    return moved[:, :size], *_shares(first, second, scheme)
+    return moved[:, :size], *SCHEMES[scheme].shares(first, second)
 
 
 def weights(x: np.ndarray, step: float, scheme: str) -> tuple[np.ndarray, np.ndarray]:
     """b0 and b1 for x = s h."""
     phi1, phi2 = _phi(x)
-    return _shares(step * phi1, step * phi2, scheme)
-
-
-def _shares(first: np.ndarray, second: np.ndarray, scheme: str) -> tuple[np.ndarray, np.ndarray]:
-    """b0 and b1 from h phi1 and h phi2."""
-    if scheme == "linear":
-        return first - second, second
-    if scheme == "damped":
-        return first, (0.5 + DAMPED) * first
-    return 0 * first, first
+    return SCHEMES[scheme].shares(step * phi1, step * phi2)
 
 
 def mixed(parts: tuple[float, float], last: np.ndarray, before: np.ndarray) -> np.ndarray:
@@ -172,16 +146,6 @@ def _series(x: np.ndarray, order: int) -> np.ndarray:
     return out
 
 
-def ahead_of_mean(scheme: str, forces: np.ndarray) -> np.ndarray:
-    """The mean force that acts during each step, less (f_n + f_{n-1}) / 2: (n, k) N.
-
-    `forces` (n + 2, k) N: at the ends of n steps, with the two before them.
-    """
-    if scheme == "constant":
-        return 0.5 * np.diff(forces[1:], axis=0)
-    return (DAMPED if scheme == "damped" else 0.0) * np.diff(forces, 2, axis=0)
-
-
 def late_answers(response: Response, step: float, scheme: str) -> sparse.csr_matrix | None:
     """The answer (r + 3, k) of outputs and rate of momentum that a step's first force still gives.
 
@@ -189,7 +153,7 @@ def late_answers(response: Response, step: float, scheme: str) -> sparse.csr_mat
     as of a linear force, and a slope (Response.slope) to the difference of both.
     """
     late = np.zeros((len(response.residual) + 3, response.residual.shape[1]))
-    if response.pulse and scheme != "constant":
+    if response.pulse and not SCHEMES[scheme].late:
         late[: response.pulse] = response.residual[: response.pulse] / 2
     if response.slope is not None:
         late -= response.slope / step
@@ -363,7 +327,7 @@ class Recursion:
             old.astype(complex),
             new.astype(complex),
         )
-        self._parts = EARLIER[scheme]
+        self._parts = SCHEMES[scheme].earlier
         # Real arithmetic on adjacent (re, im), as the states lie in memory.
         output = np.vstack([response.output[:, mine], response.inertia[0][:, mine]])
         into = np.ascontiguousarray(response.input[mine])
@@ -633,7 +597,7 @@ def marched(
     """
     decay = np.exp(response.eigenvalue * step)
     old, new = weights(response.eigenvalue * step, step, scheme)
-    parts, late = EARLIER[scheme], late_answers(response, step, scheme)
+    parts, late = SCHEMES[scheme].earlier, late_answers(response, step, scheme)
     into = np.ascontiguousarray(response.input.T).view(float)
     output = np.ascontiguousarray(response.output.conj()).view(float).T
     block = Block(response, step, scheme) if len(response.block) else None

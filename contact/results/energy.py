@@ -9,8 +9,8 @@ from scipy import linalg
 
 from tireroad.contact.patch import LEAST_REACH, Patch
 from tireroad.contact.results.chatter import Alternation, Chatter
-from tireroad.greens.recursion import ahead_of_mean
 from tireroad.greens.response import Response
+from tireroad.greens.schemes import SCHEMES
 from tireroad.modal.damping import modal_damping
 from tireroad.modal.rolling import RollingModes, pencil
 
@@ -26,7 +26,7 @@ class Work:
 
     Trapezoidal rule: sum (f + f_before).(u - u_before)/2, second order in the step. `lead`: the
     additional work of the mean forces that a `scheme` applies during the steps
-    (greens.recursion.ahead_of_mean); `begun`: energy (J) that was in the tire before. A checkpoint keeps them, with the
+    (greens.schemes.Scheme.ahead_of_mean); `begun`: energy (J) that was in the tire before. A checkpoint keeps them, with the
     last forces and displacement.
     """
 
@@ -49,7 +49,7 @@ class Work:
     def _add(self, change: np.ndarray, moved: np.ndarray) -> None:
         before = np.broadcast_to(self._forces, (2, change.shape[1]))
         path = np.concatenate([before, change])
-        force, ahead = path[1:], ahead_of_mean(self._scheme, path)
+        force, ahead = path[1:], SCHEMES[self._scheme].ahead_of_mean(path)
         place = np.concatenate([np.broadcast_to(self._moved, (1, moved.shape[1])), moved])
         mean, way = 0.5 * (force[1:] + force[:-1]), np.diff(place, axis=0)
         # Step by step, so that the sum does not depend on how steps are blocked.
@@ -135,7 +135,7 @@ class Circulation:
     The symmetric part of a residual flexibility stores the work done on it. The skew part, which a
     rolling tire has, does not: its work is what the truncated modes dissipate, less what the drive
     supplies to them. `lead`: work on the symmetric part that is not stored, as the mean forces of
-    a `scheme` during the steps are ahead (greens.recursion.ahead_of_mean).
+    a `scheme` during the steps are ahead (greens.schemes.Scheme.ahead_of_mean).
     """
 
     def __init__(self, flexibility: np.ndarray, scheme: str = "linear") -> None:
@@ -149,7 +149,7 @@ class Circulation:
     def add(self, forces: np.ndarray) -> None:
         """Count n steps: forces (n, k) N at their ends."""
         whole = np.concatenate([self._forces, forces])
-        path, ahead = whole[1:], ahead_of_mean(self._scheme, whole)
+        path, ahead = whole[1:], SCHEMES[self._scheme].ahead_of_mean(whole)
         # Of many nodes few carry points that touch: products of these alone.
         loaded = np.flatnonzero(whole.any(axis=0))
         some = np.ix_(loaded, loaded)
@@ -205,7 +205,7 @@ class Relaxed:
         """Count n steps: states and pushes (n, p) at their ends."""
         forces = np.concatenate([self._forces, pushes / self._rate])
         path = np.concatenate([self._state[None], states])
-        acting = (forces[2:] + forces[1:-1]) / 2 + ahead_of_mean(self._scheme, forces)
+        acting = (forces[2:] + forces[1:-1]) / 2 + SCHEMES[self._scheme].ahead_of_mean(forces)
         lag = acting - (path[1:] + path[:-1]) / 2
         # Step by step, so that the sum does not depend on how steps are blocked.
         for lost in (self._step * (lag**2 @ self._rate)).tolist():

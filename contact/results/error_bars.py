@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 
 from tireroad.contact.results.spectra import FEWEST, deviation, low_part, third_octaves
+from tireroad.greens.schemes import SCHEMES
 
 _NAMES = ("mean", "deviation", "level", "history")
 # Of an error of any phase, what counts in a level and in a deviation: 0.7 in the mean square where a band has one phase, less with
@@ -44,8 +45,7 @@ def orders(elements: int, scheme: str = "linear") -> dict[str, float]:
     p + 1 in the mean (Nitsche), observed between 3.7 and 4.7 for order 3 (histories of 18 x 8
     elements beside 9 x 4 and 30 x 12; bench error_bars).
     """
-    step = 1.0 if scheme == "constant" else 2.0
-    return {"step": step, "points": 1.5, "modes": 3.0, "mesh": elements + 1.0}
+    return {"step": SCHEMES[scheme].order, "points": 1.5, "modes": 3.0, "mesh": elements + 1.0}
 
 
 def share(ratio: float, order: float) -> float:

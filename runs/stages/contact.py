@@ -38,6 +38,7 @@ from tireroad.greens.coupling import Wheel
 from tireroad.greens.large_motion import LargeTire
 from tireroad.greens.recursion import Recursion, loop_communicator
 from tireroad.greens.response import Response
+from tireroad.greens.schemes import SCHEMES, keeps_history
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.process import console
@@ -157,7 +158,7 @@ def rubbing(record: Record, friction: float, scene: Scene, lagging: int) -> None
 
 def alternation(record: Record, worst: float, scheme: Chosen) -> None:
     """Warn if points open and close from step to step; with damped forces that is the road."""
-    if worst > LIMIT and scheme.scheme != "damped":
+    if worst > LIMIT and SCHEMES[scheme.scheme].chatters:
         record.warnings.append(warning(worst))
 
 
@@ -614,7 +615,7 @@ class ContactStage(Stage[ContactHistory]):
         if large:
             plan = replace(plan, response=response.resolved(plan.step))
         chosen = integration(self.job, plan, scheme.scheme)
-        if chosen.scheme == "convolution":
+        if keeps_history(chosen.scheme):
             setup = replace(setup, steady=None)  # its history begins at t = 0
         with record.timing("tread and solver"):
             moved = self._moved(large, chosen)
@@ -660,7 +661,7 @@ class ContactStage(Stage[ContactHistory]):
             excursion(record, totals.figures.excursion, deflection, held=held)
         stages_setup.describe(record, setup)
         contact_file.describe(record, setup, self.job.scene.road)
-        if chosen.scheme != "convolution":
+        if not keeps_history(chosen.scheme):
             work = works(totals.work, driven if self.job.scene.force else None, moved)
             given = self._states, response, loop.tire.snapshot(), work
             state = self.static.product

@@ -19,6 +19,7 @@ from tireroad.contact.rolling import bristles, make_loop, rolling_steadily
 from tireroad.contact.setup import ContactSetup
 from tireroad.greens.recursion import Convolution, Recursion, loop_communicator
 from tireroad.greens.response import Response
+from tireroad.greens.schemes import keeps_history
 from tireroad.runs.process import console
 from tireroad.runs.scene.physics import run_in_time
 from tireroad.runs.scene.tables.contact import TimeTable
@@ -129,7 +130,7 @@ def planned(job: Job, record: Record, response: Response, shortest: float) -> Pl
 def integration(job: Job, plan: Planned, scheme: str) -> Integration:
     """The integrator at t = 0 for the planned steps. Collective."""
     tire: Recursion | Convolution
-    if scheme == "convolution":
+    if keeps_history(scheme):
         tire = Convolution(response=plan.response, step=plan.step, steps=plan.steps)
     else:
         comm = loop_communicator(plan.response, job.comm)
@@ -260,7 +261,7 @@ def reported(record: Record, chosen: Chosen) -> Chosen:
 
 def recursive(scheme: str) -> str:
     """The scheme of a recursion that repeats a run: a convolution approximates linear forces."""
-    return "linear" if scheme == "convolution" else scheme
+    return "linear" if keeps_history(scheme) else scheme
 
 
 def of_given_forces(scene: Scene) -> str:

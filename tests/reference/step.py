@@ -5,8 +5,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.greens.recursion import EARLIER, late_answers, weights
+from tireroad.greens.recursion import late_answers, weights
 from tireroad.greens.response import Response
+from tireroad.greens.schemes import SCHEMES
 
 Array = NDArray[np.float64]
 
@@ -101,7 +102,7 @@ class PlainLoop:
         self, response: Response, step: float, scheme: str, weights_: Array, tread: Array, at_rest: Array, gap: Array,
         bristles: Bristles | None = None, friction: float | None = None,
     ) -> None:  # fmt: skip
-        self.response, self.parts = response, EARLIER[scheme]
+        self.response, self.parts = response, SCHEMES[scheme].earlier
         self.decay = np.exp(response.eigenvalue * step)
         self.old, self.new = weights(response.eigenvalue * step, step, scheme)
         late = late_answers(response, step, scheme)

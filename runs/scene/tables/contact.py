@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 from tireroad.contact.tread.law import TREADS, TreadLaw
 from tireroad.fem.parameters import Limits, filename, flag, numbers
+from tireroad.greens.schemes import SCHEMES
 from tireroad.runs.scene.schema import (
     Pitch,
     Variants,
@@ -208,7 +209,7 @@ class TimeTable:
     )
     scheme: str = choice(
         "auto",
-        ("auto", "linear", "damped", "constant", "convolution"),
+        ("auto", *SCHEMES),
         "contact force within a step; auto: linear where the steps resolve the contact, else damped",
     )
     checkpoint: float = number(

@@ -16,6 +16,7 @@ from tireroad.fem.parameters import Key, Limits, OnlyFor, described, finite, par
 from tireroad.fem.tire.material import COLDEST, REFERENCE, warmed
 from tireroad.fem.wheel import DIRECTIONS, SHAPE_TOLERANCE, Axle
 from tireroad.greens.residuals import RESIDUALS, names
+from tireroad.greens.schemes import keeps_history
 from tireroad.runs.scene.outputs import OUTPUTS, Output
 from tireroad.runs.scene.schema import (
     Collects,
@@ -788,8 +789,8 @@ def confined(scene: Scene) -> Iterator[tuple[tuple[str, ...], str]]:
         )
     if rotation is not None and rotation.speed and rotation.method == "full":
         yield ("rotation", "method"), '= "full" has no large motions: take "projected"'
-    if time is not None and time.scheme == "convolution":
-        yield ("time", "scheme"), '= "convolution" has no large motions: take "auto"'
+    if time is not None and keeps_history(time.scheme):
+        yield ("time", "scheme"), f'= "{time.scheme}" has no large motions: take "auto"'
     if (road is not None and road.drum_radius is not None) or scene.static.camber:
         key = ("static", "camber") if scene.static.camber else ("road", "drum_radius")
         yield (
