@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from tireroad.contact.choices import DENSE_POINTS, MOST_TOUCHING
 from tireroad.contact.patch import Patch
-from tireroad.contact.solver.active_set import make_solver
 from tireroad.contact.solver.conditions import ContactSolver
 from tireroad.contact.solver.projected_cg import Compliance, SpreadCompliance
+from tireroad.contact.solver.solvers import make_solver
 from tireroad.contact.tread.kernel import KernelTread
 from tireroad.contact.tread.law import TreadLaw
 from tireroad.contact.tread.memory import TreadMemory, steady

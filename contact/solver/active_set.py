@@ -12,7 +12,6 @@ from scipy.linalg import inv
 
 from tireroad.contact.solver.conditions import (
     Array,
-    ContactSolver,
     Index,
     Mask,
     check_residual,
@@ -20,9 +19,9 @@ from tireroad.contact.solver.conditions import (
     complementarity_residual,
     penetration,
 )
-from tireroad.contact.solver.projected_cg import Compliance, MatrixCompliance, ProjectedCG
+from tireroad.contact.solver.projected_cg import Compliance, MatrixCompliance
 from tireroad.fem.compiled import library
-from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.fem.errors import ConvergenceError
 
 COMPILED = library(Path(__file__).with_name("contact.c"))
 _C, _FFI = COMPILED.lib, COMPILED.ffi
@@ -414,23 +413,3 @@ class UsualSet:
 def _work(differ: float, count: int) -> float:
     """Operations of a step with `differ` nonzero unknowns of `count`: factor and products."""
     return 2.0 / 3.0 * differ**3 + 4.0 * differ * count + 2.0 * count**2
-
-
-def make_solver(name: str, matrix: Array | Compliance) -> ContactSolver:
-    """The solver "active-set", "projected-cg" or "snes-vi" (`contact.solver`); else InputError.
-
-    For a compliance that is a product, the active set is found from the set that usually touches,
-    with a matrix of these points only.
-    """
-    if name == "snes-vi":
-        from tireroad.contact.solver.snes_vi import SnesVI  # PETSc only if requested
-
-        return SnesVI(matrix)
-    if name not in ("active-set", "projected-cg"):
-        raise InputError(
-            f'contact.solver = "{name}" is unknown: take "active-set", "projected-cg" or "snes-vi"'
-        )
-    if isinstance(matrix, np.ndarray):
-        whole = MatrixCompliance(checked_compliance(matrix))
-        return ActiveSet(whole) if name == "active-set" else ProjectedCG(whole)
-    return UsualSet(matrix) if name == "active-set" else ProjectedCG(matrix)

@@ -30,6 +30,7 @@ from tireroad.contact.results.energy import (
 from tireroad.contact.roads.kinds.shapes import Edges
 from tireroad.contact.rolling import make_loop, rolling_steadily
 from tireroad.contact.setup import ContactSetup
+from tireroad.contact.solver.solvers import SOLVERS
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.nonlinear.force import RestoringForce
 from tireroad.fem.static.footprint import Footprint
@@ -481,10 +482,9 @@ class ContactStage(Stage[ContactHistory]):
 
         assert scene.contact is not None, "the stage runs with [contact] only"
         parts = [f"{scene.contact.solver}, complementarity to {TOLERANCE:g} of the scale"]
-        if scene.contact.solver == "snes-vi":
-            from tireroad.contact.solver.snes_vi import MAX_ITERATIONS
-
-            parts.append(f"PETSc SNES vinewtonrsls, at most {MAX_ITERATIONS} iterations")
+        kind = SOLVERS.get(scene.contact.solver)
+        if kind and kind.about:
+            parts.append(kind.about)
         if scene.contact.has_friction:
             from tireroad.contact.solver.grid_newton import GAP_TOLERANCE
             from tireroad.contact.solver.stick_slip import TOLERANCE as change

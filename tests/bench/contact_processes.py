@@ -14,7 +14,7 @@ from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
 from tireroad.contact.loop import Drive, roll
-from tireroad.contact.solver.active_set import make_solver
+from tireroad.contact.solver.solvers import make_solver
 from tireroad.contact.tread.compliance import half_space_compliance
 from tireroad.fem.errors import ConvergenceError
 from tireroad.greens.recursion import SHARED_FROM, Recursion, loop_communicator

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from tireroad.contact.solver.solvers import SOLVERS
 from tireroad.contact.tread.law import TREADS, TreadLaw
 from tireroad.fem.parameters import Limits, filename, flag, numbers
 from tireroad.greens.schemes import SCHEMES
@@ -137,7 +138,7 @@ class ContactTable(Variants):
     )
     solver: str = choice(
         "auto",
-        ("auto", "active-set", "projected-cg", "snes-vi"),
+        ("auto", *SOLVERS),
         "solver of the complementarity problem of a step",
     )
     reach: float | None = number(

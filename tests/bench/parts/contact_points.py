@@ -11,8 +11,8 @@ import numpy as np
 from scipy import sparse
 
 from tireroad.contact.roads.kinds.texture import TextureRoad
-from tireroad.contact.solver.active_set import make_solver
 from tireroad.contact.solver.projected_cg import ProjectedCG, SpreadCompliance
+from tireroad.contact.solver.solvers import make_solver
 from tireroad.contact.tread.compliance import half_space_influence
 from tireroad.contact.tread.kernel import GridPlaces, KernelTread
 from tireroad.runs.validation.tables import Table

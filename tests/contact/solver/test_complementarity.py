@@ -5,9 +5,10 @@ import itertools
 import numpy as np
 import pytest
 
-from tireroad.contact.solver.active_set import ActiveSet, make_solver
+from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.solver.projected_cg import MatrixCompliance, ProjectedCG
 from tireroad.contact.solver.snes_vi import SnesVI
+from tireroad.contact.solver.solvers import make_solver
 from tireroad.contact.tread.compliance import half_space_compliance
 from tireroad.fem.errors import ConvergenceError, InputError
 

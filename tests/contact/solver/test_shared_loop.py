@@ -5,8 +5,8 @@ import pytest
 from mpi4py import MPI
 
 from tireroad.contact.loop import Drive, DrivenTire, RootSolve, Solved, roll
-from tireroad.contact.solver.active_set import make_solver
 from tireroad.contact.solver.projected_cg import MatrixCompliance
+from tireroad.contact.solver.solvers import make_solver
 from tireroad.contact.solver.stick_slip import BrushFriction
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import half_space_compliance

@@ -10,9 +10,10 @@ from scipy import sparse
 from started import environment
 
 from tireroad.contact.model import DENSE_POINTS
-from tireroad.contact.solver.active_set import ActiveSet, make_solver
+from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.solver.projected_cg import ProjectedCG, SpreadCompliance
 from tireroad.contact.solver.snes_vi import PREFIX, SnesVI
+from tireroad.contact.solver.solvers import make_solver
 from tireroad.contact.tread.compliance import half_space_influence
 from tireroad.contact.tread.kernel import GridPlaces, KernelTread
 

@@ -5,8 +5,9 @@ import pytest
 from scipy import sparse, special
 from scipy.interpolate import CubicSpline
 
-from tireroad.contact.solver.active_set import ActiveSet, make_solver
+from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.solver.projected_cg import MatrixCompliance, ProjectedCG, SpreadCompliance
+from tireroad.contact.solver.solvers import make_solver
 from tireroad.contact.tread.compliance import dense_compliance, half_space_influence
 from tireroad.contact.tread.kernel import GridPlaces, KernelTread
 from tireroad.contact.tread.layer import LayerInfluence, transform_ratio
