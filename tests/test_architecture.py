@@ -10,6 +10,10 @@ from pathlib import Path
 
 import pytest
 
+from tireroad.contact.solver.solvers import SOLVERS
+from tireroad.greens.residuals import RESIDUALS
+from tireroad.greens.schemes import SCHEMES
+
 ROOT = Path(__file__).parents[1]
 ROOMS = ("fem", "modal", "greens", "contact", "runs")  # each may use those before it
 FUNCTION = 30  # lines that 95 % of all functions stay within
@@ -152,6 +156,36 @@ def test_files_of_tests_differ_in_name() -> None:
     """Two of one name in different folders are collected one by one, and not together."""
     count = Counter(file.name for file in (ROOT / "tests").rglob("test_*.py"))
     assert {name for name, number in count.items() if number > 1} == set()
+
+
+MENTIONS = {  # modules that name a choice by its word, its declaration among them; validations apart
+    "attachment": 2,
+    "dirac": 1,
+    "damped": 3,
+    "convolution": 1,
+    "active-set": 3,
+    "projected-cg": 5,
+    "snes-vi": 2,
+}
+
+
+def test_the_mentioned_choices_are_declared() -> None:
+    """Words that mean nothing else, of each kind of choice that is declared in one place."""
+    for declared in (RESIDUALS, SCHEMES, SOLVERS):
+        assert MENTIONS.keys() & declared.keys()
+    assert MENTIONS.keys() <= {*RESIDUALS, *SCHEMES, *SOLVERS}
+
+
+@pytest.mark.parametrize("word", MENTIONS)
+def test_a_choice_is_named_in_few_modules(word: str) -> None:
+    """A residual was named in nine: what others ask of it stands where it is declared."""
+    where = [
+        name
+        for name, tree in TREES.items()
+        if ".validation." not in name
+        and any(isinstance(node, ast.Constant) and node.value == word for node in ast.walk(tree))
+    ]
+    assert len(where) <= MENTIONS[word], "\n".join(where)
 
 
 def test_functions_stay_short() -> None:

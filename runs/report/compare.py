@@ -73,11 +73,11 @@ def _same(first: Any, other: Any) -> bool:
 def scene_rows(scenes: Sequence[Mapping[str, Any]]) -> list[Row]:
     """The scene keys whose values differ between runs; None for an absent key."""
     flat = [{key.path: key for key in scene_keys(scene)} for scene in scenes]
-    keys = sorted({key for key_in in flat for key in key_in} - {"name"})
+    keys = sorted({key for by_path in flat for key in by_path} - {"name"})
     rows = []
     for key in keys:
-        unit = next(key_in[key].unit for key_in in flat if key in key_in)
-        values = tuple(key_in[key].value if key in key_in else None for key_in in flat)
+        unit = next(by_path[key].unit for by_path in flat if key in by_path)
+        values = tuple(by_path[key].value if key in by_path else None for by_path in flat)
         rows.append(Row("scene", key, unit, values))
     return [row for row in rows if row.differs]
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from tireroad.contact.choices import DENSE_POINTS, MOST_TOUCHING, USABLE
 from tireroad.contact.results.chance import asked, planned
 from tireroad.greens.residuals import residual_of
+from tireroad.greens.schemes import keeps_history
 from tireroad.runs.scene.plan import meets_road, skipped
 from tireroad.runs.scene.sizes import (
     Sizes,
@@ -288,7 +289,7 @@ def operations(
         if scene.contact.has_friction:
             has_shear = _SHEARED + _SHEARED_PAIR * size.touching**2
             step += has_shear if scene.contact.has_shear else _BRISTLES
-        if scene.time.scheme == "convolution":
+        if keeps_history(scene.time.scheme):
             step += 1e-9 * 0.5 * size.steps * loads**2
         parts["contact loop"] = size.steps * step
     if "response" not in left_out:
@@ -449,7 +450,7 @@ def _contact_memory(scene: Scene, size: Sizes) -> dict[str, float]:
         + 8.0 * _in_the_loop(scene, size, directions),
         "time series": 8.0 * size.steps * 24,
     }
-    if scene.time.scheme == "convolution":
+    if keeps_history(scene.time.scheme):
         parts["time series"] += 8.0 * size.steps * loads**2
     return parts
 
