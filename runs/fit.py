@@ -1,8 +1,7 @@
 """`tireroad fit`: the built-in tire's free parameters from a real tire's figures, by least squares.
 
-The figures are mass, first modes, stiffness and footprint, from a TOML file or a .tir file. The
-latter is that of MF-Tyre/MF-Swift: sections in brackets, `KEY = value $ comment`, SI units. Of it
-belong here [UNITS], [DIMENSION], [OPERATING_CONDITIONS], [INERTIA], [VERTICAL], [DEFLECTION_LOAD_CURVE], [STRUCTURAL] and
+The figures are mass, first modes, stiffness and footprint, from a TOML file or a .tir file
+(files.tir). Of the latter belong here [UNITS], [DIMENSION], [OPERATING_CONDITIONS], [INERTIA], [VERTICAL], [DEFLECTION_LOAD_CURVE], [STRUCTURAL] and
 [CONTACT_PATCH]. The footprint of a load F is there, with the vertical stiffness C and the unloaded
 radius R,
 
@@ -47,6 +46,7 @@ from tireroad.fem.sections.inflated import InflatedRing
 from tireroad.fem.sections.radial import radial, size
 from tireroad.runs.factors import PARAMETERS, PLAUSIBLE, SCALED, construction
 from tireroad.runs.files.names import scene_name
+from tireroad.runs.files.tir import UNITS, Tir, finite, hint, parsed
 from tireroad.runs.process import console
 from tireroad.runs.scene import files
 
@@ -57,16 +57,6 @@ _FREE = {"mass", *(f"{mode}_{what}" for mode in MODES for what in ("frequency", 
 _LOAD_RANGES = ((0.0, 0.5), (0.0, 1e6))
 _PRINT_RANGES = ((10.0, 1e6), (0.01, 1.0), (0.01, 1.0))
 _EXAMPLE = {"size": '"205/55 R16"', "inflation": "2.4e5   # Pa"}
-_LINE = re.compile(r"^\s*([A-Za-z_]\w*)\s*=\s*('[^']*'|\"[^\"]*\"|[^$!]*)")
-_UNITS: Mapping[str, tuple[str, tuple[str, ...]]] = {
-    "LENGTH": ("meter", ("m", "meter", "metre", "meters", "metres")),
-    "FORCE": ("newton", ("n", "newton", "newtons")),
-    "TIME": ("second", ("s", "sec", "second", "seconds")),
-    "MASS": ("kg", ("kg", "kilogram", "kilograms", "kilo")),
-    "ANGLE": ("radians", ("rad", "radian", "radians")),
-    "PRESSURE": ("pascal", ("pa", "pascal", "pascals")),
-}
-"""What a .tir file calls the SI units."""
 _CURVE = "DEFLECTION_LOAD_CURVE"
 _MOST_LOADS = 3  # points of a curve that are fitted
 _TRUST, _LEAST = 0.5, 0.03  # largest change of a logarithm in an iteration; one at which they end
@@ -278,78 +268,6 @@ def _checked(path: Path, key: str, value: object) -> float:
     return _number(path, key, value, kind.least, kind.most, kind.unit)
 
 
-@dataclass(frozen=True)
-class Tir:
-    """A .tir file: `units` and `values` by key in capitals as written, with their lines, and rows of numbers by section."""
-
-    path: Path
-    units: Mapping[str, tuple[str, int]]
-    values: Mapping[str, tuple[str, int]]
-    tables: Mapping[str, list[tuple[str, int]]]
-
-    def number(self, key: str) -> float | None:
-        """The value of a key; None where it is absent. InputError for one that is no finite number."""
-        if key not in self.values:
-            return None
-        text, line = self.values[key]
-        value = _finite(text)
-        if value is None:
-            told = f"{key} = {text} is not a number{_hint(text)}" if text else f"{key} has no value"
-            raise InputError(f"{self.path}, line {line}: {told}")
-        return value
-
-    def unit(self, key: str) -> str | None:
-        """The unit as written if it is not that of SI."""
-        text = self.units.get(key, ("", 0))[0]
-        return text if text and text.lower() not in _UNITS[key][1] else None
-
-
-def _finite(text: str) -> float | None:
-    """A number as C or Fortran writes it; None if it is none or not finite."""
-    try:
-        value = float(text.replace("D", "e").replace("d", "e"))
-    except ValueError:
-        return None
-    return value if math.isfinite(value) else None
-
-
-def _hint(text: str) -> str:
-    return f": write {text.replace(',', '.')}" if re.fullmatch(r"[-+\d,eE]+", text) else ""
-
-
-def tir_of(text: str, path: Path) -> Tir:
-    """The content of a .tir file; comments begin with $ or !. InputError for a key of two values."""
-    units: dict[str, tuple[str, int]] = {}
-    values: dict[str, tuple[str, int]] = {}
-    tables: dict[str, list[tuple[str, int]]] = {}
-    section = ""
-    for number, line in enumerate(text.replace("\x1a", "").splitlines(), 1):
-        plain = line.strip()
-        if not plain or plain.startswith(("$", "!", "{")):
-            continue
-        if plain.startswith("["):
-            section = plain[1:].partition("]")[0].strip().upper()
-            continue
-        if not (match := _LINE.match(line)):
-            word = re.match(r"\w+", plain)
-            if word and word[0].upper() in _USED:
-                raise InputError(
-                    f"{path}, line {number}: {plain[:40]!r} is not {word[0].upper()} = number"
-                )
-            tables.setdefault(section, []).append((re.split(r"[$!]", plain)[0].strip(), number))
-            continue
-        key, value = match[1].upper(), match[2].strip().strip("'\"").strip()
-        # Without sections MASS is a unit by its text.
-        of_units = section == "UNITS" or (not section and key in _UNITS and not value[:1].isdigit())
-        into = units if of_units else values
-        if key in into and into[key][0] != value and key in _USED:
-            raise InputError(
-                f"{path}, line {number}: {key} = {value}, and {into[key][0]} in line {into[key][1]}: which is right?"
-            )
-        into.setdefault(key, (value, number))
-    return Tir(path, units, values, tables)
-
-
 _USED = {
     *(kind.tir for kind in KINDS.values()),
     *(
@@ -371,7 +289,7 @@ def _check_units(tir: Tir, notes: list[str]) -> None:
     matters = {"MASS": "MASS" in tir.values, "ANGLE": "YAW_STIFFNESS" in tir.values}
     if not tir.units:
         notes.append("no [UNITS] in the file: SI units assumed")
-    for key, (unit, _) in _UNITS.items():
+    for key, (unit, _) in UNITS.items():
         other = tir.unit(key)
         if other is None:
             continue
@@ -387,10 +305,10 @@ def _curve(tir: Tir, nominal: float | None, notes: list[str]) -> list[list[float
     points: list[list[float]] = []
     for text, line in tir.tables.get(_CURVE, []):
         fields = re.split(r"[\s;]+", text)
-        pair = [number for number in map(_finite, fields) if number is not None]
+        pair = [number for number in map(finite, fields) if number is not None]
         if len(fields) != 2 or len(pair) != 2:
             raise InputError(
-                f"{tir.path}, line {line}: [{_CURVE}] has lines of a deflection and a load, not {text[:40]!r}{_hint(text)}"
+                f"{tir.path}, line {line}: [{_CURVE}] has lines of a deflection and a load, not {text[:40]!r}{hint(text)}"
             )
         if points and not (pair[0] > points[-1][0] and pair[1] >= points[-1][1]):
             raise InputError(f"{tir.path}, line {line}: [{_CURVE}] must ascend, not {text[:40]!r}")
@@ -411,14 +329,9 @@ def _curve(tir: Tir, nominal: float | None, notes: list[str]) -> list[list[float
     return chosen
 
 
-def tir_values(text: str) -> dict[str, str]:
-    """Values as written by key in capitals, without units."""
-    return {key: value for key, (value, _) in tir_of(text, Path("tir")).values.items()}
-
-
 def _of_tir(text: str, path: Path, notes: list[str], sized: bool) -> dict[str, Any]:
     """The figures of a .tir file by the keys of a TOML file; `sized`: the size is given otherwise."""
-    tir = tir_of(text, path)
+    tir = parsed(text, path, _USED)
     _check_units(tir, notes)
     value = tir.number
     named, off = ("", 0.0) if sized else _size(path, value)

@@ -18,6 +18,7 @@ from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.sections.inflated import InflatedRing
 from tireroad.fem.sections.mesh2d import SectionMesh
 from tireroad.runs.files.store import opened
+from tireroad.runs.files.tir import UNITS
 from tireroad.runs.fit import KINDS
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.tables.scene import Scene
@@ -37,13 +38,7 @@ _STATIC = (
     "footprint_length",
     "footprint_width",
 )
-_UNITS = (
-    ("LENGTH", "meter"),
-    ("FORCE", "newton"),
-    ("ANGLE", "radians"),
-    ("MASS", "kg"),
-    ("TIME", "second"),
-)
+_UNITS = "LENGTH", "FORCE", "ANGLE", "MASS", "TIME"
 _STIFF = "load", "vertical", "longitudinal", "lateral", "torsional"
 
 
@@ -77,7 +72,7 @@ def written(
         "FILE_VERSION             = 3.0",
         "FILE_FORMAT              = 'ASCII'",
         "[UNITS]",
-        *(f"{key:24s} = '{unit}'" for key, unit in _UNITS),
+        *(f"{key:24s} = '{UNITS[key][0]}'" for key in _UNITS),
     ]
     for name, rows in sections.items():
         copied = list(rows)

@@ -13,7 +13,8 @@ from synthetic_results import sealed, write_results
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.cli import main
-from tireroad.runs.fit import read, tir_values
+from tireroad.runs.files.tir import parsed
+from tireroad.runs.fit import read
 
 SCENE = """[tire]
 section = "radial"
@@ -28,6 +29,11 @@ steps = 5
 """
 
 
+def _values(text: str) -> dict[str, str]:
+    """Values as written by key in capitals, without units."""
+    return {key: value for key, (value, _) in parsed(text, Path("tir")).values.items()}
+
+
 @pytest.mark.long
 def test_there_and_back(tmp_path: Path) -> None:
     """Stiffness, footprint and mass are those of the run; modes those of its mesh; the curves follow their points."""
@@ -40,7 +46,7 @@ def test_there_and_back(tmp_path: Path) -> None:
     path = out / "export" / "tire.tir"
     heads = (out / "export" / "stiffness.csv").read_text().splitlines()
     assert heads[0].startswith('"deflection [m]"') and "load [N]" in heads[0] and len(heads) == 6
-    found, values = read(path), tir_values(path.read_text())
+    found, values = read(path), _values(path.read_text())
     with h5py.File(out / "stiffness.h5") as file:
         for name in ("vertical", "longitudinal", "lateral", "torsional"):
             assert found.values[f"{name}_stiffness"] == pytest.approx(
@@ -206,7 +212,7 @@ def test_what_can_be_is_written_and_the_rest_is_said(
     text = (tmp_path / "export" / "tire.tir").read_text()
     sections = re.findall(r"^\[(\w+)\]$", text, re.MULTILINE)
     assert sections[:4] == ["MDI_HEADER", "UNITS", "MODEL", "DIMENSION"]
-    values = tir_values(text)
+    values = _values(text)
     assert float(values["FNOMIN"]) == 3000.0
     assert float(values["LONGVL"]) == pytest.approx(70.0 * 0.306)
     assert values["TYRESIDE"] == "SYMMETRIC" and "VERTICAL_STIFFNESS" not in values
