@@ -343,7 +343,8 @@ def _validate(args: argparse.Namespace) -> None:
 
     scenes = [Path(name) for name in args.names if name.endswith(".toml")]
     if not scenes:
-        return run_all("tireroad.runs.validation", args.names, args.out, args.large)
+        _check_checkout("validation", args.command)
+        return run_all("tireroad.tests.validation", args.names, args.out, args.large)
     if len(scenes) < len(args.names) or args.large:
         raise InputError(
             "validate takes names, or scenes of your own: one or the other, and no --large with them"
@@ -571,7 +572,7 @@ COMMANDS = {
                 "names",
                 nargs="*",
                 metavar="NAME",
-                help="all by default; or a SCENE.toml of your own, which is run against full finite elements in time",
+                help="all by default, in a checkout; or a SCENE.toml of your own, which is run against full finite elements in time",
             ),
             TABLE,
             argument(

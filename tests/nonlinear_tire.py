@@ -10,7 +10,7 @@ from tireroad.fem.static.state import static_state
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.mesh import Region, compounds
-from tireroad.runs.validation.cases import thesis_torus
+from tireroad.tests.validation.cases import thesis_torus
 
 INFLATION = 2e5
 SOFT = compound("neo-hookean", 1200.0, youngs_modulus=2e7, poisson_ratio=0.45, dynamic=1.5)

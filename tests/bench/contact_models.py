@@ -10,14 +10,6 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from scipy.optimize import brentq
 
-from tireroad.contact.literature import (
-    LookUp,
-    ShiftedSprings,
-    Wedges,
-    asperities,
-    fitted_stiffness,
-    look_up,
-)
 from tireroad.contact.results.spectra import distance, third_octaves
 from tireroad.contact.tread.law import TREADS
 from tireroad.fem.static.equilibrium import Equilibrium
@@ -27,6 +19,14 @@ from tireroad.fem.static.state import StaticState, static_state
 from tireroad.runs.validation.full_elements import Conditions
 from tireroad.runs.validation.tables import Table
 from tireroad.tests.bench.accuracy.rough_road import BAND, Mesh, Prepared, modal, prepared
+from tireroad.tests.reference.literature import (
+    LookUp,
+    ShiftedSprings,
+    Wedges,
+    asperities,
+    fitted_stiffness,
+    look_up,
+)
 
 ABOUT = "the literature's contact models against the half-space with fine points: forces, third octaves, time"
 MESH = Mesh(24, 10, 0.3)

@@ -18,8 +18,8 @@ from tireroad.contact.solver.solvers import make_solver
 from tireroad.contact.tread.compliance import half_space_compliance
 from tireroad.fem.errors import ConvergenceError
 from tireroad.greens.recursion import SHARED_FROM, Recursion, loop_communicator
-from tireroad.runs.validation.cases import RollingStrip, oval_patch
 from tireroad.runs.validation.tables import Table
+from tireroad.tests.validation.cases import RollingStrip, oval_patch
 
 ABOUT = (
     "a step of the contact loop on 1 and 2 processes: few points and modes, 1,000 and more of both"

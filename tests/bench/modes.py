@@ -10,8 +10,8 @@ from mpi4py import MPI
 
 from tireroad.runs.process import console
 from tireroad.runs.process.surroundings import peak_memory
-from tireroad.runs.validation.cases import thesis_torus
 from tireroad.runs.validation.tables import Table
+from tireroad.tests.validation.cases import thesis_torus
 
 ABOUT = "time, memory and accuracy of standing and rolling modes"
 COUNTS = (250, 500, 1000, 2000)

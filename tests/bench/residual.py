@@ -23,8 +23,8 @@ from tireroad.greens.responses import Cutoff, estimate
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes, rolling_modes
 from tireroad.modal.standing import standing_modes
-from tireroad.runs.validation.cases import thesis_torus
 from tireroad.runs.validation.tables import Table
+from tireroad.tests.validation.cases import thesis_torus
 
 ABOUT = "receptance of few modes with each residual against the full matrices; set-up times"
 

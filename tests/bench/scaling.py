@@ -17,11 +17,11 @@ from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.tread.compliance import half_space_compliance
 from tireroad.greens.recursion import Recursion
 from tireroad.runs.process import console
-from tireroad.runs.validation.cases import RollingStrip, oval_patch
 from tireroad.runs.validation.tables import Table
 from tireroad.tests.bench.accuracy.rough_road import Mesh, prepared, write_scene
 from tireroad.tests.bench.parts.floors import bandwidth, exponent, fastest, flop_rate
 from tireroad.tests.bench.parts.launched import launched
+from tireroad.tests.validation.cases import RollingStrip, oval_patch
 
 ABOUT = "cost exponents over unknowns, modes, points, steps; processes; memory; floors"
 

@@ -24,7 +24,7 @@ from tireroad.fem.static.footprint import TreadSurface
 from tireroad.fem.tire.mesh import field_lattice
 from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.scene.tables.contact import ContactTable
-from tireroad.runs.validation.cases import thesis_torus
+from tireroad.tests.validation.cases import thesis_torus
 
 SECTION = thesis_torus(segments=60, elements_arc=16, grading="bead", footprint_size=0.3)
 

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from tireroad.contact.literature import (
+from tireroad.contact.tread.law import TREADS
+from tireroad.fem.errors import InputError
+from tireroad.tests.reference.literature import (
     Asperities,
     ShiftedSprings,
     Wedges,
@@ -11,8 +13,6 @@ from tireroad.contact.literature import (
     fitted_stiffness,
     look_up,
 )
-from tireroad.contact.tread.law import TREADS
-from tireroad.fem.errors import InputError
 
 PITCH = 1e-4
 

@@ -10,7 +10,7 @@ from tireroad.contact.rolling import StaticTire
 from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.solver.stick_slip import BrushFriction
 from tireroad.contact.tread.brush import Brush, BrushLaw
-from tireroad.runs.validation.cases import oval_patch
+from tireroad.tests.validation.cases import oval_patch
 
 ALONG_Z, IN_PLANE = 1e-6, 3e-6  # m/N: tires are up to three times as soft in the plane
 SPEED, STEP = 10.0, 1e-4

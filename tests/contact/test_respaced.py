@@ -7,7 +7,7 @@ import pytest
 
 from tireroad.contact.grid_patch import ACROSS, MOST, ratio
 from tireroad.contact.tread.kernel import GridPlaces
-from tireroad.runs.validation.cases import oval_patch
+from tireroad.tests.validation.cases import oval_patch
 
 
 def footprint(long: int, wide: int, lost: int = 0):

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from tireroad.fem.static.state import StaticState
-from tireroad.runs.validation import stability
-from tireroad.runs.validation.stability import Attempt, EndedRun, attempts, result
+from tireroad.tests.validation import stability
+from tireroad.tests.validation.stability import Attempt, EndedRun, attempts, result
 
 pytestmark = pytest.mark.slow
 

@@ -23,7 +23,7 @@ from tireroad.greens.response import couple
 from tireroad.modal.basis import project
 from tireroad.modal.solver import undamped
 from tireroad.modal.standing import sites
-from tireroad.runs.validation.cases import thesis_torus
+from tireroad.tests.validation.cases import thesis_torus
 
 pytestmark = pytest.mark.slow
 

@@ -22,7 +22,7 @@ from tireroad.modal.basis import extended, project
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.fields import gram, multiply
 from tireroad.modal.solver.slicing import Modes
-from tireroad.runs.validation.cases import thesis_torus
+from tireroad.tests.validation.cases import thesis_torus
 
 MATERIAL = {
     "model": "neo-hookean",

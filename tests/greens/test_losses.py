@@ -20,7 +20,7 @@ from tireroad.greens.coupling import Basis, Wheel
 from tireroad.modal.basis import project
 from tireroad.modal.damping import StrainEnergy, beyond, tail_growth
 from tireroad.modal.solver import undamped
-from tireroad.runs.validation.cases import thesis_torus
+from tireroad.tests.validation.cases import thesis_torus
 
 INFLATION, KEPT = 1e5, 30
 

@@ -28,7 +28,7 @@ from tireroad.modal.rotation_shapes import up_to, with_rotation_shapes
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.fields import gram, multiply
 from tireroad.modal.standing import fewer, projected, solved, standing_modes
-from tireroad.runs.validation.cases import thesis_torus
+from tireroad.tests.validation.cases import thesis_torus
 
 SOFT = compound("neo-hookean", 1200.0, youngs_modulus=6e6, poisson_ratio=0.45)
 PLY = {"youngs_modulus": 9.87e9, "area": 4.21e-7, "spacing": 1e-3}

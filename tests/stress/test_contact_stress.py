@@ -11,8 +11,8 @@ from tireroad.contact.roads.kinds.shapes import Flat
 from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.tread.compliance import half_space_compliance
 from tireroad.greens.recursion import Recursion
-from tireroad.runs.validation.cases import RollingStrip, oval_patch
-from tireroad.runs.validation.stability import (
+from tireroad.tests.validation.cases import RollingStrip, oval_patch
+from tireroad.tests.validation.stability import (
     CRITICAL,
     RolledCase,
     cases,

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tireroad.runs.validation import stability
+from tireroad.tests.validation import stability
 
 
 @pytest.mark.long

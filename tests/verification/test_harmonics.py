@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tireroad.fem.sections.mesh2d import PlyLine
-from tireroad.runs.validation.cases import thesis_torus
 from tireroad.tests.bench.parts.harmonics import Membrane, Rubber, frequencies
+from tireroad.tests.validation.cases import thesis_torus
 
 HALF = np.radians(120)
 

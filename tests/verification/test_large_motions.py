@@ -5,7 +5,7 @@ import pytest
 
 from tireroad.fem.nonlinear.quasi_static import Standing
 from tireroad.fem.nonlinear.road import Feature
-from tireroad.runs.validation.large import NAMES, Found, bar, edge, rows
+from tireroad.tests.validation.large import NAMES, Found, bar, edge, rows
 
 
 def standing(along, up):

@@ -30,7 +30,7 @@ from tireroad.modal.damping import StrainEnergy
 from tireroad.modal.rolling import rolling_modes
 from tireroad.modal.standing import standing_modes
 from tireroad.runs.scene.physics import rolling_shape
-from tireroad.runs.validation.cases import thesis_torus
+from tireroad.tests.validation.cases import thesis_torus
 
 SCENE = """
 name = "chain"

@@ -27,7 +27,7 @@ from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.mesh import Region
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.physics import make_body
-from tireroad.runs.validation.cases import thesis_torus
+from tireroad.tests.validation.cases import thesis_torus
 
 pytestmark = pytest.mark.slow
 

@@ -19,7 +19,7 @@ from tireroad.modal.basis import project
 from tireroad.modal.damping import Proportional, StrainEnergy, beyond, rates
 from tireroad.modal.rotating import matrices, standing
 from tireroad.modal.solver import undamped
-from tireroad.runs.validation.cases import thesis_torus
+from tireroad.tests.validation.cases import thesis_torus
 
 INFLATION = 1.0e5
 

@@ -5,7 +5,7 @@ import pytest
 
 from tireroad.fem.sections.inflated import InflatedRing
 from tireroad.fem.sections.radial import radial
-from tireroad.runs.validation import mobility, slow_motions, waves_around
+from tireroad.tests.validation import mobility, slow_motions, waves_around
 
 FREQUENCY = np.array([20.0, 63.0, 100.0, 125.0])
 

@@ -16,7 +16,7 @@ from tireroad.modal.rolling import truncation
 from tireroad.modal.rotating import checks, matrices, rotating
 from tireroad.modal.solver import quadratic, undamped
 from tireroad.modal.standing import sites
-from tireroad.runs.validation.cases import thesis_torus
+from tireroad.tests.validation.cases import thesis_torus
 
 pytestmark = pytest.mark.slow
 

@@ -24,7 +24,7 @@ from tireroad.modal.rotating import matrices
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.fields import projected
 from tireroad.modal.standing import solved
-from tireroad.runs.validation.cases import thesis_torus
+from tireroad.tests.validation.cases import thesis_torus
 
 INFLATION = 1.0e5
 PI = np.pi

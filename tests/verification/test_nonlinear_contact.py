@@ -18,7 +18,7 @@ from tireroad.fem.static.state import static_state
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
 from tireroad.fem.transient import FullTire, NonlinearTire
-from tireroad.runs.validation.cases import thesis_torus
+from tireroad.tests.validation.cases import thesis_torus
 
 INFLATION, STEP = 2e5, 2e-4
 DAMPING = (400.0, 0.0)
@@ -161,8 +161,8 @@ def test_a_rise_of_centimetres_in_long_steps_ends_at_the_static_load():
 @pytest.mark.long
 def test_rolling_it_tends_to_the_linear_tire(tmp_path):
     """Waves of 0.05 and 0.5 mm at 100 rad/s: what is off grows with them, from nearly none."""
-    from tireroad.runs.validation.excursion import _SINE, beside, scene_of
-    from tireroad.runs.validation.full_elements import Tires
+    from tireroad.tests.validation.comparison import Tires
+    from tireroad.tests.validation.excursion import _SINE, beside, scene_of
 
     mesh, found = {"segments": 16, "elements_arc": 6}, []
     tires = Tires(scene_of(_SINE.format(height=5e-5), mesh, 0.01), tmp_path)

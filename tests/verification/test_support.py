@@ -17,7 +17,7 @@ from tireroad.fem.tire.material import compound
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.slicing import Modes
 from tireroad.modal.standing import sites
-from tireroad.runs.validation.cases import thesis_torus
+from tireroad.tests.validation.cases import thesis_torus
 
 pytestmark = pytest.mark.slow
 

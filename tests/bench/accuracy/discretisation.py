@@ -9,10 +9,10 @@ import numpy as np
 from mpi4py import MPI
 
 from tireroad.runs.process import console
-from tireroad.runs.validation.cases import thesis_torus
 from tireroad.runs.validation.tables import Table
 from tireroad.tests.bench.parts import converged_load
 from tireroad.tests.bench.parts.harmonics import Rubber, lowest
+from tireroad.tests.validation.cases import thesis_torus
 
 ABOUT = "element order, mesh, grading, near-incompressibility and mass on the clamped torus"
 YOUNGS_MODULUS, INFLATION = 48e6, 2e5  # Pa

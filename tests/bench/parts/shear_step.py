@@ -19,8 +19,8 @@ from tireroad.contact.tread.compliance import half_space_compliance, half_space_
 from tireroad.contact.tread.kernel import GridPlaces, KernelTread
 from tireroad.contact.tread.shear import KernelShear, half_space_shear
 from tireroad.greens.recursion import Recursion
-from tireroad.runs.validation.cases import RollingStrip, oval_patch
 from tireroad.runs.validation.tables import Table
+from tireroad.tests.validation.cases import RollingStrip, oval_patch
 
 STEP = 1e-4
 ELASTIC = 5e6, 0.45

@@ -13,7 +13,7 @@ from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.static.footprint import Footprint
 from tireroad.runs.stages.contact import edges, excursion, points
 from tireroad.runs.stages.stage import Record
-from tireroad.runs.validation.cases import oval_patch
+from tireroad.tests.validation.cases import oval_patch
 
 
 def block(displacement: np.ndarray, **more: np.ndarray) -> dict[str, np.ndarray]:

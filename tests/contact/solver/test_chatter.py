@@ -27,7 +27,7 @@ from tireroad.contact.solver.stick_slip import BrushFriction
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.law import TREADS
 from tireroad.greens.recursion import Recursion, alternating
-from tireroad.runs.validation.cases import RollingStrip, oval_patch
+from tireroad.tests.validation.cases import RollingStrip, oval_patch
 
 PATCH = oval_patch((9, 7), (0.015, 0.02), 500.0)
 TREAD = SimpleNamespace(

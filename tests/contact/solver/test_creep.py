@@ -7,7 +7,7 @@ from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.tread.laws.viscoelastic import Viscoelastic
 from tireroad.contact.tread.memory import TreadMemory, creep_of, steady
 from tireroad.fem.errors import InputError
-from tireroad.runs.validation.contact_closed_forms import (
+from tireroad.tests.validation.contact_closed_forms import (
     CREEP_SPEED,
     DX,
     DY,

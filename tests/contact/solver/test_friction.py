@@ -15,7 +15,7 @@ from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import half_space_compliance, rectangle_potential
 from tireroad.fem.errors import ConvergenceError
 from tireroad.greens.recursion import Recursion
-from tireroad.runs.validation.cases import RollingStrip, oval_patch
+from tireroad.tests.validation.cases import RollingStrip, oval_patch
 
 PATCH = oval_patch((9, 7), (0.015, 0.02), 500.0)
 TREAD = half_space_compliance(PATCH.points[:, :2], PATCH.half_sizes, 5e6, 0.45)

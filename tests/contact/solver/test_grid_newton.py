@@ -15,7 +15,7 @@ from tireroad.contact.tread.kernel import GridPlaces, KernelTread
 from tireroad.contact.tread.layer import LayerInfluence, LayerShear
 from tireroad.contact.tread.shear import KernelShear
 from tireroad.fem.errors import ConvergenceError
-from tireroad.runs.validation.cases import oval_patch
+from tireroad.tests.validation.cases import oval_patch
 
 STEP, SPEED, STEPS, FRICTION = 1e-4, 20.0, 12, 0.6
 COUNTS, NODES, SPACING = (25, 17), (13, 9), (0.004, 0.005)

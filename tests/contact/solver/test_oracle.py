@@ -17,8 +17,8 @@ from tireroad.contact.tread.compliance import half_space_influence
 from tireroad.contact.tread.kernel import GridPlaces, KernelTread
 from tireroad.contact.tread.shear import KernelShear, MatrixShear, half_space_shear
 from tireroad.greens.recursion import Recursion
-from tireroad.runs.validation.cases import RollingStrip, oval_patch
 from tireroad.tests.reference.step import Bristles, PlainLoop
+from tireroad.tests.validation.cases import RollingStrip, oval_patch
 
 STEP, SPEED, STEPS = 1e-4, 20.0, 80
 NODES = oval_patch((7, 5), (0.02, 0.025), 500.0)

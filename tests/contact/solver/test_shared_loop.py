@@ -12,7 +12,7 @@ from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import half_space_compliance
 from tireroad.fem.errors import ConvergenceError
 from tireroad.greens.recursion import Recursion
-from tireroad.runs.validation.cases import RollingStrip, oval_patch
+from tireroad.tests.validation.cases import RollingStrip, oval_patch
 
 PATCH = oval_patch((13, 9), (0.012, 0.012), 500.0)
 COUNT = len(PATCH.points)

@@ -5,8 +5,8 @@ import pytest
 
 from tireroad.contact.solver.stick_slip import BrushFriction
 from tireroad.contact.tread.brush import Brush, BrushLaw, upstream
-from tireroad.runs.validation.cases import oval_patch
 from tireroad.tests.reference.step import Pressed
+from tireroad.tests.validation.cases import oval_patch
 
 
 def test_upstream_is_linear_interpolation_on_each_line() -> None:

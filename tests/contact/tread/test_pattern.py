@@ -7,8 +7,8 @@ from tireroad.contact.tread.pattern import Heights, Pattern, pitch_starts
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.tables.contact import GrooveTable, PatternTable
 from tireroad.runs.stages.setup import make_pattern
-from tireroad.runs.validation import contact_closed_forms
-from tireroad.runs.validation.contact_closed_forms import AROUND, grooves, rolled
+from tireroad.tests.validation import contact_closed_forms
+from tireroad.tests.validation.contact_closed_forms import AROUND, grooves, rolled
 
 
 def test_orders_of_equal_pitches_by_hand() -> None:

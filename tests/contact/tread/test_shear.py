@@ -16,7 +16,7 @@ from tireroad.contact.tread.layer import LayerInfluence, LayerShear, transforms
 from tireroad.contact.tread.memory import TreadMemory
 from tireroad.contact.tread.shear import KernelShear, MatrixShear, half_space_shear
 from tireroad.greens.recursion import Recursion
-from tireroad.runs.validation.cases import RollingStrip, oval_patch
+from tireroad.tests.validation.cases import RollingStrip, oval_patch
 
 YOUNG = 1e6
 

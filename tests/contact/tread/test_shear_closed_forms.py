@@ -1,9 +1,9 @@
-"""Contact with a half-space that gives way sideways: pushed, bonded and rolling bodies (runs.validation.contact_closed_forms)."""
+"""Contact with a half-space that gives way sideways: pushed, bonded and rolling bodies (tests.validation.contact_closed_forms)."""
 
 import numpy as np
 import pytest
 
-from tireroad.runs.validation import contact_closed_forms
+from tireroad.tests.validation import contact_closed_forms
 
 
 @pytest.mark.parametrize("nu", [0.0, 0.25])

@@ -9,7 +9,7 @@ from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
-from tireroad.runs.validation.cases import thesis_torus
+from tireroad.tests.validation.cases import thesis_torus
 
 DAMPING = (400.0, 0.0)
 

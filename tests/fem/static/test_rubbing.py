@@ -12,7 +12,7 @@ from tireroad.fem.static.press import place
 from tireroad.fem.static.road import FLAT
 from tireroad.fem.static.state import static_state
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
-from tireroad.runs.validation import contact_closed_forms
+from tireroad.tests.validation import contact_closed_forms
 
 LOAD = 1500.0
 TURNING = Rolling(speed=40.0)

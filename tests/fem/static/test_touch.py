@@ -7,7 +7,7 @@ from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.footprint import TreadSurface
 from tireroad.fem.static.load_steps import LoadStepper
 from tireroad.fem.tire.mesh import NodeGrid, position
-from tireroad.runs.validation.cases import thesis_torus
+from tireroad.tests.validation.cases import thesis_torus
 
 
 def torus(ring, arc):

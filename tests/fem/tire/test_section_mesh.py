@@ -9,7 +9,7 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.sections import mesh2d
 from tireroad.fem.sections.mesh2d import PlyLine, RegionPatch, element_corners
 from tireroad.fem.sections.torus import Torus
-from tireroad.runs.validation.cases import thesis_torus
+from tireroad.tests.validation.cases import thesis_torus
 
 HALF = np.radians(120)
 BELT = PlyLine("belt", (-0.8, 0.8), 0.75)

@@ -6,7 +6,7 @@ import pytest
 from tireroad.fem.sections import mesh2d
 from tireroad.fem.sections.radial import radial
 from tireroad.fem.static.load_error import split_ring, split_section
-from tireroad.runs.validation.cases import thesis_torus
+from tireroad.tests.validation.cases import thesis_torus
 
 
 def area(section) -> float:

@@ -26,7 +26,7 @@ from tireroad.modal.rolling import decouple
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.fields import everywhere
 from tireroad.modal.standing import sites
-from tireroad.runs.validation.cases import thesis_torus
+from tireroad.tests.validation.cases import thesis_torus
 
 COMM = MPI.COMM_WORLD
 RUBBER = compound("neo-hookean", 1200.0, youngs_modulus=4.8e7, poisson_ratio=0.45)

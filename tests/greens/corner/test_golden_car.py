@@ -6,7 +6,7 @@ from mpi4py import MPI
 from scipy import sparse
 
 from tireroad.greens.recursion import Recursion
-from tireroad.runs.validation import closed_forms
+from tireroad.tests.validation import closed_forms
 
 COMM = MPI.COMM_WORLD
 

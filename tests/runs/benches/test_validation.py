@@ -6,10 +6,11 @@ import pytest
 from tireroad.contact.loop import ContactProblem, Loop
 from tireroad.contact.model import step_solver
 from tireroad.contact.results.spectra import distance
-from tireroad.runs.validation import closed_forms, passenger, rolling, schemes
-from tireroad.runs.validation.full_elements import Choice, Comparison, FullHistory, Tires, follow
-from tireroad.runs.validation.moved_road import SCENE
+from tireroad.runs.validation.full_elements import FullHistory, follow
 from tireroad.runs.validation.tables import modules
+from tireroad.tests.validation import closed_forms, passenger, rolling, schemes
+from tireroad.tests.validation.comparison import Choice, Comparison, Tires
+from tireroad.tests.validation.moved_road import SCENE
 
 DURATION = 0.1
 
@@ -61,7 +62,7 @@ def test_the_fastest_run_within_an_error_is_held_against_full_elements_within_it
 
 
 def test_every_validation_says_what_it_is_about() -> None:
-    known = modules("tireroad.runs.validation")
+    known = modules("tireroad.tests.validation")
     assert {"point_force", "moved_road", "rolling", "axle", "closed_forms", "stability"} <= set(
         known
     )

@@ -7,7 +7,7 @@ from matplotlib.image import imread
 
 from tireroad.fem.sections.mesh2d import PlyLine
 from tireroad.runs.report.section_figure import draw_section, save_section
-from tireroad.runs.validation.cases import thesis_torus
+from tireroad.tests.validation.cases import thesis_torus
 
 
 @pytest.fixture

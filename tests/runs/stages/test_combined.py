@@ -2,7 +2,7 @@
 
 import pytest
 
-from tireroad.runs.validation import stability
+from tireroad.tests.validation import stability
 
 
 def test_every_combination_is_a_scene(tmp_path) -> None:

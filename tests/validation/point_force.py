@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from tireroad.runs.validation.full_elements import Choice, Comparison, FullHistory, Tires, verdicts
+from tireroad.runs.validation.full_elements import FullHistory
 from tireroad.runs.validation.tables import Table
+from tireroad.tests.validation.comparison import Choice, Comparison, Tires, verdicts
 
 ABOUT = "displacement under a point force, modes against full finite elements of the same mesh"
 DURATION = 0.2  # s

@@ -26,8 +26,8 @@ from tireroad.fem.sections.inflated import InflatedRing, patch_share
 from tireroad.fem.sections.radial import radial
 from tireroad.fem.tire.material import Kind, own_moduli
 from tireroad.runs import library
-from tireroad.runs.validation.mobility import ALONG, ANGLES, HALF, PRESSURE, SIZE, level
 from tireroad.runs.validation.tables import Table
+from tireroad.tests.validation.mobility import ALONG, ANGLES, HALF, PRESSURE, SIZE, level
 
 ABOUT = "what weakens waves around the tire: elements around, moduli and losses of modes, what couples them"
 UP_TO = 1000.0  # Hz, of the modes

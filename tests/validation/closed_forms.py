@@ -24,8 +24,8 @@ from tireroad.modal.corner import Corner
 from tireroad.modal.rolling import decouple
 from tireroad.modal.rotating import matrices, rotating, standing
 from tireroad.modal.solver.slicing import Modes
-from tireroad.runs.validation import contact_closed_forms as contact
 from tireroad.runs.validation.tables import Table
+from tireroad.tests.validation import contact_closed_forms as contact
 
 FLAT = 1e6  # m, radius of the section circle: the part of the torus in use is a cylinder
 COMM = MPI.COMM_SELF

@@ -7,17 +7,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from tireroad.contact.results.spectra import distance
-from tireroad.runs.validation.full_elements import (
-    LOADED,
-    Choice,
-    Tires,
-    compare,
-    digits,
-    follow,
-    percent,
-    verdicts,
-)
+from tireroad.runs.validation.full_elements import digits, follow, percent
 from tireroad.runs.validation.tables import Table
+from tireroad.tests.validation.comparison import LOADED, Choice, Tires, compare, verdicts
 
 ABOUT = "a standing tire on a flat road that moves: modes against full finite elements"
 

@@ -13,9 +13,9 @@ from mpi4py import MPI
 from tireroad.runs.pipeline import run_scene
 from tireroad.runs.process import console
 from tireroad.runs.scene.load import load
-from tireroad.runs.validation.full_elements import LOADED, Choice, Tires, compare, verdicts
-from tireroad.runs.validation.rolling import ROADS
 from tireroad.runs.validation.tables import Table
+from tireroad.tests.validation.comparison import LOADED, Choice, Tires, compare, verdicts
+from tireroad.tests.validation.rolling import ROADS
 
 LIMIT_SCENE = """
 [tire]

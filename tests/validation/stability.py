@@ -51,8 +51,8 @@ from tireroad.modal.states import StateModes
 from tireroad.runs.files.store import opened
 from tireroad.runs.pipeline import run_scene
 from tireroad.runs.process import console
-from tireroad.runs.validation.cases import RollingStrip, oval_patch, thesis_torus
 from tireroad.runs.validation.tables import Table
+from tireroad.tests.validation.cases import RollingStrip, oval_patch, thesis_torus
 
 BALANCED = 1e-9  # residual of an equilibrium, relative to the force scale
 

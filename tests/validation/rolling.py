@@ -9,17 +9,16 @@ from pathlib import Path
 import numpy as np
 
 from tireroad.contact.results.spectra import BAND, distance
-from tireroad.runs.validation.full_elements import (
+from tireroad.runs.validation.full_elements import digits, percent
+from tireroad.runs.validation.tables import Table
+from tireroad.tests.validation.comparison import (
     LOADED,
     Choice,
     Comparison,
     Tires,
     compare,
-    digits,
-    percent,
     verdicts,
 )
-from tireroad.runs.validation.tables import Table
 
 ABOUT = "contact and axle force while rolling, modes against full finite elements of the same mesh"
 

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from tireroad.runs.validation.full_elements import Tires, follow
-from tireroad.runs.validation.rolling import SCENE
+from tireroad.runs.validation.full_elements import follow
 from tireroad.runs.validation.tables import Table
+from tireroad.tests.validation.comparison import Tires
+from tireroad.tests.validation.rolling import SCENE
 
 ABOUT = "rolling over bumps up to several static deflections: linear against nonlinear finite elements in time"
 

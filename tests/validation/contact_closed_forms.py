@@ -45,7 +45,7 @@ from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.mesh import INNER, TREAD
 from tireroad.runs.scene.tables.contact import GrooveTable
-from tireroad.runs.validation.cases import oval_patch
+from tireroad.tests.validation.cases import oval_patch
 
 YOUNG, POISSON = 3.4e6, 0.49
 MODULUS = exact.contact_modulus(YOUNG, POISSON)

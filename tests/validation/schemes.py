@@ -11,9 +11,10 @@ from tireroad.contact.results.spectra import BAND, distance
 from tireroad.fem.errors import ConvergenceError
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
-from tireroad.runs.validation.full_elements import FullHistory, Tires, digits, follow
-from tireroad.runs.validation.rolling import ROADS, SCENE
+from tireroad.runs.validation.full_elements import FullHistory, digits, follow
 from tireroad.runs.validation.tables import Table
+from tireroad.tests.validation.comparison import Tires
+from tireroad.tests.validation.rolling import ROADS, SCENE
 
 ABOUT = (
     "the scheme chosen on treads of 10 and 340 MPa, against a finer step, and what the others give"

@@ -27,8 +27,8 @@ from tireroad.greens.response import Response
 from tireroad.runs.library import modes, press, radial, roll
 from tireroad.runs.process import console
 from tireroad.runs.validation.full_elements import digits, percent
-from tireroad.runs.validation.large import ACROSS, BED, INFLATION, LOADS, SEGMENTS, bar
 from tireroad.runs.validation.tables import Table
+from tireroad.tests.validation.large import ACROSS, BED, INFLATION, LOADS, SEGMENTS, bar
 
 ABOUT = "a road that rises by 15 mm in 8 ms: linear and reduced nonlinear tire against nonlinear elements in time"
 

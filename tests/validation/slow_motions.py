@@ -15,8 +15,8 @@ from tireroad.fem.matrices.compliance import add_part, compliance
 from tireroad.fem.sections.inflated import InflatedRing, patch_share
 from tireroad.fem.sections.radial import radial
 from tireroad.fem.tire.material import own_moduli
-from tireroad.runs.validation.mobility import ALONG, PRESSURE, SIZE, Chain
 from tireroad.runs.validation.tables import Table
+from tireroad.tests.validation.mobility import ALONG, PRESSURE, SIZE, Chain
 
 ABOUT = "flexibility under slow loads: static moduli, those of the modes, those of a standing wave of a rolling tire, and the loop's"
 UP_TO, WAVES = 1000.0, 60  # Hz, of the modes

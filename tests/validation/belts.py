@@ -5,8 +5,8 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from tireroad.runs.validation.full_elements import Choice, Tires, compare, verdicts
 from tireroad.runs.validation.tables import Table
+from tireroad.tests.validation.comparison import Choice, Tires, compare, verdicts
 
 ABOUT = "a belted tire of lossy rubber rolling, modes against full finite elements of the same mesh"
 

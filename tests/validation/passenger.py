@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from tireroad.contact.results.spectra import nominal, third_octaves
-from tireroad.runs.validation.full_elements import Choice, FullHistory, Tires, digits, follow
+from tireroad.runs.validation.full_elements import FullHistory, digits, follow
 from tireroad.runs.validation.tables import Table
+from tireroad.tests.validation.comparison import Choice, Tires
 
 # The full finite elements in time have the moduli of one frequency: exponent = 0.
 ABOUT = "the passenger tire on a rough road, third octaves of modes against full finite elements"

@@ -17,8 +17,8 @@ from tireroad.greens.coupling import wheel_of
 from tireroad.greens.outputs import by_free_rim, by_momentum, from_moment
 from tireroad.modal.corner import MOMENTS
 from tireroad.modal.standing import solved
-from tireroad.runs.validation.full_elements import Tires
 from tireroad.runs.validation.tables import Table
+from tireroad.tests.validation.comparison import Tires
 
 ABOUT = "axle force and moment per force on the tread: by momentum, by the free rim's modes, by full finite elements"
 FREQUENCY = np.array([10.0, 50.0, 100.0, 150.0, 200.0, 250.0, 300.0])  # Hz
