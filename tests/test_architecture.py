@@ -13,6 +13,7 @@ import pytest
 from tireroad.contact.solver.solvers import SOLVERS
 from tireroad.greens.residuals import RESIDUALS
 from tireroad.greens.schemes import SCHEMES
+from tireroad.modal.solver.searches import SEARCHES
 
 ROOT = Path(__file__).parents[1]
 ROOMS = ("fem", "modal", "greens", "contact", "runs")  # each may use those before it
@@ -166,14 +167,16 @@ MENTIONS = {  # modules that name a choice by its word, its declaration among th
     "active-set": 3,
     "projected-cg": 5,
     "snes-vi": 2,
+    "lanczos": 2,
+    "slepc": 2,
 }
 
 
 def test_the_mentioned_choices_are_declared() -> None:
     """Words that mean nothing else, of each kind of choice that is declared in one place."""
-    for declared in (RESIDUALS, SCHEMES, SOLVERS):
+    for declared in (RESIDUALS, SCHEMES, SOLVERS, SEARCHES):
         assert MENTIONS.keys() & declared.keys()
-    assert MENTIONS.keys() <= {*RESIDUALS, *SCHEMES, *SOLVERS}
+    assert MENTIONS.keys() <= {*RESIDUALS, *SCHEMES, *SOLVERS, *SEARCHES}
 
 
 @pytest.mark.parametrize("word", MENTIONS)

@@ -16,8 +16,8 @@ from tireroad.fem.collective import from_local_rows, summed
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.matrices.compliance import RIGID
 from tireroad.fem.static.checkpoint import Entry, Journal
+from tireroad.modal.solver.searches import AUTO, BLOCK
 
-BLOCK = 8
 # Longest basis: this many vectors for each wanted one, and this many blocks more.
 _LENGTH, _MORE = 6, 30
 _EVERY = 3  # blocks between two checks of convergence
@@ -36,7 +36,6 @@ _LARGEST_DENSE = 3000
 # Krylov-Schur: the longest basis over the wanted eigenvalues, and the share of it that a restart keeps: 193
 # solves for 107 eigenvalues (half of it, SLEPc's default: 209; 1.25 and 0.5: 202; 1.75 and 0.9: 201).
 _LONGEST, _KEPT = 1.5, 0.7
-AUTO = "lanczos"
 
 # Eigenvalues per slice and matrix: fewest, where teams wait for work, and most. The more, the fewer vectors
 # each takes (61,071 unknowns: 3.2 of 171, 2.6 of 326) and the fewer factors there are; but the basis grows.

@@ -29,8 +29,8 @@ from tireroad.modal.solver.fields import (
     row_sum,
     scaled_by,
 )
+from tireroad.modal.solver.searches import resolved
 from tireroad.modal.solver.slicing import (
-    AUTO,
     LowestEigenvalues,
     Modes,
     ProcessGroup,
@@ -93,8 +93,9 @@ def solve(
     rank = np.arange(size) if all_sites is None else all_sites.rank()
     own = slice(*scaled.getOwnershipRange())
     team = ProcessGroup.of(comm, teams or comm.size)
-    name = AUTO if solver == "auto" else solver
-    problem = _Problem(scaled, team, row_sum(scaled), mass, rank[own], journal or Journal(), name)
+    problem = _Problem(
+        scaled, team, row_sum(scaled), mass, rank[own], journal or Journal(), resolved(solver)
+    )
     count, limit = min(count or size, size), (2 * np.pi * up_to) ** 2
     for split in _splits(scaled, all_sites, waves, team):
         modes = problem.solve(split, count, limit)

@@ -207,14 +207,11 @@ class ModesStage(Computed[ModalBasis]):
     def solver(self) -> str:
         """The solvers' settings, for the log."""
         scene = self.job.scene
-        from tireroad.modal.solver.slicing import AUTO, BLOCK, TOLERANCE
+        from tireroad.modal.solver.searches import SEARCHES, resolved
+        from tireroad.modal.solver.slicing import TOLERANCE
         from tireroad.modal.solver.undamped import ORTHONORMALITY_TOLERANCE, RESIDUAL_TOLERANCE
 
-        solver = AUTO if scene.modes.solver == "auto" else scene.modes.solver
-        how = {
-            "lanczos": f"block Lanczos, {BLOCK} vectors a block, on (A - sigma I)^-1 of each slice",
-            "slepc": "SLEPc's Krylov-Schur on (A - sigma I)^-1 of each slice, options -modes_…",
-        }[solver]
+        how = SEARCHES[resolved(scene.modes.solver)]
         rotation = scene.rotation
         shapes = f"; rotation shapes of {rotation.shape_tolerance:g} and more" if rotation else ""
         return (

@@ -17,6 +17,7 @@ from tireroad.fem.tire.material import COLDEST, REFERENCE, warmed
 from tireroad.fem.wheel import DIRECTIONS, SHAPE_TOLERANCE, Axle
 from tireroad.greens.residuals import RESIDUALS, names
 from tireroad.greens.schemes import keeps_history
+from tireroad.modal.solver.searches import SEARCHES
 from tireroad.runs.scene.outputs import OUTPUTS, Output
 from tireroad.runs.scene.schema import (
     Collects,
@@ -125,7 +126,7 @@ class ModalTable:
     )
     solver: str = choice(
         "auto",
-        ("auto", "slepc", "lanczos"),
+        ("auto", *SEARCHES),
         "who finds the modes in slices of equal numbers, of each part that symmetry leaves: block Lanczos, which auto "
         "takes, or SLEPc's Krylov-Schur with one vector, which finds the same in 1.2 to 1.7 times the CPU time",
     )
