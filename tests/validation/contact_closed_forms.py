@@ -13,7 +13,6 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy.optimize import brentq, root_scalar
 
-from tireroad.contact import closed_forms as exact
 from tireroad.contact.loop import roll
 from tireroad.contact.patch import Patch
 from tireroad.contact.roads.kinds.shapes import Flat
@@ -45,6 +44,7 @@ from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.mesh import INNER, TREAD
 from tireroad.runs.scene.tables.contact import GrooveTable
+from tireroad.tests.reference import closed_forms as exact
 from tireroad.tests.validation.cases import oval_patch
 
 YOUNG, POISSON = 3.4e6, 0.49

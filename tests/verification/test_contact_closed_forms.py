@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from tireroad.contact.closed_forms import (
+from tireroad.contact.solver.active_set import ActiveSet
+from tireroad.contact.solver.projected_cg import MatrixCompliance, ProjectedCG
+from tireroad.contact.tread.compliance import half_space_compliance
+from tireroad.tests.reference.closed_forms import (
     SQUARE_PUNCH,
     contact_modulus,
     hertz_cylinder,
@@ -14,9 +17,6 @@ from tireroad.contact.closed_forms import (
     westergaard_mean,
     westergaard_pressure,
 )
-from tireroad.contact.solver.active_set import ActiveSet
-from tireroad.contact.solver.projected_cg import MatrixCompliance, ProjectedCG
-from tireroad.contact.tread.compliance import half_space_compliance
 
 YOUNG, POISSON = 3.4e6, 0.49
 MODULUS = contact_modulus(YOUNG, POISSON)

@@ -3,11 +3,16 @@
 import numpy as np
 import pytest
 
-from tireroad.contact.closed_forms import brush_force, carter_force, carter_traction, hertz_cylinder
 from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.solver.stick_slip import BrushFriction
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import rectangle_potential
+from tireroad.tests.reference.closed_forms import (
+    brush_force,
+    carter_force,
+    carter_traction,
+    hertz_cylinder,
+)
 
 FRICTION, LOAD, HALF = 0.4, 1000.0, 0.02
 

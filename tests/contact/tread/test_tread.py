@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.integrate import dblquad
 
-from tireroad.contact.closed_forms import LOVE_SQUARE_CENTRE
 from tireroad.contact.tread.compliance import (
     half_space_compliance,
     no_tread,
@@ -12,6 +11,7 @@ from tireroad.contact.tread.compliance import (
     winkler_compliance,
 )
 from tireroad.fem.errors import InputError
+from tireroad.tests.reference.closed_forms import LOVE_SQUARE_CENTRE
 
 
 def potential(x: float, y: float, a: float = 1.0, b: float = 1.0) -> float:

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.contact import closed_forms
 from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.tread.compliance import half_space_compliance, rectangle_potential
+from tireroad.tests.reference import closed_forms
 from tireroad.tests.thesis.claim import Claim
 from tireroad.tests.thesis.figure import Reproduced, figure
 from tireroad.tests.thesis.plots import Curve, Panel, lines

@@ -1,4 +1,4 @@
-"""Closed forms of contact with an elastic half-space and of rolling, for tests and users.
+"""Closed forms of contact with an elastic half-space and of rolling, for tests.
 
 E* is the contact modulus, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2, in Pa; a rigid body has no term.
 Source: Johnson, Contact Mechanics (1985), unless another is given.
