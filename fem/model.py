@@ -29,8 +29,8 @@ class TireModel:
 
     @cached_property
     def lattice(self) -> NodeGrid:
-        """The nodes of the displacement field; needs no mesh."""
-        return field_lattice(self.section)
+        """The nodes of the displacement field: those of the body where there is one; needs no mesh."""
+        return self.body.lattice if "body" in vars(self) else field_lattice(self.section)
 
     @cached_property
     def body(self) -> Body:
