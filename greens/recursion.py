@@ -161,7 +161,7 @@ def late_answers(response: Response, step: float, scheme: str) -> sparse.csr_mat
 
 
 @dataclass(frozen=True)
-class Spread:
+class StateDistribution:
     """States dealt in turn to the processes of `comm`, except the first `idle` ones."""
 
     comm: MPI.Comm
@@ -318,7 +318,7 @@ class Recursion:
         self.comm = comm
         self.step = step
         self._idle = int(look_ahead and comm.size > 1)  # processes without states, the root first
-        self._spread = Spread(comm, self._idle)
+        self._spread = StateDistribution(comm, self._idle)
         mine = self._spread.mine(np.arange(len(response.eigenvalue)))
         s = response.eigenvalue[mine]
         old, new = weights(s * step, step, scheme)

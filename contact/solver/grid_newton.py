@@ -208,7 +208,7 @@ class _Step:
         self._solver, self._brush = solver, solver.friction
         self._open, self._free, self._read = gap, free, read
         self._tolerance = tolerance
-        share, past = self._brush.offer()
+        share, past = self._brush.trial_displacement()
         self._bears = share > 1e-9
         share = np.where(self._bears, share, 1.0)
         self._past, self._spring = past / share, 1.0 / (self._brush.stiffness * share)

@@ -278,7 +278,7 @@ class BrushFriction:
         """Number of steps so far in which normal and horizontal forces each took the other's of the step before."""
         return int(self.compiled.lagged)
 
-    def offer(self) -> tuple[Array, Array]:
+    def trial_displacement(self) -> tuple[Array, Array]:
         """share (c,) and past (2, c) m of a bristle's deflection share u + past at the end of the step (contact.tread.brush)."""
         share, past = np.empty(len(self._touched)), np.empty((2, len(self._touched)))
         _C.brush_offer(self.compiled, COMPILED.doubles(share), COMPILED.doubles(past))
