@@ -114,15 +114,11 @@ def _splits(
         ring = repeated(matrix, sites) if waves else None
         if ring is not None:
             yield _Split([ring.wave(n, team) for n in ring.waves], ring.defect, ring.segments)
-        found_symmetries = symmetries(matrix, sites)
-        if found_symmetries:
-            parts: list[SymmetricPart] = [
-                *sectors(matrix, [symmetry.image for symmetry in found_symmetries], team)
-            ]
-            names = tuple(symmetry.isometry.name for symmetry in found_symmetries)
-            yield _Split(
-                parts, sum(symmetry.defect for symmetry in found_symmetries), symmetries=names
-            )
+        found = symmetries(matrix, sites)
+        if found:
+            parts: list[SymmetricPart] = [*sectors(matrix, [one.image for one in found], team)]
+            names = tuple(one.isometry.name for one in found)
+            yield _Split(parts, sum(one.defect for one in found), symmetries=names)
     yield _Split([whole(matrix, team)])
 
 
@@ -161,21 +157,19 @@ class _Problem:
             )
         return self._together(split, spectrum.slices(boundaries), min(count, proof.inertia), proof)
 
-    def _together(self, split: _Split, slices: list[Slice], count: int, proof: _Proof) -> Modes:
+    def _together(self, split: _Split, found: list[Slice], count: int, proof: _Proof) -> Modes:
         """The lowest `count` modes of all slices, orthonormal and by rule, with residuals.
         Collective.
         """
         parts, bottom = split.parts, proof.bottom
-        values = np.concatenate([part_slice.values for part_slice in slices])
+        values = np.concatenate([one.values for one in found])
         values[values <= bottom.zero] = 0.0
-        order, group = ordered(values, _families(parts, slices), self._same(values))
+        order, group = ordered(values, _families(parts, found), self._same(values))
         # Rotate a group as a whole, even if the last mode divides it.
         end = int(np.searchsorted(group, group[count - 1], side="right"))
         order, group = order[:end], group[:end]
-        vectors = collect(self.scaled, parts, slices, order, self.team)
-        part = np.concatenate(
-            [np.full(len(part_slice.values), part_slice.part) for part_slice in slices]
-        )[order]
+        vectors = collect(self.scaled, parts, found, order, self.team)
+        part = np.concatenate([np.full(len(one.values), one.part) for one in found])[order]
         defect = orthonormalise(self.comm, vectors, part)
         vectors /= np.sqrt(self.mass)[:, None]
         normalise_modes(self.comm, vectors, self.rank, group)
@@ -189,7 +183,7 @@ class _Problem:
             counted_below=proof.top,
             rigid=int((squares == 0).sum()),
             sectors=tuple(part.matrix.shape[1] * part.copies for part in parts),
-            slices=len(slices),
+            slices=len(found),
             segments=split.segments,
             symmetries=split.symmetries,
         )
@@ -242,11 +236,10 @@ class _Problem:
         return np.sqrt(summed(self.comm, defects)) / np.maximum(squares, least)
 
 
-def _families(parts: list[SymmetricPart], slices: list[Slice]) -> np.ndarray:
+def _families(parts: list[SymmetricPart], found: list[Slice]) -> np.ndarray:
     """(k,) a number for each eigenpair: of its part and, within it, of the copy."""
     most = max(part.copies for part in parts)
     numbers = [
-        most * part_slice.part + np.arange(len(part_slice.values)) % parts[part_slice.part].copies
-        for part_slice in slices
+        most * one.part + np.arange(len(one.values)) % parts[one.part].copies for one in found
     ]
     return np.concatenate(numbers)
