@@ -390,7 +390,8 @@ class ContactProblem:
     """The contact of a step between the `patch`'s points and the road: normal, or with `friction` too.
 
     `same_step` (k, k) m/N: displacements at the end of a step of the nodes under forces on them, in z, or in z, then x,
-    then y. `solver` is made for the normal compliance A + C~.
+    then y. `solver` is made for the normal compliance A + C~. `of_nodes`: the same where the nodes move more than the contact
+    counts of it, because they have a part of the tread (contact.tread.between_nodes).
 
     A point meets the road where it lies, at its place x + u, y + v of the same instant (near flanks steeper than GENTLE only in
     part, near those of STEEP at its place at rest: on them a point has several places to rest at), and on a slope r = (r_x, r_y)
@@ -416,13 +417,15 @@ class ContactProblem:
         solver: ContactSolver,
         friction: BrushFriction | None = None,
         tolerance: float = MEETING,
+        of_nodes: Array | None = None,
     ) -> None:
         self.patch, self._solver, self._friction = patch, solver, friction
         self._tolerance = tolerance
         c = len(patch.points)
         p = c if patch.weights is None else patch.weights.shape[1]
         self.nodes, self.components = p, len(same_step) // p
-        self.answer = np.ascontiguousarray(same_step.T)  # (k, k)
+        felt = np.ascontiguousarray(same_step.T)  # (k, k)
+        self.answer = felt if of_nodes is None else np.ascontiguousarray(of_nodes.T)
         weights = sparse.identity(p, format="csr") if patch.weights is None else patch.weights
         up, down = CompressedRows(weights), CompressedRows(weights.T)
         self._q, self._free = np.zeros(c), np.zeros((2, c))
@@ -448,7 +451,7 @@ class ContactProblem:
         doubles = {
             "gap0": np.ascontiguousarray(patch.gap), "at_rest": np.ascontiguousarray(patch.force), "q": self._q,
             "free": self._free, "vertical": self.vertical, "horizontal": self.horizontal, "change": self.at_points,
-            "nodal": self.change, "resultant": self.resultant, "answer": self.answer, "normal_force": self._force,
+            "nodal": self.change, "resultant": self.resultant, "answer": felt, "normal_force": self._force,
             "tangential": self._tangential, "shift": self._shift, "lifted": np.empty(len(same_step)),
             "added": np.empty(3 * c), "value": np.empty(3 * p),
         }  # fmt: skip

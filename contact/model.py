@@ -7,10 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.contact.choices import DENSE_POINTS, MOST_TOUCHING
+from tireroad.contact.grid_patch import DeformedTread
 from tireroad.contact.patch import Patch
 from tireroad.contact.solver.conditions import ContactSolver
 from tireroad.contact.solver.projected_cg import Compliance, SpreadCompliance
 from tireroad.contact.solver.solvers import make_solver
+from tireroad.contact.tread.between_nodes import on_nodes, rastered
 from tireroad.contact.tread.kernel import KernelTread
 from tireroad.contact.tread.law import TreadLaw
 from tireroad.contact.tread.memory import TreadMemory, steady
@@ -30,6 +32,10 @@ class ContactSpec(Protocol):
     @property
     def law(self) -> TreadLaw:
         """The tread law."""
+
+    @property
+    def in_series(self) -> bool:
+        """Whether the tread lies on the tire's own rubber; else it is that rubber (contact.tread.between_nodes)."""
 
     @property
     def solver(self) -> str:
@@ -62,11 +68,13 @@ class ContactSpec(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class TreadContact:
-    """A `ContactSpec` of a tread that touches the road itself, with `friction` or without (0)."""
+    """A `ContactSpec` of a tread that touches the road itself, with `friction` or without (0); `in_series` with the tire's own
+    rubber, or that rubber itself."""
 
     law: TreadLaw
     solver: str = "auto"
     friction: float = 0.0
+    in_series: bool = True
     brush: ClassVar[str] = "rolling"
     brush_stiffness: ClassVar[float | None] = None
     brush_stiffness_per_area: ClassVar[float | None] = None
@@ -140,6 +148,25 @@ def tread_shear(spec: ContactSpec, patch: Patch, at_once: float = 1.0) -> Shear 
     if patch.places is not None:
         return KernelShear(patch.places, influence)
     return MatrixShear(patch.points[:, :2], patch.half_sizes, influence)
+
+
+def resolved_tread(spec: ContactSpec, patch: Patch, surface: DeformedTread | None) -> Array | None:
+    """Compliance that the elements resolve of a tread that is the tire's own: N (p, p) or, with shear, (3p, 3p) m/N between the nodes.
+
+    `surface`: the deformed tread of a grid of points. None of a tread in series, and at nodes, where the elements have all of it.
+    InputError for a tread that creeps, of which this is not known.
+    """
+    if spec.in_series or patch.places is None:
+        return None
+    if spec.law.creep is not None:
+        raise InputError(
+            "contact.in_series = false: what elements resolve of a tread that creeps is not known; take contact.tread = "
+            '"layer", whose losses are those of the elements, or contact.in_series = true'
+        )
+    assert surface is not None, "the nodes of a grid of points"
+    farthest = _farthest(patch)
+    shear = spec.law.shear(farthest) if spec.has_shear else None
+    return on_nodes(rastered(surface, patch), spec.law.influence(farthest), shear)
 
 
 def _spread(patch: Patch, tire: Array) -> Array:

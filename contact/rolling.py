@@ -14,6 +14,7 @@ from tireroad.contact.patch import Patch
 from tireroad.contact.setup import ContactSetup, SteadyRolling
 from tireroad.contact.solver.conditions import Array
 from tireroad.contact.solver.stick_slip import TOLERANCE, BrushFriction
+from tireroad.contact.tread.between_nodes import without
 from tireroad.contact.tread.brush import Brush, BrushLaw, next_ahead
 from tireroad.fem.errors import ConvergenceError
 from tireroad.greens.response import Response
@@ -40,12 +41,13 @@ def make_loop(
     InputError if the contact problem is not affordable or has no unique solution. Collective when the tire looks ahead.
     """
     patch = setup.patch
-    p = len(patch.index)
+    p, felt = len(patch.index), without(tire.same_step, setup.resolved)
     memory = tread_memory(spec, patch, setup.rolled.speed, step)
     at_once = memory.at_once if memory else 1.0
-    solver = step_solver(spec, patch, tire.same_step[:p, :p], at_once)
-    friction = _friction(spec, setup, tire, step, at_once, tolerance) if spec.has_friction else None
-    loop = Loop(tire, ContactProblem(patch, tire.same_step, solver, friction), memory)
+    solver = step_solver(spec, patch, felt[:p, :p], at_once)
+    friction = _friction(spec, setup, felt, step, at_once, tolerance) if spec.has_friction else None
+    problem = ContactProblem(patch, felt, solver, friction, of_nodes=tire.same_step)
+    loop = Loop(tire, problem, memory)
     return loop.begun_at(setup.steady.state, setup.steady.change) if setup.steady else loop
 
 
@@ -61,27 +63,28 @@ def bristles(spec: ContactSpec, patch: Patch) -> float | Array | None:
 def _friction(
     spec: ContactSpec,
     setup: ContactSetup,
-    tire: LinearTire,
+    felt: Array,
     step: float,
     at_once: float,
     tolerance: float,
 ) -> BrushFriction:
-    """The brush at rest.
+    """The brush at rest, on a tire of the compliance `felt` (3p, 3p) m/N.
 
     Shear of the tread by pressure counts from the static state, like all motion. If the slip of the
     static shape counts (free rolling), the shear of its tread does too, except for a tread that
-    creeps.
+    creeps, and for one that is the tire's own, whose elements have it in that shape.
     """
     patch, stiffness = setup.patch, bristles(spec, setup.patch)
     assert stiffness is not None
     shear, pressed, moved = tread_shear(spec, patch, at_once), None, None
-    if shear is not None and setup.shape_slip is not None and spec.law.creep is None:
+    beside = spec.in_series and spec.law.creep is None
+    if shear is not None and setup.shape_slip is not None and beside:
         drag = shear.drag(patch.force)
         pressed, moved = np.zeros(len(patch.points)), np.stack([drag.real, drag.imag], axis=-1)
     law = BrushLaw(stiffness, spec.friction, setup.slips, spec.brush)
     brush = Brush(law, patch.points[:, 0], patch.line, setup.rolled.speed, step)
     brush.begin(patch.force > 0, moved)
-    return BrushFriction(brush, tire.same_step, patch.weights, shear, pressed, tolerance)
+    return BrushFriction(brush, felt, patch.weights, shear, pressed, tolerance)
 
 
 class StaticTire:

@@ -10,11 +10,12 @@ import numpy as np
 
 from tireroad.contact.grid_patch import DeformedTread, equilibrate, make_grid_patch, spread_pull
 from tireroad.contact.loop import Drive, no_motion
-from tireroad.contact.model import ContactSpec, static_solver
+from tireroad.contact.model import ContactSpec, resolved_tread, static_solver
 from tireroad.contact.patch import LEAST_REACH, Patch, make_patch
 from tireroad.contact.roads.cell_mean import CellMean
 from tireroad.contact.roads.kinds.shapes import Flat
 from tireroad.contact.roads.under_tire import NOTHING, PreparedRoad, RoadUnderTire
+from tireroad.contact.tread.between_nodes import before_equilibrium
 from tireroad.contact.tread.brush import shape_slip
 from tireroad.contact.tread.pattern import Pattern
 from tireroad.fem.static.road import RoadShape
@@ -88,13 +89,16 @@ class ContactSetup:
     (s, 2) of the static shape at the outer face's nodes, for bristles, and `pull` (s, 2) N,
     horizontal forces of a static state with friction. `free`: the slip of free rolling is still to be found; `free_slip`:
     that slip, which is part of `slip`;
-    `steady`: the state of steady rolling in which a loop begins (contact.rolling.rolling_steadily).
+    `steady`: the state of steady rolling in which a loop begins (contact.rolling.rolling_steadily). `surface`: the deformed tread under a
+    grid of points; `resolved` (p, p) or (3p, 3p) m/N: what the nodes have of the tread, which the contact counts less of them (contact.model.resolved_tread), once settled.
     """
 
     patch: Patch
     reach: float
     road: PreparedRoad
     rolled: Rolled
+    surface: DeformedTread | None = None
+    resolved: np.ndarray | None = None
     pattern: Pattern | None = None
     slip: tuple[float, float] = (0.0, 0.0)
     shape_slip: np.ndarray | None = None
@@ -218,11 +222,15 @@ class ContactSetup:
             patch = replace(patch, gap=patch.gap + self.begun)
         p = len(patch.index)
         flexibility = (response.static() + response.residual)[:p, :p]
+        resolved = resolved_tread(spec, patch, self.surface)
+        if resolved is not None:
+            normal = resolved[:p, :p]
+            flexibility, patch = flexibility - normal, before_equilibrium(patch, normal, force)
         solver = static_solver(spec, patch, flexibility, self.rolled.speed)
         settled, rise = equilibrate(patch, solver, flexibility, force)
         if pull is not None:
             settled = replace(settled, pull=spread_pull(settled, pull, force))
-        return replace(self, patch=settled), rise
+        return replace(self, patch=settled, resolved=resolved), rise
 
 
 def freely_rolling(
@@ -265,7 +273,13 @@ def contact_setup(
         pattern.land(patch.points[~patch.edge, 1])
     under = _under(road, patch, rolled)
     return ContactSetup(
-        patch=patch, reach=reach, road=under, rolled=rolled, pattern=pattern, pull=face.pull
+        patch=patch,
+        reach=reach,
+        road=under,
+        rolled=rolled,
+        pattern=pattern,
+        pull=face.pull,
+        surface=surface,
     )
 
 

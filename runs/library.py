@@ -41,6 +41,7 @@ from tireroad.fem.matrices import probe
 from tireroad.fem.model import SmallMotions, TireModel
 from tireroad.fem.parallel import on_root
 from tireroad.fem.parameters import plain
+from tireroad.fem.sections.mesh2d import Ring, crown_layer
 from tireroad.fem.sections.torus import Torus
 from tireroad.fem.static.footprint import Footprint
 from tireroad.fem.static.press import press as press_tire
@@ -67,7 +68,7 @@ from tireroad.runs.scene.physics import make_tire, rolling_shape, run_in_time
 from tireroad.runs.scene.rules import barred_from_contact
 from tireroad.runs.scene.sections.radial import RadialSection
 from tireroad.runs.scene.sections.torus import TorusSection
-from tireroad.runs.scene.tables.contact import DRY_ASPHALT
+from tireroad.runs.scene.tables.contact import DRY_ASPHALT, TREAD_RUBBER
 from tireroad.runs.scene.tables.tire import NEAR_ROAD, TireTable
 
 # Arguments that are one number.
@@ -627,7 +628,8 @@ def drive(
     """Roll the tire over the road for `duration` s.
 
     `step` s: time step, by default small enough for the fastest mode. `tread`: a law of
-    contact.tread.laws, by default a half-space of 10 MPa. `spacing` (m, or m, m along and across) of
+    contact.tread.laws, which lies on the tire's own tread; by default a half-space of 10 MPa, and with a `spacing` on a tire with
+    cords what its elements do not resolve of its tread, a layer of 10 MPa (contact.tread.between_nodes). `spacing` (m, or m, m along and across) of
     a grid of contact points, by default the nodes of the mesh. `friction`: coefficient between tread and road,
     where the tread shears (half-space, layer, viscoelastic); 0: none, and horizontal forces come from the road's
     slope alone.
@@ -638,7 +640,7 @@ def drive(
     Collective.
     """
     check_times(duration, duration if step is None else step)
-    law, pitches = _law(tread), _pitches(spacing)
+    pitches = _pitches(spacing)
     motions, turning = tire.standing.motions, tire.states.turning
     static = motions.static
     _check_motions(motions)
@@ -648,7 +650,9 @@ def drive(
     setup = contact_setup(static, motions.lattice, road, rolled, spacing=pitches)
     if not (math.isfinite(friction) and friction >= 0.0):
         raise InputError(f"drive: friction = {friction!r} must be a number of 0 or more")
-    spec = TreadContact(law=law, friction=friction)
+    own = tread is None and pitches is not None and bool(motions.tire.section.section.plies)
+    law = _own_tread(motions.tire.section) if own else _law(tread)
+    spec = TreadContact(law=law, friction=friction, in_series=not own)
     if spec.has_friction and rolled.speed > 0:
         setup = freely_rolling(setup, static, motions.lattice.ring, static.rolling_radius())
     followed = (2, 0, 1) if spec.has_friction or setup.leans else (2,)
@@ -674,10 +678,16 @@ def _check_motions(motions: SmallMotions) -> None:
         raise InputError(f"drive: modes with {key} {why}")
 
 
+def _own_tread(ring: Ring) -> TreadLaw:
+    """A layer of 10 MPa as thick as the tire's own tread at the crown."""
+    _, thickness = crown_layer(ring.section)
+    return TREADS.make("layer", youngs_modulus=TREAD_RUBBER, thickness=thickness)
+
+
 def _law(tread: TreadLaw | None) -> TreadLaw:
     """The tread law, by default a half-space of 10 MPa."""
     if tread is None:
-        return TREADS.make("half-space", youngs_modulus=1e7)
+        return TREADS.make("half-space", youngs_modulus=TREAD_RUBBER)
     if isinstance(tread, TreadLaw):
         return tread
     raise InputError(
@@ -716,9 +726,9 @@ def _blocks(
 ) -> list[Block]:
     """Run the time loop with the integration scheme that suits the contact. Collective."""
     resolved = response.resolved(chosen.size)
-    scheme = choose(
-        oscillation(spec, setup.patch, resolved, chosen.size, bristles(spec, setup.patch))
-    ).scheme
+    patch, rubbed = setup.patch, bristles(spec, setup.patch)
+    steps = oscillation(spec, patch, resolved, chosen.size, rubbed, setup.resolved)
+    scheme = choose(steps).scheme
     recursion = Recursion(response=resolved, step=chosen.size, scheme=scheme, comm=comm)
     loop = make_loop(spec, setup, recursion, chosen.size)
     return list(loop.roll(setup.drive, chosen.size, chosen.count))

@@ -24,6 +24,7 @@ from scipy import linalg
 
 from tireroad.contact.model import ContactSpec, touching_compliance, tread_shear
 from tireroad.contact.patch import Patch
+from tireroad.contact.tread.between_nodes import without
 from tireroad.fem.errors import ConvergenceError
 from tireroad.greens.recursion import alternating, at_once
 from tireroad.greens.response import Response
@@ -111,19 +112,20 @@ def oscillation(
     response: Response,
     step: float,
     bristles: Stiffness | None = None,
+    resolved: np.ndarray | None = None,
 ) -> float:
     """Steps (2 or more, inf) per fastest oscillation of points touching at rest, linear forces.
 
     `step` in s. `response` as the loop uses it (Response.resolved); its first inputs and outputs
     are the patch's nodes, with horizontal forces in z, then x and y. `bristles` N/m of each point,
-    inf if rigid, None: no horizontal forces. The points are taken to stick, so the result is a
+    inf if rigid, None: no horizontal forces. `resolved` m/N: what the nodes have of the tread (ContactSetup). The points are taken to stick, so the result is a
     lower bound. Of more than `MOST` points those nearest to their middle are taken.
     """
     index = _nearest(patch, MOST)
     if len(index) == 0:
         return math.inf
     p = len(patch.index)
-    whole = -alternating(response, step), at_once(response)
+    whole = -alternating(response, step), without(at_once(response), resolved)
     seen = [matrix[:p, :p] for matrix in whole]
     approach = _between(patch, seen[0], index)
     mu = _largest(approach, touching_compliance(spec, patch, seen[1], index))

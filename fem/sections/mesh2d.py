@@ -673,13 +673,27 @@ def section_angles(section: SectionMesh) -> np.ndarray:
     return (length - middle) / length[-1] * (angle[-1] - angle[0])
 
 
-def wall_thickness(section: SectionMesh) -> float:
-    """Area over mean length of inner and outer face, m."""
+def crown_layer(section: SectionMesh) -> tuple[int, float]:
+    """Number of the region that is the outer face at the crown, and how thick (m) it is there: area over width."""
+    cell = section.outer[len(section.outer) // 2, 0]
+    middle = section.nodes[section.cells].mean(axis=1)
+    low, high = np.sort(section.nodes[section.cells[cell], 1])[[0, -1]]
+    own = section.region == section.region[cell]
+    under = own & (middle[:, 1] > low) & (middle[:, 1] < high)
+    return int(section.region[cell]), float(cell_areas(section)[under].sum() / (high - low))
+
+
+def cell_areas(section: SectionMesh) -> np.ndarray:
+    """Area (m2) of each cell between its corners."""
     corners = section.nodes[section.cells[:, [0, section.order, -1, -1 - section.order]]]
     x, y = corners[..., 0], corners[..., 1]
-    area = 0.5 * abs((x * np.roll(y, -1, 1) - y * np.roll(x, -1, 1)).sum(axis=1)).sum()
+    return 0.5 * np.abs((x * np.roll(y, -1, 1) - y * np.roll(x, -1, 1)).sum(axis=1))
+
+
+def wall_thickness(section: SectionMesh) -> float:
+    """Area over mean length of inner and outer face, m."""
     lengths = [
         np.linalg.norm(np.diff(section.nodes[section.side(face)], axis=1), axis=2).sum()
         for face in (section.inner, section.outer)
     ]
-    return float(2 * area / sum(lengths))
+    return float(2 * cell_areas(section).sum() / sum(lengths))

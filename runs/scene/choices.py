@@ -12,11 +12,13 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from tireroad.contact.choices import USABLE
-from tireroad.contact.tread.laws.elastic import ElasticTread
+from tireroad.contact.tread.laws.elastic import ElasticLayer, ElasticTread
 from tireroad.fem.parameters import second_digit
+from tireroad.fem.sections.mesh2d import crown_layer
 from tireroad.fem.tire.material import REFERENCE, wlf
 from tireroad.runs.scene.plan import skipped
 from tireroad.runs.scene.schema import Pitch, Source
+from tireroad.runs.scene.tables.contact import TREAD_RUBBER
 from tireroad.runs.scene.tables.scene import (
     DampingTable,
     ModalTable,
@@ -40,9 +42,6 @@ LOOSER = 0.01  # rotation.shape_tolerance where errors count in dB: docs/verific
 ON_A_WAVE, CLOSE = 8.0, 4e-3  # -, m
 UNHEARD = 1.2  # times the band's upper edge: the rolling radius is not known yet
 COARSE_UP_TO = 450.0  # Hz: to there 24 segments of 16 elements carry the waves of a radial tire
-TREAD_RUBBER = (
-    1e7  # Pa: contact.youngs_modulus of a radial tire, whose own tread is taken for usual
-)
 
 
 @dataclass(frozen=True)
@@ -181,6 +180,28 @@ def tread_rubber(scene: Scene, file: SceneFile) -> Scene:
     )
 
 
+def own_tread(scene: Scene, file: SceneFile) -> Scene:
+    """A contact that counts only for what the elements do not resolve of the tire's tread, where the scene leaves the tread open."""
+    contact, tire = scene.contact, scene.tire
+    if contact is None or {"tread", "in_series"} & file.keys("contact").keys():
+        return scene
+    if contact.on_nodes or contact.has_bristles or not isinstance(contact.law, ElasticLayer):
+        return scene
+    section = tire.shape.ring(tire).section
+    region, thickness = crown_layer(section)
+    rubber = tire.shape.rubbers(tire)[section.regions[region]].at(scene.temperature)
+    own = {"thickness": float(f"{thickness:.4g}")}
+    if tire.section != "radial":
+        own["youngs_modulus"] = float(f"{rubber.dynamic * rubber.law.youngs:.4g}")
+    changes = {key: value for key, value in own.items() if key not in file.keys("contact")}
+    law = replace(contact.law, **changes)
+    file.say(
+        f"contact.in_series = false: of the tire's tread, {1e3 * law.thickness:.3g} mm of {1e-6 * law.youngs_modulus:.3g} MPa, the "
+        "contact counts what the elements do not resolve"
+    )
+    return replace(scene, contact=replace(contact, law=law, in_series=False))
+
+
 def warmth(scene: Scene, file: SceneFile) -> Scene:
     """Say what another temperature than that of the compounds makes of pressure and moduli."""
     if scene.temperature != REFERENCE:
@@ -279,6 +300,7 @@ CHOICES = (
     Choice(damping, TIRE),
     Choice(warmth),
     Choice(tread_rubber, TIRE, of="contact"),
+    Choice(own_tread, TIRE, of="contact"),
     Choice(wheel_speed, TIRE, of="rotation"),
     Choice(points, TIRE, where=has_band),
     Choice(flat_road, of="contact"),

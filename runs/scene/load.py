@@ -167,16 +167,17 @@ def _given(path: Path_, changed: Set[Path_]) -> bool:
     )
 
 
-def by_section(raw: dict[str, Any]) -> None:
-    """Set what follows from the kind of section: a mesh's section, a section's tread."""
+def by_section(raw: dict[str, Any]) -> dict[str, Any]:
+    """The tables with what follows from the kind of section: a mesh's section, a section's tread."""
     tire, contact = raw.get("tire"), raw.get("contact")
     if not isinstance(tire, dict):
-        return
+        return raw
     if "mesh" in tire:
-        tire.setdefault("section", "file")
+        tire = {"section": "file"} | tire
     kind = tire.get("section")
     if isinstance(contact, dict) and isinstance(kind, str) and kind in SECTIONS:
-        contact.setdefault("tread", SECTIONS[kind].tread_law)
+        contact = {"tread": SECTIONS[kind].tread_law} | contact
+    return raw | {"tire": tire} | ({} if contact is None else {"contact": contact})
 
 
 def with_merged(scene: Scene, file: SceneFile) -> Scene:
@@ -223,15 +224,15 @@ def load(
     raw.setdefault("name", scene_name(path.stem))
     if changed:
         drop_unused(Scene, raw, changed, say)
-    by_section(raw)
-    scene = _table(Scene, raw, (), source)
+    filled = by_section(raw)
+    scene = _table(Scene, filled, (), source)
     if not NAME.fullmatch(scene.name):
         source.add(
             ("name",), f"must be letters, digits, '.', '_', '-', not {described(scene.name)}"
         )
     file = SceneFile(raw, until, source, say)
     scene = chosen(with_merged(scene, file), file)
-    rules.check(scene, raw, source)
+    rules.check(scene, filled, source)
     source.refuse()
     return scene
 

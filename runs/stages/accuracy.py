@@ -35,11 +35,12 @@ from tireroad.contact.tread.between_nodes import (
     before_equilibrium,
     on_nodes,
     over_rectangles,
+    rastered,
 )
 from tireroad.contact.tread.compliance import Influence
 from tireroad.contact.tread.laws.elastic import ElasticLayer, HalfSpace
 from tireroad.fem.errors import ConvergenceError, InputError
-from tireroad.fem.sections.mesh2d import Ring
+from tireroad.fem.sections.mesh2d import Ring, crown_layer
 from tireroad.fem.static.load_error import carried_over
 from tireroad.fem.static.state import StaticState
 from tireroad.greens.fewer_modes import of_fewer_modes
@@ -117,8 +118,10 @@ def backed(job: Job, static: StaticState, setup: ContactSetup, response: Respons
     plane, bristles, a tread that creeps.
     """
     contact, patch = job.scene.contact, setup.patch
+    if not contact.in_series:
+        raise InputError("the run's own tread is what its mesh does not resolve")
     if (
-        patch.weights is None
+        setup.surface is None
         or patch.frames is not None
         or contact.has_bristles
         or contact.law.creep
@@ -127,7 +130,7 @@ def backed(job: Job, static: StaticState, setup: ContactSetup, response: Respons
             "the compliance of the wall between nodes is known only for a grid of points on a plane road without bristles"
         )
     wall = over_rectangles(_outer(job.scene, job.tire.section))
-    known = on_nodes(patch, static.area, wall)
+    known = on_nodes(rastered(setup.surface, patch), wall)
     count = len(patch.index)
     residual = response.residual.copy()
     residual[:count, :count] -= known
@@ -138,15 +141,10 @@ def backed(job: Job, static: StaticState, setup: ContactSetup, response: Respons
 
 def _outer(scene: Scene, ring: Ring) -> Influence:
     """Influence of the crown's compound, as warm as the tire: a half-space if it is the whole wall, else a layer."""
-    tire, section = scene.tire, ring.section
-    cell = section.outer[len(section.outer) // 2, 0]
-    region = section.regions[section.region[cell]]
-    material = tire.shape.in_layers(tire)[region].at(scene.temperature)
+    tire, (region, thickness) = scene.tire, crown_layer(ring.section)
+    layers = tire.shape.in_layers(tire)
+    material = layers[ring.section.regions[region]].at(scene.temperature)
     modulus = material.dynamic * material.law.youngs
-    middle = section.nodes[section.cells].mean(axis=1)
-    low, high = np.sort(section.nodes[section.cells[cell], 1])[[0, -1]]
-    under = (section.region == section.region[cell]) & (middle[:, 1] > low) & (middle[:, 1] < high)
-    thickness = float(np.ptp(section.nodes[section.cells[under], 0]))
     rubber = {"youngs_modulus": modulus, "poisson_ratio": material.law.poisson}
     law = (
         HalfSpace(**rubber)
@@ -224,8 +222,9 @@ class ReferenceRun:
         resolved = self.response.resolved(step)
         if len(resolved.every) < len(self.response.resolved(self.step).every):
             return self.own
-        patch = self.equilibrated.patch
-        steps = oscillation(spec, patch, resolved, step, bristles(spec, patch))
+        setup = self.equilibrated
+        rubbed = bristles(spec, setup.patch)
+        steps = oscillation(spec, setup.patch, resolved, step, rubbed, setup.resolved)
         if self.scheme == "linear" and choose(steps).scheme != "linear":
             return self.own
         try:

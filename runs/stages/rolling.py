@@ -243,7 +243,8 @@ def chosen_scheme(
     """
     scheme = job.scene.time.scheme
     spec, patch = job.scene.contact, setup.patch
-    steps = oscillation(spec, patch, plan.response, plan.step, bristles(spec, patch))
+    rubbed = bristles(spec, patch)
+    steps = oscillation(spec, patch, plan.response, plan.step, rubbed, setup.resolved)
     if math.isfinite(steps):
         record.indicators["steps in the fastest oscillation of the contact"] = (steps, "-")
     chosen = Chosen(scheme, f'time.scheme = "{scheme}"')

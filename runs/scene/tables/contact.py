@@ -23,6 +23,7 @@ from tireroad.runs.scene.schema import (
 )
 
 DRY_ASPHALT = 1.0  # coefficient of friction of a passenger tire
+TREAD_RUBBER = 1e7  # Pa: contact.youngs_modulus of a radial tire, whose own tread is usual
 
 
 @dataclass(frozen=True)
@@ -92,6 +93,12 @@ class ContactTable(Variants):
         "local compliance of the tread; absent, on section radial or file: layer, because belts hardly deform",
     )
     law: TreadLaw = variant("tread", TREADS)
+    in_series: bool = flag(
+        True,
+        "true: the tread lies on the tire's own outer rubber, in series with it; false: it is that rubber, and counts only for "
+        "what the elements do not resolve of it, on a grid of points; absent, on section radial or file where tread is absent "
+        "too, on a grid and without bristles: false, and thickness and (on a file) youngs_modulus are those of the tire's tread",
+    )
     points: str | Pitch = points(
         "contact points: the nodes of the mesh, or a grid with this spacing; auto: a grid as fine as the footprint and "
         "the waves up to accuracy.up_to require, or the nodes under a tread without compliance or with bristles counted "
@@ -186,6 +193,18 @@ def check_tread(contact: ContactTable, standing: bool, error: Where, has_frictio
             ("contact", "tread"),
             "= a tread that creeps needs a grid: contact.points = { dx, dy } (m)",
         )
+    if not contact.in_series:
+        if contact.law.creep is not None:
+            raise error(
+                ("contact", "in_series"),
+                '= false: what elements resolve of a tread that creeps is not known: take contact.tread = "layer", whose losses '
+                "are those of the elements, or true",
+            )
+        if contact.on_nodes:
+            raise error(
+                ("contact", "in_series"),
+                "= false: nodes have all of the tire's tread: take contact.points = { dx, dy } (m), or true",
+            )
     if None not in (contact.brush_stiffness, contact.brush_stiffness_per_area):
         raise error(
             ("contact", "brush_stiffness_per_area"), "and brush_stiffness are two brushes: keep one"

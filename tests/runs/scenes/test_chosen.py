@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 from full_scene import CONTRACT, refused
 
+from tireroad.fem.errors import InputError
 from tireroad.runs.cli import main
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.resolved import dumps
@@ -116,3 +117,52 @@ def test_run_says_what_it_dropped(launch, path: Path, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert done.stdout.count(NOTE) == 1
     assert NOTE in (out / "log.txt").read_text(encoding="utf-8")
+
+
+RADIAL = """[tire]
+section = "radial"
+[static]
+load = 4000.0
+inflation = 2.2e5
+[time]
+[contact]
+"""
+
+
+@pytest.mark.parametrize(
+    ("contact", "in_series", "thickness"),
+    [
+        ("", False, 7.95e-3),
+        ("thickness = 6e-3", False, 6e-3),
+        ('tread = "layer"', True, 10e-3),
+        ("in_series = true", True, 10e-3),
+        ('points = "nodes"', True, 10e-3),
+        ("brush_stiffness_per_area = 1e8", True, 10e-3),
+    ],
+)
+def test_a_contact_that_is_left_open_is_the_tires_own_tread(
+    scene_file, contact: str, in_series: bool, thickness: float
+) -> None:
+    """The tread of 205/60 R15 is 8 mm thick at the crown."""
+    said: list[str] = []
+    scene = load(scene_file(RADIAL + contact), [], said.append)
+    assert scene.contact.in_series is in_series
+    assert scene.contact.law.thickness == pytest.approx(thickness, rel=0.01)
+    assert any("in_series" in line for line in said) is not in_series
+    again = load(scene_file(dumps(scene), "resolved.toml"))
+    assert again.contact == scene.contact
+
+
+@pytest.mark.parametrize(
+    ("contact", "why"),
+    [
+        ('points = "nodes"\nin_series = false', "nodes have all"),
+        (
+            'tread = "viscoelastic"\npoints = { dx = 5e-3, dy = 5e-3 }\nin_series = false',
+            "creeps is not known",
+        ),
+    ],
+)
+def test_a_tread_of_the_tires_own_where_that_is_not_known(scene_file, contact, why) -> None:
+    with pytest.raises(InputError, match=f"contact.in_series = false.*{why}"):
+        load(scene_file(RADIAL + contact))
