@@ -32,6 +32,7 @@ from tireroad.modal.corner import READINGS
 from tireroad.modal.solver.slicing import Modes
 
 Array = np.ndarray
+Yields = Callable[[Array], Array]
 
 TOLERANCE = 1e-3  # of s, over the tire's whole motion in the same measure
 FLOOR = 0.1  # J^(1/2): of that motion
@@ -39,6 +40,7 @@ TURNS, STALE = 25, 6  # evaluations of a step at most; after so many the derivat
 SPACES = 1e-9  # of a motion: changes that say nothing of the derivative
 # Evaluations from which on a rest of this share of the motion is small enough.
 ENOUGH, ROUGH = 13, 2e-2
+CAUTIOUS = 0.3  # of the tolerance: rest that a step leaves, if as much as the last one did, for it not to be evaluated
 
 
 def large_response(
@@ -107,16 +109,18 @@ class _Newton:
     the next; where that does not do it, taken anew.
 
     The contact is solved to a tolerance of its own (contact.loop.MEETING), by which s(s) jumps: where the rest falls no further,
-    the best s is taken if its rest is small.
+    the best s is taken if its rest is small. `settled`: the s that `next` gave needs no evaluation.
     """
 
     def __init__(self, count: int) -> None:
         self.derivative = np.eye(count)
+        self.left = 1.0  # of a rest by the last step that was evaluated
         self.taken = self.rough = 0  # derivatives taken anew; solutions that stay at the best s
 
     def begin(self) -> None:
         """A solution begins."""
-        self._turns, self._last = 0, False
+        self._turns, self.settled = 0, False
+        self._off = np.inf
         self._tried: tuple[Array, Array] | None = None
         self._best: tuple[float, Array] = (np.inf, np.zeros(0))
 
@@ -126,7 +130,7 @@ class _Newton:
         """The next s to be evaluated, None if this one is found; `size` J^(1/2) of the motion. ConvergenceError after 25
         evaluations."""
         off = float(np.linalg.norm(rest)) / size
-        if off <= TOLERANCE or self._last:
+        if off <= TOLERANCE:
             return None
         self._turns += 1
         if off < self._best[0]:
@@ -137,7 +141,7 @@ class _Newton:
                 'motion.kind = "linear"'
             )
         if self._turns >= ENOUGH and self._best[0] <= ROUGH:
-            self._last = True
+            self.settled = True
             self.rough += 1
             return self._best[1]
         if self._turns % STALE == 0:
@@ -148,7 +152,10 @@ class _Newton:
             if step @ step > (SPACES * size) ** 2:
                 lacking = change - self.derivative @ step
                 self.derivative += np.outer(lacking, step) / (step @ step)
-        self._tried = s, rest
+        if np.isfinite(self._off):
+            self.left = off / self._off
+        self.settled = off * self.left <= CAUTIOUS * TOLERANCE
+        self._tried, self._off = (s, rest), off
         return s - np.linalg.solve(self.derivative, rest)
 
 
@@ -201,27 +208,33 @@ class LargeTire:
         self._newton.begin()
         return self._free - self._moved @ self.s
 
-    def settle(self, force: Array) -> Array | None:
+    def settle(self, force: Array, yields: Yields | None = None) -> Array | None:
         """None if the reduced force is that of the motion under contact forces (c,) N, else the displacements (r,) m for which
-        the contact has to be solved again. ConvergenceError after 25 evaluations."""
+        the contact has to be solved again. `yields`: changes (c, m) N of these forces by displacements (r, m) m, by default
+        none. ConvergenceError after 25 evaluations."""
         moved = self._beside + self._inside @ force - self._bent @ self.s
         self._now = moved[self._inner :]
-        found = self._next(self._newton, self.s, moved[: self._inner], self._now)
+        if self._newton.settled:
+            return None
+        found = self._next(moved[: self._inner], yields)
         if found is None:
             return None
         self.s = found
         return self._free - self._moved @ found
 
-    def _next(self, newton: _Newton, s: Array, inner: Array, read: Array) -> Array | None:
-        """The next s to be tried where the kept nodes move by `inner` and V^T K u is `read`; None if it is the right one."""
+    def _next(self, inner: Array, yields: Yields | None) -> Array | None:
+        """The next s to be tried where the kept nodes move by `inner`; None if it is the right one."""
         self.evaluations += 1
-        rest = s - (self._force.evaluate(inner) - self._begun)
-        size = max(float(np.linalg.norm(read + s)), FLOOR)
+        rest = self.s - (self._force.evaluate(inner) - self._begun)
+        size = max(float(np.linalg.norm(self._now + self.s)), FLOOR)
 
         def derivative() -> Array:
-            return np.eye(len(s)) + self._force.jacobian(inner, self._bent[: self._inner])
+            along = self._bent[: self._inner]
+            if yields is not None:
+                along = along + self._inside.columns.T[: self._inner] @ yields(self._moved)
+            return np.eye(len(rest)) + self._force.jacobian(inner, along)
 
-        return newton.next(s, rest, size, derivative)
+        return self._newton.next(self.s, rest, size, derivative)
 
     def advance(self, force: Array) -> None:
         """Set the contact forces (c,) N at the end of the step."""
@@ -259,7 +272,7 @@ class LargeTire:
         own = {
             "large_force": np.stack([self.s, self._before, self._older, self._read, self._begun]),
             "large_derivative": self._newton.derivative.copy(),
-            "large_work": np.array([self.stored, self.lead]),
+            "large_work": np.array([self.stored, self.lead, self._newton.left]),
             "large_count": np.array([self.evaluations, self.derivatives, self.rough]),
         }
         return self._linear.snapshot() | own
@@ -268,7 +281,7 @@ class LargeTire:
         """Continue from a snapshot. Collective when looking ahead."""
         self.s, self._before, self._older, self._read, self._begun = state["large_force"].copy()
         self._newton.derivative = state["large_derivative"].copy()
-        self.stored, self.lead = state["large_work"].tolist()
         newton = self._newton
+        self.stored, self.lead, newton.left = state["large_work"].tolist()
         self.evaluations, newton.taken, newton.rough = (int(n) for n in state["large_count"])
         self._linear.restore(state)
