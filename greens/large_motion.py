@@ -7,8 +7,8 @@ With K the stiffness, V (n, k) and s = V^T r of fem.nonlinear.reduced, the tire 
 
 is solved within each step, with the contact, which gives the forces f for displacements w = w_free + A_ww f - A_wv s, as an
 inner problem: Newton's method on the k numbers, the derivative of s - s(u_c(s)) by Broyden's updates, kept from step to
-step. Where that does not do it is taken anew for forces f that stay, 1 + (ds/du_c) A_cv: stiffer than it is, so that no step is
-too long. (A plain fixed point diverges: ds/dq, q = V^T K u, has eigenvalues of up to 10.)
+step. Where that does not do it is taken anew, 1 + (ds/du_c) (A_cv + A_cw f'(A_wv)), f' being how the forces yield where points
+touch. (A plain fixed point diverges: ds/dq, q = V^T K u, has eigenvalues of up to 10.)
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from scipy import sparse
 
 from tireroad.fem.collective import summed
 from tireroad.fem.errors import ConvergenceError
-from tireroad.fem.matrices.compliance import on_own_rows
+from tireroad.fem.matrices.compliance import LoadedShapes, on_own_rows
 from tireroad.fem.nonlinear.force import RestoringForce
 from tireroad.fem.nonlinear.reduced import ReducedForce, at_nodes, extra_loads
 from tireroad.greens.basis import Basis, Probes
@@ -52,6 +52,7 @@ def large_response(
     force: ReducedForce,
     vectors: Array,
     loaded: int | None = None,
+    shapes: LoadedShapes | None = None,
 ) -> Response:
     """The response between forces and motions of probes, and of the reduced force.
 
@@ -59,7 +60,7 @@ def large_response(
     the motions of these c, K V, what is read at the other points, and the nodes of the kept cells (d,), relative to the
     wheel. K is what small motions have in the loop: where moduli depend on frequency, that of each mode, so that -K V s moves
     the tire by -V s at rest. `modes` on all unknowns, whose projection `basis` is; `vectors` V (n, k) on own unknowns. With
-    the exact static flexibility of all of them. Collective.
+    the exact static flexibility of all of them (`shapes`: wheel.loaded_shapes(), by default made and destroyed). Collective.
     """
     operators, comm = wheel.operators, wheel.operators.body.comm
     pushed = extra_loads(restoring, vectors)
@@ -89,7 +90,7 @@ def large_response(
     read = sparse.vstack([driven.T, own[:, c:].T, rows], format="csr")
     true = (along / basis.projection.squares) @ basis.projection.stiffness
     bases = inside(true), inside(growth * along)
-    return wheel.respond_inside(*bases, outputs, loads, read, driven)
+    return wheel.respond_inside(*bases, outputs, loads, read, driven, shapes)
 
 
 def _rows(restoring: RestoringForce, nodes: Array) -> sparse.csr_matrix:
