@@ -206,10 +206,13 @@ class IteratedTire(LinearTire, Protocol):
     """A tire whose response is known approximately (fem.nonlinear_transient).
 
     `settle` returns None if its motion under a force is in balance, else the free displacement for
-    which the contact has to be solved again.
+    which the contact has to be solved again. `yields`: how forces follow displacements (ContactProblem.yields).
     """
 
-    def settle(self, force: np.ndarray) -> np.ndarray | None: ...
+    def settle(self, force: np.ndarray, yields: Yields | None = None) -> np.ndarray | None: ...
+
+
+Yields = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -427,6 +430,8 @@ class ContactProblem:
         felt = np.ascontiguousarray(same_step.T)  # (k, k)
         self.answer = felt if of_nodes is None else np.ascontiguousarray(of_nodes.T)
         weights = sparse.identity(p, format="csr") if patch.weights is None else patch.weights
+        self._weights: sparse.csr_matrix = weights.tocsr()
+        self._slope: Array | None = None
         up, down = CompressedRows(weights), CompressedRows(weights.T)
         self._q, self._free = np.zeros(c), np.zeros((2, c))
         self._touching: Mask | None = patch.force > 0
@@ -473,33 +478,36 @@ class ContactProblem:
         """Whether bristles carry horizontal forces."""
         return self._friction is not None
 
-    def solve(self, road: RoadMet, tread: Array | None, free: Array) -> Solved:
+    def solve(self, road: RoadMet, tread: Array | None, free: Array, again: bool = False) -> Solved:
         """The forces on the `road` for displacements `free` (k,) m of the nodes without those of the step.
 
-        `tread` (1 or 3, c) m: displacements of a tread that creeps due to its past.
+        `tread` (1 or 3, c) m: displacements of a tread that creeps due to its past. `again`: the same step once more for
+        other displacements, from its last solution.
         """
         if self._at_once:
-            return self._solve_at_once(self._at_once, road, tread, free)
+            return self._solve_at_once(self._at_once, road, tread, free, again)
         if not road.leans:
-            return self._solve_at(road.known, None, tread, free)
+            return self._solve_at(road.known, None, tread, free, again)
         nodes, tips = COMPILED.doubles(free), self._friction.compiled if self._friction else _NULL
         place, found, mixed = np.empty((2, len(self._q))), np.empty((2, len(self._q))), Mixed()
-        last = self._solution.copy()
-        self._solution += last - self._before
-        self._before = last
+        if not again:
+            last = self._solution.copy()
+            self._solution += last - self._before
+            self._before = last
         COMPILED.lib.meeting_place(self._compiled, nodes, COMPILED.doubles(place))
         place *= road.follows
         for turn in range(MEETINGS):
             height, slope = road.at(place)
             force, pulled = self._force.copy(), self._tangential.copy()
             self.solutions += 1
-            solved = self._solve_at(height, slope, tread, free, again=turn > 0, rough=turn == 0)
+            first = turn == 0 and not again
+            solved = self._solve_at(height, slope, tread, free, again=not first, rough=first)
             self.commit(solved)
             COMPILED.lib.meeting_shift(self._compiled, nodes, tips)
             COMPILED.lib.meeting_place(self._compiled, nodes, COMPILED.doubles(found))
             rest = road.follows * found - place
             settled = self._settled(solved, rest, self._force - force, self._tangential - pulled)
-            if settled and (turn or not self.has_friction):
+            if settled and not (first and self.has_friction):
                 return solved
             steep = (slope * slope).sum(axis=1)
             way = np.where(
@@ -510,7 +518,7 @@ class ContactProblem:
         return solved
 
     def _solve_at_once(
-        self, solver: GridNewton, road: RoadMet, tread: Array | None, free: Array
+        self, solver: GridNewton, road: RoadMet, tread: Array | None, free: Array, again: bool
     ) -> Solved:
         """As `solve`, the road read in each Newton step."""
         given = COMPILED.doubles(free), COMPILED.doubles(self._at_zero), _NULL, _pointer(tread)
@@ -519,9 +527,8 @@ class ContactProblem:
         def read(place: Array) -> tuple[Array, Array]:
             return road.at(road.follows * place)
 
-        found = solver.solve(
-            self._q, self._free, read if road.leans else None, road.known, self._tolerance
-        )
+        reading = read if road.leans else None
+        found = solver.solve(self._q, self._free, reading, road.known, self._tolerance, again)
         self.solutions += found.turns
         self.unsettled += found.astray
         slope = found.slope if road.leans else None
@@ -565,11 +572,31 @@ class ContactProblem:
 
     def commit(self, solved: Solved) -> Array:
         """Set the solution of the step; returns the change (k,) N of the forces on the nodes."""
+        self._slope = solved.slope
         tangential = _pointer(solved.horizontal if self._friction else None)
         force = COMPILED.doubles(solved.force)
         COMPILED.lib.meeting_conclude(self._compiled, force, tangential, _pointer(solved.slope))
         self._touching = None
         return self.change
+
+    def yields(self, moved: Array) -> Array:
+        """Changes (k, m) N of the forces on the nodes by further displacements (r, m) m of them, after `commit`: of normal forces,
+        while the same points touch the road where they do.
+
+            f' = -(n A n^T + C)^-1 n w,   n = (1, -r_x, -r_y) between points that touch and nodes, C of the tread.
+        """
+        index, p = np.flatnonzero(self._force > 0.0), self.nodes
+        weights = self._weights[index]
+        normal = [weights]
+        if self.components == 3:
+            slopes = np.zeros((len(index), 2)) if self._slope is None else self._slope[index]
+            normal += [sparse.diags(-r) @ weights for r in slopes.T]
+        lean = sparse.hstack(normal, format="csr")
+        answer = self.answer.T
+        whole = (lean @ (lean @ answer).T).T
+        level = (weights @ (weights @ answer[:p, :p]).T).T
+        stiff = self._solver.block(index) + whole - level
+        return -(lean.T @ np.linalg.solve(stiff, lean @ moved[: lean.shape[1]]))
 
     def creep(self, slip: Array) -> None:
         """Set the slip (s_x, s_y), or (c, 2) at the points, of the steps to come (contact.tread.brush); with friction only."""
@@ -697,16 +724,14 @@ class Loop:
         frames, readings = contact.patch.frames, []
         for k in range(n):
             tread = memory.predict() if memory else None
-            predict, past = tire.predict, contact.state() if iterated else {}
+            solve, predict = partial(contact.solve, roads[k], tread), tire.predict
             while True:
-                solve = partial(contact.solve, roads[k], tread)
                 free, solved = together(predict, solve, contact.has_friction, roads[k].leans)
                 pushed = contact.commit(solved)
-                again = iterated.settle(pushed) if iterated else None
-                if again is None:
+                moved = iterated.settle(pushed, contact.yields) if iterated else None
+                if moved is None:
                     break
-                contact.set_state(past)
-                predict = partial(np.asarray, again)
+                solve, predict = partial(solve, again=True), partial(np.asarray, moved)
             free_all[k], change[k] = free, pushed
             tire.advance(pushed)
             if memory:
@@ -830,9 +855,16 @@ class DrivenTire:
         seen: np.ndarray = free[: self._seen] + pushed
         return seen
 
-    def _settled(self, force: np.ndarray) -> np.ndarray | None:
+    def _settled(self, force: np.ndarray, yields: Yields | None = None) -> np.ndarray | None:
         """IteratedTire.settle, of a tire that is iterated."""
-        again = self._iterated.settle(np.concatenate([force, self._history[self._step]]))
+
+        def all_yield(moved: np.ndarray) -> np.ndarray:
+            assert yields is not None, "how the contact yields"
+            given = np.zeros((self._history.shape[1], moved.shape[1]))
+            return np.concatenate([yields(moved[: self._seen]), given])
+
+        acting = np.concatenate([force, self._history[self._step]])
+        again = self._iterated.settle(acting, all_yield if yields else None)
         return None if again is None else self._pushed(again)
 
     def advance(self, force: np.ndarray) -> None:

@@ -41,11 +41,12 @@ Array = np.ndarray
 _STATE = ("displacement", "velocity", "acceleration", "balanced")
 TOLERANCE = 1e-9  # of the largest displacement
 _FLOOR = 1e-11  # of the wall's thickness: rounding of F
-MOST_TURNS = 60
+MOST_TURNS = 90
 _MOST_MET = 500  # solutions of the contact in one of them
-# An iteration that leaves more than this of what the last one left is followed by a new factor: one
-# takes as long as some ten iterations between few points, and as a hundred between many.
-SLOW = 0.3
+# Iterations of a step after which the matrix is factorised anew: that takes as long as some forty of them.
+PATIENT = 30
+SECANTS = 40  # kept at most
+_DEPENDENT = 1e-12  # squares of their singular values that are taken for none, of the largest
 _PART = 0.1  # of what is out of balance: changes of the contact's forces that are not felt
 
 
@@ -75,11 +76,15 @@ class ModalDamping:
         self._weighted = operators.mass[:, None] * fields
         self._push = self._weighted @ excess
         # Phi^T B = -(B Phi)^T: B is skew.
-        self._turned = 0.0 if body is None else -speed * multiply(body, fields)
+        self._turned = np.zeros_like(fields) if body is None else -speed * multiply(body, fields)
 
     def force(self, rate: np.ndarray) -> np.ndarray:
         """D_x rate, own rows, N, for velocities (n,) m/s. Collective."""
         return self._push @ summed(self._comm, self._weighted.T @ rate)
+
+    def carried(self, motion: np.ndarray) -> np.ndarray:
+        """K_x motion, own rows, N, for displacements (n,) m. Collective."""
+        return self._push @ summed(self._comm, self._turned.T @ motion)
 
     def solver_with(
         self, solve: Callable[[np.ndarray], np.ndarray], share: float
@@ -327,7 +332,9 @@ class FullTire:
         system.setOption(PETSc.Mat.Option.SYMMETRIC, speed == 0)
         self._columns = on_own_rows(operators, loads).toarray()
         self._modal, self._share = modal, share
-        self._take(system)
+        self._factorise(system)
+        # Full motion per unit force at the end of a step: the response of a step is then one product.
+        self._answer = self._solved_columns(self._columns)
         self._tire = len(self._mass)
         self.wheel, self._air = wheel, None
         if air or wheel:
@@ -337,15 +344,12 @@ class FullTire:
         self.displacement, self.velocity, self.acceleration, self.balanced = np.zeros((4, n))
         self._vectors = system.createVecs()
 
-    def _take(self, system: PETSc.Mat) -> None:
-        """Factorise the matrix of a step, and take what follows from it. Collective."""
+    def _factorise(self, system: PETSc.Mat) -> None:
+        """Take this matrix of a step, and its factor. Collective."""
         self._system, self._solver = system, factorise(system)
         self._with_modes = None
         if self._modal:
             self._with_modes = self._modal.solver_with(self._by_factors, self._share)
-        # Full motion per unit force at the end of a step: the response of a step is then one
-        # product.
-        self._answer = self._solved_columns(self._columns)
 
     def _with(self, air: Column | None, wheel: MovingWheel | None) -> AirStep | WheelStep:
         """Include air or wheel: append its unknowns to all arrays with one row each. Collective."""
@@ -435,8 +439,11 @@ class FullTire:
 
     def advance(self, force: np.ndarray) -> None:
         """Apply the force (k,) N at the end of the step; call after `predict`."""
+        self._move_to(self._free + self._answer @ force)
+
+    def _move_to(self, new: np.ndarray) -> None:
+        """End the step with a displacement (own rows)."""
         h, beta, gamma = self._step, self._beta, self._gamma
-        new = self._free + self._answer @ force
         moved = new - self.displacement - h * self.velocity
         acceleration = moved / (beta * h**2) - (0.5 / beta - 1) * self.acceleration
         self.velocity += h * ((1 - gamma) * self.acceleration + gamma * acceleration)
@@ -474,6 +481,51 @@ class FullTire:
         return summed(self.comm, self._carried @ self.balanced)
 
 
+class Secants:
+    """Quasi-Newton steps by least squares for x (n,) whose rest d(x) is to be 0, kept from problem to problem.
+
+    With the differences dX, dD (n, m) of the last m tries x + dX a + d + dD a follows x, a that of the least |d + dD a|
+    (IQN-ILS: Degroote, Bathe and Vierendeels 2009, doi 10.1016/j.compstruc.2008.11.013). Own rows; collective.
+    """
+
+    def __init__(self, comm: MPI.Comm) -> None:
+        self._comm = comm
+        self._moves: list[np.ndarray] = []
+        self._changes: list[np.ndarray] = []
+        self._last: tuple[np.ndarray, np.ndarray] | None = None
+
+    def begin(self) -> None:
+        """Another problem begins, near the last one."""
+        self._last = None
+
+    def state(self) -> np.ndarray:
+        """The differences (n, 2 m) between two problems."""
+        held = self._moves + self._changes
+        return np.stack(held, axis=1) if held else np.zeros((0, 0))
+
+    def set_state(self, held: np.ndarray) -> None:
+        """Continue from a `state`."""
+        count = held.shape[1] // 2
+        self._moves, self._changes = list(held.T[:count].copy()), list(held.T[count:].copy())
+
+    def next(self, x: np.ndarray, rest: np.ndarray) -> np.ndarray:
+        """The next x, from one and its rest."""
+        if self._last is not None:
+            self._moves.append(x - self._last[0])
+            self._changes.append(rest - self._last[1])
+            del self._moves[:-SECANTS], self._changes[:-SECANTS]
+        self._last = x, rest
+        if not self._moves:
+            return x + rest
+        changes = np.stack(self._changes, axis=1)
+        gram = summed(self._comm, changes.T @ np.column_stack([changes, rest]))
+        size = np.sqrt(np.maximum(gram.diagonal(), np.finfo(float).tiny))
+        squares, turn = np.linalg.eigh(gram[:, :-1] / size / size[:, None])
+        kept = squares > _DEPENDENT * squares[-1]
+        part = turn[:, kept] / squares[kept] @ (turn[:, kept].T @ (gram[:, -1] / size)) / size
+        return x + rest - (np.stack(self._moves, axis=1) + changes) @ part
+
+
 class NonlinearTire(FullTire):
     """The nonlinear tire between forces and displacements of the patch, about its static state.
 
@@ -493,9 +545,9 @@ class NonlinearTire(FullTire):
 
         A = (1 - a) M / (beta h^2) + (gamma / (beta h)) (D + 2 Omega G) + K_Omega + dF/du (u_k) - K,
 
-    that of the linear step first, and taken anew at the present motion where an iteration leaves more
-    than `SLOW` of what was out of balance. The contact is solved in each iteration. Its own matrix stays
-    that of the linear step, S_0 = W A_0^-1 W^T: for forces f' near f it is given the displacement
+    that of the linear step, and secants of it (`Secants`) kept from step to step: the nonlinear response has few shapes. The
+    factor is taken anew at the present motion where `PATIENT` iterations have not done. The contact is solved in each
+    iteration. Its own matrix stays that of the linear step, S_0 = W A_0^-1 W^T: with another factor, for forces f' near f it is given the displacement
     w(f) - S_0 f + (S - S_0) (f' - f), with f' of its last solution, and solved again until f' stays. That
     needs steps in which inertia counts: contact and tire are to respond less than twice as much as in S_0.
     """
@@ -528,16 +580,32 @@ class NonlinearTire(FullTire):
         )
         self._small = _FLOOR * operators.body.ring.thickness
         self._elastic = np.zeros(len(self._mass))
-        self._beyond = np.zeros_like(self.same_step)  # S - S_0
+        self._loads = on_own_rows(operators, loads)
+        # What is nonlinear of the motion in which a loop begins.
+        self._begun = np.zeros(len(self._mass))
         self._met = np.zeros(self.same_step.shape[1])
         self._linear: PETSc.Mat | None = None
         self._factored: np.ndarray | None = None  # the motion at which the matrix was taken
+        self._secants = Secants(self.comm)
         self.turns, self.factors = 0, 1
+
+    def start_steady(self, force: np.ndarray, sudden: np.ndarray | None = None) -> np.ndarray:
+        """FullTire.start_steady: the linear tire's motion, which is taken to be in balance, so that what is nonlinear counts
+        from there (greens.large_motion.LargeTire.start_steady)."""
+        moved = super().start_steady(force, sudden)
+        self._elastic = self._loads @ force
+        self._begun = self._restoring(self.displacement) - self._elastic
+        return moved
+
+    def _restoring(self, motion: np.ndarray) -> np.ndarray:
+        """Forces (own rows) N of a motion at rest in the non-rotating frame since the static state."""
+        found = self._force.change(motion)
+        return found + self._modal.carried(motion) if self._modal else found
 
     def predict(self) -> np.ndarray:
         """First estimate of the displacement (r,) m at the end of the step without new force."""
         self._tried, self._meetings, self._off = 0, 0, np.inf
-        self._again = False
+        self._secants.begin()
         self._free = self._predicted()
         return self._seen()
 
@@ -546,46 +614,59 @@ class NonlinearTire(FullTire):
         here = self.displacement
         return here - self._solved(self._dynamic(here) + self._elastic)
 
-    def settle(self, force: np.ndarray) -> np.ndarray | None:
+    def settle(
+        self, force: np.ndarray, yields: Callable[[np.ndarray], np.ndarray] | None = None
+    ) -> np.ndarray | None:
         """None if the motion under a force (k,) N is in equilibrium; then call `advance`.
 
         Otherwise a better displacement (r,) m without new force, for which to solve the contact
         again. Raises ConvergenceError after MOST_TURNS iterations.
         """
-        felt = float(abs(self._beyond @ (force - self._met)).max(initial=0.0))
+        felt = float(abs(self._beyond(force - self._met)).max(initial=0.0))
         self._met = force.copy()
-        new = self._free + self._answer @ force
+        new = self._free + self._pushed(force)
         size = self._largest(new)
         enough = TOLERANCE * size + self._small
         if felt > max(_PART * min(self._off, size), enough) and self._meetings < _MOST_MET:
             self._meetings += 1
             return self._seen()
         self._tried, self._meetings = self._tried + 1, 0
-        elastic = self._force.change(new)
-        defect = self._dynamic(new) + elastic - self._columns @ force
+        elastic = self._restoring(new) - self._begun
+        defect = self._dynamic(new) + elastic - self._loads @ force
         change = self._solved(defect)
         off = self._largest(change)
         self.turns += 1
         if max(off, felt) <= enough:
-            self._elastic = elastic
+            self._elastic, self._new = elastic, new
             return None
         if self._tried > MOST_TURNS or not np.isfinite(off):
             raise self._stuck(off, size)
-        if off > self._off and not self._again:
-            # Too far from the motion of the step before to be led back.
-            self._again, self._off = True, np.inf
-            self._factor_at(self.displacement)
-            self._free = self._predicted()
-            return self._seen()
-        if off > SLOW * self._off:
+        if self._tried % PATIENT == 0:
             try:
                 self._factor_at(new)
             except NearlySingular:
                 raise self._stuck(off, size) from None
             change = self._solved(defect)
+            self._secants = Secants(self.comm)
+            self._free = new - change - self._pushed(force)
+        else:
+            self._free = self._secants.next(self._free, -change)
         self._off = off
-        self._free = new - change - self._answer @ force
         return self._seen()
+
+    def advance(self, force: np.ndarray) -> None:
+        """The motion under the force (k,) N for which `settle` returned None is that of the end of the step."""
+        self._move_to(self._new)
+
+    def _pushed(self, force: np.ndarray) -> np.ndarray:
+        """Displacement (own rows) under a force (k,) N, by the present factor."""
+        return self._solved(self._loads @ force) if force.any() else np.zeros(len(self._mass))
+
+    def _beyond(self, force: np.ndarray) -> np.ndarray:
+        """(S - S_0) f, (r,) m."""
+        if self._factored is None or not force.any():
+            return np.zeros(len(self.same_step))
+        return summed(self.comm, self._outputs @ self._pushed(force)) - self.same_step @ force
 
     def _largest(self, values: np.ndarray) -> float:
         """Largest magnitude among the rows of all processes."""
@@ -611,14 +692,13 @@ class NonlinearTire(FullTire):
         now.setOption(PETSc.Mat.Option.SYMMETRIC, known)
         self._solver.destroy()
         self._system.destroy()
-        self._take(now)
-        self._beyond = summed(self.comm, self._outputs @ self._answer) - self.same_step
+        self._factorise(now)
         self._factored = motion.copy()
         self.factors += 1
 
     def _seen(self) -> np.ndarray:
         """Displacement (r,) m without new force for which the contact is solved with S_0."""
-        return summed(self.comm, self._outputs @ self._free) + self._beyond @ self._met
+        return summed(self.comm, self._outputs @ self._free) + self._beyond(self._met)
 
     def _dynamic(self, new: np.ndarray) -> np.ndarray:
         """Inertia and damping forces, N, if the step ends at displacement `new` (own rows)."""
@@ -631,9 +711,11 @@ class NonlinearTire(FullTire):
 
     def snapshot(self) -> dict[str, np.ndarray]:
         """FullTire.snapshot, with the motion of the factor if it was taken anew, and the last forces."""
-        kept = super().snapshot() | {"met": self._met}
+        spread, everywhere = self._operators.spread, self._operators.body.everywhere
+        kept = super().snapshot() | {"met": self._met, "begun": everywhere(spread(self._begun))}
+        if (secants := self._secants.state()).size:
+            kept["secants"] = np.stack([everywhere(spread(one)) for one in secants.T])
         if self._factored is not None:
-            spread, everywhere = self._operators.spread, self._operators.body.everywhere
             kept["factored"] = everywhere(spread(self._factored))
         return kept
 
@@ -641,7 +723,13 @@ class NonlinearTire(FullTire):
         """Continue from a snapshot, before `predict`; written by any number of processes."""
         super().restore(state)
         self._met = state["met"]
-        self._elastic = self._force.change(self.displacement)
+        self._begun = self._operators.restrict(state["begun"][self._operators.body.ids])
+        self._elastic = self._restoring(self.displacement) - self._begun
+        self._secants = Secants(self.comm)
+        if "secants" in state:
+            ids = self._operators.body.ids
+            own = [self._operators.restrict(one[ids]) for one in state["secants"]]
+            self._secants.set_state(np.stack(own, axis=1))
         if "factored" in state:
             self._factor_at(self._operators.restrict(state["factored"][self._operators.body.ids]))
 

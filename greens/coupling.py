@@ -283,17 +283,20 @@ class Wheel:
         loads: Probes,
         read: sparse.csr_matrix,
         driven: sparse.csr_matrix,
+        shapes: LoadedShapes | None = None,
     ) -> Response:
         """Response of probes of which some lie inside the tire, with the exact static flexibility of what the states lack.
 
         The shapes of `basis` have further rows for these, and those of `full` for what they are in the full matrices;
         `read` (r, n) and `driven` (n, k) are the same `outputs` and `loads` there, on own unknowns. Those inside are relative
-        to a wheel that moves, and loads inside have no resultant on it. Collective.
+        to a wheel that moves, and loads inside have no resultant on it. `shapes`: `loaded_shapes`, by default made and
+        destroyed here. Collective.
         """
         rows = sparse.csr_matrix(self._beside(basis.of_hub(outputs)))
-        shapes = LoadedShapes(self.operators, self.rotating_stiffness, self.air)
-        answers = shapes.readings(sparse.vstack([read, rows], format="csr"), driven)
-        shapes.destroy()
+        taken = shapes or self.loaded_shapes()
+        answers = taken.readings(sparse.vstack([read, rows], format="csr"), driven)
+        if shapes is None:
+            taken.destroy()
         flexibility, beside = np.split(answers, [outputs.shape[0]])
         if self._apart:
             stiffnesses = self._stiffnesses(basis.projection)
@@ -301,16 +304,19 @@ class Wheel:
             flexibility, beside = flexibility + lacking.compliance, beside + lacking.momentum
         return self._completed(basis, outputs, loads, flexibility, beside)
 
-    def beyond_modes(self, basis: Basis, modes: Modes, loads: Array) -> Array:
+    def loaded_shapes(self) -> LoadedShapes:
+        """The shapes of the full matrices under constant loads, to be destroyed by the caller. Collective."""
+        return LoadedShapes(self.operators, self.rotating_stiffness, self.air)
+
+    def beyond_modes(self, basis: Basis, modes: Modes, loads: Array, shapes: LoadedShapes) -> Array:
         """Motions (n, p) m that constant loads, own rows (n, p) N, cause beside those of the modes,
 
             K_Omega^-1 b - Phi K~^-1 Phi^T b,
 
-        both of the full matrices, relative to the wheel. `modes` on all unknowns, whose projection `basis` is. Collective.
+        both of the full matrices, relative to the wheel. `modes` on all unknowns, whose projection `basis` is; `shapes`:
+        `loaded_shapes`. Collective.
         """
-        shapes = LoadedShapes(self.operators, self.rotating_stiffness, self.air)
         found = shapes.whole(loads)
-        shapes.destroy()
         _, uniform = self._stiffnesses(basis.held.projection)
         m = modes.vectors.shape[1]
         pushed = np.zeros((len(uniform), loads.shape[1]))

@@ -7,8 +7,8 @@ With K the stiffness, V (n, k) and s = V^T r of fem.nonlinear.reduced, the tire 
 
 is solved within each step, with the contact, which gives the forces f for displacements w = w_free + A_ww f - A_wv s, as an
 inner problem: Newton's method on the k numbers, the derivative of s - s(u_c(s)) by Broyden's updates, kept from step to
-step. Where that does not do it is taken anew for forces f that stay, 1 + (ds/du_c) A_cv: stiffer than it is, so that no step is
-too long. (A plain fixed point diverges: ds/dq, q = V^T K u, has eigenvalues of up to 10.)
+step. Where that does not do it is taken anew, 1 + (ds/du_c) (A_cv + A_cw f'(A_wv)), f' being how the forces yield where points
+touch. (A plain fixed point diverges: ds/dq, q = V^T K u, has eigenvalues of up to 10.)
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from scipy import sparse
 
 from tireroad.fem.collective import summed
 from tireroad.fem.errors import ConvergenceError
-from tireroad.fem.matrices.compliance import on_own_rows
+from tireroad.fem.matrices.compliance import LoadedShapes, on_own_rows
 from tireroad.fem.nonlinear.force import RestoringForce
 from tireroad.fem.nonlinear.reduced import ReducedForce, at_nodes, extra_loads
 from tireroad.greens.basis import Basis, Probes
@@ -33,6 +33,7 @@ from tireroad.modal.corner import READINGS
 from tireroad.modal.solver.slicing import Modes
 
 Array = np.ndarray
+Yields = Callable[[Array], Array]
 
 TOLERANCE = 1e-3  # of s, over the tire's whole motion in the same measure
 FLOOR = 0.1  # J^(1/2): of that motion
@@ -40,6 +41,7 @@ TURNS, STALE = 25, 6  # evaluations of a step at most; after so many the derivat
 SPACES = 1e-9  # of a motion: changes that say nothing of the derivative
 # Evaluations from which on a rest of this share of the motion is small enough.
 ENOUGH, ROUGH = 13, 2e-2
+CAUTIOUS = 0.3  # of the tolerance: rest that a step leaves, if as much as the last one did, for it not to be evaluated
 
 
 def large_response(
@@ -51,6 +53,7 @@ def large_response(
     force: ReducedForce,
     vectors: Array,
     loaded: int | None = None,
+    shapes: LoadedShapes | None = None,
 ) -> Response:
     """The response between forces and motions of probes, and of the reduced force.
 
@@ -58,7 +61,7 @@ def large_response(
     the motions of these c, K V, what is read at the other points, and the nodes of the kept cells (d,), relative to the
     wheel. K is what small motions have in the loop: where moduli depend on frequency, that of each mode, so that -K V s moves
     the tire by -V s at rest. `modes` on all unknowns, whose projection `basis` is; `vectors` V (n, k) on own unknowns. With
-    the exact static flexibility of all of them. Collective.
+    the exact static flexibility of all of them (`shapes`: wheel.loaded_shapes(), by default made and destroyed). Collective.
     """
     operators, comm = wheel.operators, wheel.operators.body.comm
     pushed = extra_loads(restoring, vectors)
@@ -88,7 +91,7 @@ def large_response(
     read = sparse.vstack([driven.T, own[:, c:].T, rows], format="csr")
     true = (along / basis.projection.squares) @ basis.projection.stiffness
     bases = inside(true), inside(growth * along)
-    return wheel.respond_inside(*bases, outputs, loads, read, driven)
+    return wheel.respond_inside(*bases, outputs, loads, read, driven, shapes)
 
 
 def _rows(restoring: RestoringForce, nodes: Array) -> sparse.csr_matrix:
@@ -108,16 +111,18 @@ class _Newton:
     the next; where that does not do it, taken anew.
 
     The contact is solved to a tolerance of its own (contact.loop.MEETING), by which s(s) jumps: where the rest falls no further,
-    the best s is taken if its rest is small.
+    the best s is taken if its rest is small. `settled`: the s that `next` gave needs no evaluation.
     """
 
     def __init__(self, count: int) -> None:
         self.derivative = np.eye(count)
+        self.left = 1.0  # of a rest by the last step that was evaluated
         self.taken = self.rough = 0  # derivatives taken anew; solutions that stay at the best s
 
     def begin(self) -> None:
         """A solution begins."""
-        self._turns, self._last = 0, False
+        self._turns, self.settled = 0, False
+        self._off = np.inf
         self._tried: tuple[Array, Array] | None = None
         self._best: tuple[float, Array] = (np.inf, np.zeros(0))
 
@@ -127,7 +132,7 @@ class _Newton:
         """The next s to be evaluated, None if this one is found; `size` J^(1/2) of the motion. ConvergenceError after 25
         evaluations."""
         off = float(np.linalg.norm(rest)) / size
-        if off <= TOLERANCE or self._last:
+        if off <= TOLERANCE:
             return None
         self._turns += 1
         if off < self._best[0]:
@@ -138,7 +143,7 @@ class _Newton:
                 'motion.kind = "linear"'
             )
         if self._turns >= ENOUGH and self._best[0] <= ROUGH:
-            self._last = True
+            self.settled = True
             self.rough += 1
             return self._best[1]
         if self._turns % STALE == 0:
@@ -149,7 +154,10 @@ class _Newton:
             if step @ step > (SPACES * size) ** 2:
                 lacking = change - self.derivative @ step
                 self.derivative += np.outer(lacking, step) / (step @ step)
-        self._tried = s, rest
+        if np.isfinite(self._off):
+            self.left = off / self._off
+        self.settled = off * self.left <= CAUTIOUS * TOLERANCE
+        self._tried, self._off = (s, rest), off
         return s - np.linalg.solve(self.derivative, rest)
 
 
@@ -202,27 +210,33 @@ class LargeTire:
         self._newton.begin()
         return self._free - self._moved @ self.s
 
-    def settle(self, force: Array) -> Array | None:
+    def settle(self, force: Array, yields: Yields | None = None) -> Array | None:
         """None if the reduced force is that of the motion under contact forces (c,) N, else the displacements (r,) m for which
-        the contact has to be solved again. ConvergenceError after 25 evaluations."""
+        the contact has to be solved again. `yields`: changes (c, m) N of these forces by displacements (r, m) m, by default
+        none. ConvergenceError after 25 evaluations."""
         moved = self._beside + self._inside @ force - self._bent @ self.s
         self._now = moved[self._inner :]
-        found = self._next(self._newton, self.s, moved[: self._inner], self._now)
+        if self._newton.settled:
+            return None
+        found = self._next(moved[: self._inner], yields)
         if found is None:
             return None
         self.s = found
         return self._free - self._moved @ found
 
-    def _next(self, newton: _Newton, s: Array, inner: Array, read: Array) -> Array | None:
-        """The next s to be tried where the kept nodes move by `inner` and V^T K u is `read`; None if it is the right one."""
+    def _next(self, inner: Array, yields: Yields | None) -> Array | None:
+        """The next s to be tried where the kept nodes move by `inner`; None if it is the right one."""
         self.evaluations += 1
-        rest = s - (self._force.evaluate(inner) - self._begun)
-        size = max(float(np.linalg.norm(read + s)), FLOOR)
+        rest = self.s - (self._force.evaluate(inner) - self._begun)
+        size = max(float(np.linalg.norm(self._now + self.s)), FLOOR)
 
         def derivative() -> Array:
-            return np.eye(len(s)) + self._force.jacobian(inner, self._bent[: self._inner])
+            along = self._bent[: self._inner]
+            if yields is not None:
+                along = along + self._inside.columns.T[: self._inner] @ yields(self._moved)
+            return np.eye(len(rest)) + self._force.jacobian(inner, along)
 
-        return newton.next(s, rest, size, derivative)
+        return self._newton.next(self.s, rest, size, derivative)
 
     def advance(self, force: Array) -> None:
         """Set the contact forces (c,) N at the end of the step."""
@@ -262,7 +276,7 @@ class LargeTire:
         own = {
             "large_force": np.stack([self.s, self._before, self._older, self._read, self._begun]),
             "large_derivative": self._newton.derivative.copy(),
-            "large_work": np.array([self.stored, self.lead]),
+            "large_work": np.array([self.stored, self.lead, self._newton.left]),
             "large_count": np.array([self.evaluations, self.derivatives, self.rough]),
         }
         return self._linear.snapshot() | own
@@ -271,7 +285,7 @@ class LargeTire:
         """Continue from a snapshot. Collective when looking ahead."""
         self.s, self._before, self._older, self._read, self._begun = state["large_force"].copy()
         self._newton.derivative = state["large_derivative"].copy()
-        self.stored, self.lead = state["large_work"].tolist()
         newton = self._newton
+        self.stored, self.lead, newton.left = state["large_work"].tolist()
         self.evaluations, newton.taken, newton.rough = (int(n) for n in state["large_count"])
         self._linear.restore(state)

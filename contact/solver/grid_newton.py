@@ -109,20 +109,32 @@ class GridNewton:
         self._held = up, down, grid
 
     def solve(
-        self, gap: Array, free: Array, read: Reading | None, road: Array, tolerance: float
+        self,
+        gap: Array,
+        free: Array,
+        read: Reading | None,
+        road: Array,
+        tolerance: float,
+        again: bool = False,
     ) -> _Step:
         """The forces, gaps and slopes of a step, whose brush is then at its end.
 
         `gap` (c,) and `free` (2, c) m: gaps over a level road at height 0 and displacements in the plane, under the forces at
         rest. The road is `read` at the points' places, or at heights `road` (c,) m and level. `tolerance`: what places may change of gaps after the
-        road was read, as a share of deflections (mean squares). ConvergenceError after 40 steps in a row that had to be split.
+        road was read, as a share of deflections (mean squares). `again`: the last step once more, from its forces. ConvergenceError
+        after 40 steps in a row that had to be split.
         """
-        step = _Step(self, gap, free, read, road, tolerance)
+        if again:
+            self.friction.retrace()
+        else:
+            self.friction.keep()
+        step = _Step(self, gap, free, read, road, tolerance, again)
         lags = not step.settle()
         if lags and (self.friction.unbounded or not step.split()):
             raise self.friction.unsolved()
         step.within_bounds()
-        self.before, self.force, self.slope = self.force, step.force, step.slope
+        self.before = self.before if again else self.force
+        self.force, self.slope = step.force, step.slope
         self.wholly = max(self.wholly - 1, 0)
         self.friction.advance(step.force, step.bases, lags)
         return step
@@ -201,7 +213,8 @@ class _Step:
     """A step's `force` (3, c) N, `gap` (c,) m and `slope` (c, 2) of the road, while they are sought."""
 
     def __init__(
-        self, solver: GridNewton, gap: Array, free: Array, read: Reading | None, road: Array, tolerance: float
+        self, solver: GridNewton, gap: Array, free: Array, read: Reading | None, road: Array, tolerance: float,
+        again: bool,
     ) -> None:  # fmt: skip
         if not (np.all(np.isfinite(gap)) and np.all(np.isfinite(free))):
             check_residual("projected-cg", np.nan)
@@ -214,7 +227,10 @@ class _Step:
         self._past, self._spring = past / share, 1.0 / (self._brush.stiffness * share)
         self._beside = self._brush.own + self._spring
         last = solver.force
-        self.force = self._brush.carried(last) if read else 2.0 * last - solver.before
+        if again:
+            self.force = last.copy()
+        else:
+            self.force = self._brush.carried(last) if read else 2.0 * last - solver.before
         self.force[:, ~(self.force[0] > 0.0)] = 0.0
         _onto_discs(self.force[1:], self._brush.bound(self.force[0]))
         self.slope = solver.slope if read else np.zeros((len(gap), 2))

@@ -298,6 +298,15 @@ class BrushFriction:
         """Residual (N) that a step may leave, of its `first` one (N) and the `most` (N) that a point may bear."""
         return float(_C.brush_limit(self.compiled, first, most))
 
+    def keep(self) -> None:
+        """Keep the bristles as they are before a step, for `retrace`."""
+        self._kept = self._brush.state(), self._before.copy(), self._horizontal.copy()
+
+    def retrace(self) -> None:
+        """Take the bristles back to before the last step, to solve it again."""
+        state, self._before[:], self._horizontal[:] = self._kept
+        self._brush.set_state(state)
+
     def advance(self, force: Array, moved: Array, lags: bool) -> None:
         """End the step with forces (3, c) N, z, x, y, and bases of bristles `moved` (2, c) m; whether normal and horizontal forces
         have each `lags` behind the other. ConvergenceError after 40 such steps in a row."""

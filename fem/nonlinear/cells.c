@@ -17,6 +17,7 @@ typedef struct {
     void *cell_kernel, *facet_kernel;            // of UFCx; 0: none
 } forms;
 void element_tensors(const forms *form, const double *motion, double *out);
+void summed_forces(const forms *form, const double *motion, const double *weights, double *work, double *out);
 // end
 
 // The last argument is one of later releases of UFCx only; those before do not look at it.
@@ -42,4 +43,15 @@ void element_tensors(const forms *form, const double *motion, double *out) {
         facet(out + (size_t)c * f.size, f.coefficients + (size_t)c * f.width, f.constants,
               f.coordinates + (size_t)c * f.points, &side, &turned, NULL);
     }
+}
+
+// out += the forces of the cells at their nodes, times their weights (cells); work (cells, size).
+void summed_forces(const forms *form, const double *motion, const double *weights, double *work, double *out) {
+    const forms f = *form;
+    element_tensors(form, motion, work);
+    for (int c = 0; c < f.cells; c++)
+        for (int i = 0; i < f.own; i++) {
+            const int place = f.place[(size_t)c * f.own + i];
+            if (place >= 0) out[place] += weights[c] * work[(size_t)c * f.size + i];
+        }
 }

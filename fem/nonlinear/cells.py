@@ -47,6 +47,7 @@ class CellForms:
     facet: np.ndarray
     number: np.ndarray
     _described: list[Any] = field(default_factory=list, compare=False)
+    _work: list[np.ndarray] = field(default_factory=list, compare=False)
 
     def __post_init__(self) -> None:
         for name, kind in _KINDS.items():  # as compiled code reads them
@@ -54,17 +55,29 @@ class CellForms:
 
     def __call__(self, displacement: np.ndarray) -> np.ndarray:
         """Tensors (c, size) at the displacement (n,) m: N, or N/m."""
-        compiled = library(SOURCE)
-        if not self._described:
-            self._described.append(self._struct(compiled))
-        out = np.empty((len(self.place), self.size))
+        compiled, out = library(SOURCE), np.empty((len(self.place), self.size))
         given = np.ascontiguousarray(displacement, dtype=float)
         compiled.lib.element_tensors(
-            self._described[0], compiled.doubles(given), compiled.doubles(out)
+            self._struct(compiled), compiled.doubles(given), compiled.doubles(out)
         )
         return out
 
+    def summed(self, displacement: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Forces (n,) N of the cells at the displacement (n,) m, each times its weight (c,)."""
+        compiled, out = library(SOURCE), np.zeros(len(displacement))
+        if not self._work:
+            self._work.append(np.empty((len(self.place), self.size)))
+        given = (np.ascontiguousarray(each, float) for each in (displacement, weights))
+        pointers = map(compiled.doubles, (*given, self._work[0], out))
+        compiled.lib.summed_forces(self._struct(compiled), *pointers)
+        return out
+
     def _struct(self, compiled: Any) -> Any:
+        if not self._described:
+            self._described.append(self._described_for(compiled))
+        return self._described[0]
+
+    def _described_for(self, compiled: Any) -> Any:
         cells, own = self.place.shape
         return compiled.ffi.new(
             "forms *",
@@ -99,11 +112,12 @@ class CellForms:
             facet=facet[facet[:, 0] >= 0],
             number=self.number[cells],
             _described=[],
+            _work=[],
         )
 
     def moved_to(self, place: np.ndarray) -> CellForms:
         """The same, of displacements at other places (c, d)."""
-        return replace(self, place=place, _described=[])
+        return replace(self, place=place, _described=[], _work=[])
 
     def everywhere(self, comm: MPI.Comm) -> CellForms:
         """The cells of all processes on every process, in the order of their numbers. Collective."""
@@ -112,7 +126,7 @@ class CellForms:
         names = "coefficients", "coordinates", "place", "number"
         parts: dict[str, Any] = {name: allgather_rows(comm, getattr(self, name)) for name in names}
         order = np.argsort(parts["number"])
-        whole = replace(self, facet=allgather_rows(comm, moved), _described=[], **parts)
+        whole = replace(self, facet=allgather_rows(comm, moved), _described=[], _work=[], **parts)
         return whole.only(order)
 
 

@@ -38,14 +38,13 @@ class ReducedForce:
     weights: Array
     _forces: CellForms
     _rest: Array
-    _weighted: Array
     _linear: Array
     _at_rest: Array
 
     def evaluate(self, motion: Array) -> Array:
         """s (k,) J^(1/2) at a motion (d,) m of `nodes` from the static state."""
-        forces = self._forces(self._rest + motion)
-        return self._weighted @ forces.ravel() - self._at_rest - self._linear @ motion
+        forces = self._forces.summed(self._rest + motion, self.weights) - self._at_rest
+        return forces @ self.vectors - self._linear @ motion
 
     def jacobian(self, motion: Array, along: Array, size: float = 1e-7) -> Array:
         """Derivative (k, m) of s along motions (d, m), by differences of `size` m."""
@@ -95,7 +94,6 @@ def reduced_force(
     linear = np.zeros((vectors.shape[1], len(rest) + 1))
     for part, where in zip(columns, place, strict=True):
         linear[:, where] += part  # a cell has each value once, or held ones, which are dropped
-    whole = np.ascontiguousarray(weighted.reshape(-1, vectors.shape[1]).T)
     return ReducedForce(
         nodes=known,
         vectors=at_kept,
@@ -103,9 +101,8 @@ def reduced_force(
         weights=weights,
         _forces=forces,
         _rest=rest,
-        _weighted=whole,
         _linear=np.ascontiguousarray(linear[:, :-1]),
-        _at_rest=whole @ forces(rest).ravel(),
+        _at_rest=forces.summed(rest, weights),
     )
 
 

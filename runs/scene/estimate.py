@@ -91,7 +91,12 @@ SLIPPING = 16
 kernels and their indices 7, the normal forces' 1, of twice its width the lifts 2, the coupling 1, its
 singular values 1 (contact.solver.stick_slip). Not during pivoting."""
 
+STATES, HELD = 300, 5
+"""States of a training of large motions, half-turned copies included (70 to 300 on bars), and copies held of their fields: motions,
+answers, forces and what is made of both (runs.stages.training)."""
+
 FOOTPRINT = "columns of the footprint"
+TRAINING = "training of large motions"
 FACTOR = "factor of the stiffness"
 
 # Keys that determine the size of each part.
@@ -106,6 +111,7 @@ KEYS = {
     "rotating pencil": "modal.count or modal.up_to",
     "flexibility of the patch": "greens.residual, the mesh, contact.reach, the road's height",
     "contact": "contact.points, contact.reach, the road's height",
+    TRAINING: "motion.kind, and the mesh",
     "receptances": "output.receptance.step, output.receptance.to, the number of forces",
     "time series": "time.duration, time.step",
     "contact.h5": "time.duration, time.step, contact.points",
@@ -130,6 +136,7 @@ SPREAD = (
     DAMPING,
     "modes",
     "flexibility of the patch",
+    TRAINING,
 )
 # Share of a factor that MUMPS keeps on disk out of core: with 54,000 and 108,000 unknowns, 26 and
 # 22 % of the memory were still taken.
@@ -427,6 +434,8 @@ def _memory(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, fl
     if "contact" not in left_out:
         parts |= _contact_memory(scene, size)
         parts |= road_memory(scene)
+    if "nonlinear" not in left_out:
+        parts[TRAINING] = _training(free, through, tire.order)
     if "response" not in left_out:
         k = max(size.driven, 1)
         parts["receptances"] = 16.0 * 5 * size.frequencies * k**2
@@ -437,6 +446,18 @@ def _memory(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, fl
 def _each_step(scene: Scene, points: int) -> int:
     """Values per time step that the outputs at the driven points add."""
     return sum(kind.numbers(points) for _, kind in scene.output.kinds)
+
+
+def _training(free: float, through: int, order: int) -> float:
+    """Bytes of the training of large motions: fields of its states, stiffnesses of all cells and what they weigh together, and
+    a tangent with its factor."""
+    cells, own = free / (3 * order**3), 3 * (order + 1) ** 3
+    fields = STATES * HELD * free
+    return (
+        8.0 * (fields + cells * own**2 + 2 * cells**2)
+        + matrices(1, free, through, order)
+        + factor(free, through, order)
+    )
 
 
 def _contact_memory(scene: Scene, size: Sizes) -> dict[str, float]:

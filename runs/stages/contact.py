@@ -655,6 +655,7 @@ class ContactStage(Stage[ContactHistory]):
         edges(record, self.job.scene.road, setup.patch, abs(setup.rolled.speed), highest)
         if large and moved:
             left_out = large.left_out(instants, chosen.step) if len(instants) else None
+            large.factors.destroy()
             describe_large(record, moved, left_out, totals.figures.steps, totals.figures.excursion)
         else:
             deflection, held = self.static.product.deflection, self.job.scene.axle.kind == "fixed"

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy import sparse
 
 from tireroad.contact.loop import LinearTire
-from tireroad.fem.matrices.compliance import factorise, on_own_rows, solve_columns
+from tireroad.fem.collective import summed
+from tireroad.fem.matrices.compliance import (
+    LoadedShapes,
+    factorise,
+    on_own_rows,
+    solve_columns,
+)
 from tireroad.fem.nonlinear.force import RestoringForce
-from tireroad.fem.nonlinear.reduced import ReducedForce, extra_loads, outside, sizes
+from tireroad.fem.nonlinear.reduced import ReducedForce, at_nodes, extra_loads, outside, sizes
 from tireroad.greens.basis import Basis, Probes
 from tireroad.greens.coupling import Wheel
 from tireroad.greens.large_motion import LargeTire, large_response
@@ -89,20 +97,57 @@ class Greatest(Instants):
 
 @dataclass(frozen=True, kw_only=True)
 class LeftOut:
-    """The motion (n, i) m at i instants `time` (i,) s and its `answer` K^-1 r (n, i), on own unknowns; `lacking` (i,) J^(1/2):
-    what is outside the training, and the `size` (i,) of the whole in the same measure (fem.nonlinear.reduced)."""
+    """The motion (n, i) m at i instants `time` (i,) s and its `answer` K^-1 r (n, i), on own unknowns; J^(1/2) (i,): what is
+    `outside` the vectors of the training, what its weighted cells have `misread`, and the `size` of the whole in the same
+    measure (fem.nonlinear.reduced)."""
 
     time: Array
     motion: Array
     answer: Array
-    lacking: Array
+    outside: Array
+    misread: Array
     size: Array
 
     @property
     def shares(self) -> Array:
-        """The share (n,) of the motion that is outside, of the smallest over a twentieth of the largest."""
+        """The share (i,) of the motion that is outside the training or misread, of the smallest over a twentieth of the largest."""
+        return self._of_size(np.hypot(self.outside, self.misread))
+
+    @property
+    def misread_shares(self) -> Array:
+        """The share (i,) of it that is misread."""
+        return self._of_size(self.misread)
+
+    def _of_size(self, part: Array) -> Array:
         least = _SLIGHT * self.size.max(initial=0.0)
-        return self.lacking / np.maximum(np.maximum(self.size, least), np.finfo(float).tiny)
+        return part / np.maximum(np.maximum(self.size, least), np.finfo(float).tiny)
+
+
+class Factors:
+    """Factors of the stiffness of the tire, standing and as it rolls: made on first use and kept, since a training takes them
+    after each of its runs. Collective."""
+
+    def __init__(self, wheel: Wheel, restoring: RestoringForce) -> None:
+        self._wheel, self._stiffness = wheel, restoring.operators.stiffness
+
+    @cached_property
+    def rolling(self) -> LoadedShapes:
+        """Shapes of the wheel's full matrices under constant loads."""
+        return self._wheel.loaded_shapes()
+
+    @cached_property
+    def _standing(self) -> Any:
+        return factorise(self._stiffness)
+
+    def answers(self, forces: Array) -> Array:
+        """K^-1 of forces (n, s) N, own rows."""
+        return solve_columns(self._standing, self._stiffness, forces)
+
+    def destroy(self) -> None:
+        """Free them; what is needed again is made again."""
+        for name in ("rolling", "_standing"):
+            if (held := self.__dict__.pop(name, None)) is not None:
+                held.destroy()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,10 +164,11 @@ class LargeMotion:
     loaded: int
     wheel: Wheel
     rolling: RollingModes
+    factors: Factors
 
     def trained(self, force: ReducedForce, vectors: Array) -> LargeMotion:
         """The same with a reduced force, and the response to it. Collective."""
-        given = self.points, self.restoring, force, vectors, self.loaded
+        given = self.points, self.restoring, force, vectors, self.loaded, self.factors.rolling
         response = large_response(self.wheel, self._basis, self._modes, *given)
         return replace(self, force=force, vectors=vectors, response=response)
 
@@ -137,23 +183,31 @@ class LargeMotion:
         pushed = (self.wheel.growth or 1.0) * extra_loads(self.restoring, self.vectors)
         own = on_own_rows(self.restoring.operators, self.points[: self.loaded])
         acting = own @ loads[: self.loaded] + pushed @ loads[self.loaded :]
-        beyond = self.wheel.beyond_modes(self._basis, self._modes, acting)
+        beyond = self.wheel.beyond_modes(self._basis, self._modes, acting, self.factors.rolling)
         return beyond + self._modes.vectors @ self._coordinates(z, y, step)
 
     def left_out(self, instants: Instants, step: float) -> LeftOut:
         """How far the motion at the instants is outside the training. Collective."""
         motion, restoring = self.motions(instants, step), self.restoring
-        forces, stiffness = restoring.nonlinear(motion), restoring.operators.stiffness
-        factor = factorise(stiffness)
-        answer = solve_columns(factor, stiffness, forces)
-        factor.destroy()
+        forces = restoring.nonlinear(motion)
+        answer = self.factors.answers(forces)
         return LeftOut(
             time=instants.columns[0],
             motion=motion,
             answer=answer,
-            lacking=outside(restoring, self.vectors, answer, forces),
+            outside=outside(restoring, self.vectors, answer, forces),
+            misread=self._misread(motion, forces),
             size=sizes(restoring, motion, answer),
         )
+
+    def _misread(self, motion: Array, forces: Array) -> Array:
+        """|V^T r - s| (s,) J^(1/2) at motions and their forces r (n, s): what the weighted cells are off. Collective."""
+        if self.force is None:
+            return np.zeros(motion.shape[1])
+        right = summed(self.restoring.body.comm, self.vectors.T @ forces)
+        read = at_nodes(self.restoring, motion, self.force.nodes)
+        found = [self.force.evaluate(np.ascontiguousarray(one)) for one in read.T]
+        return np.linalg.norm(right - np.stack(found, axis=1), axis=0)
 
     @property
     def _basis(self) -> Basis:

@@ -35,7 +35,7 @@ from tireroad.runs.files import store
 from tireroad.runs.process import console
 from tireroad.runs.stages import setup as stages_setup
 from tireroad.runs.stages.greens import Responses, fill_response, read_response
-from tireroad.runs.stages.large import Instants, LargeMotion
+from tireroad.runs.stages.large import Factors, Instants, LargeMotion
 from tireroad.runs.stages.nonlinear import Nonlinear, stored
 from tireroad.runs.stages.rolling import (
     Integration,
@@ -53,7 +53,7 @@ LIMIT = 0.03  # of forces: error of the linear tire from which on "auto" takes l
 BED = 1e9  # N/m3: springs of the tread under the standing tire, 10 MPa over 10 mm
 RUNS, INSTANTS, STEPS = 6, 60, 4000  # at most: runs, instants of each, steps of each
 ENOUGH = 0.05  # of the motion: what the vectors may lack
-SETTINGS = Settings(most=160, turns=2, precision=5e-3)
+SETTINGS = Settings(most=160, turns=6, precision=5e-3)
 _RESPONSE = "response"
 
 
@@ -138,7 +138,10 @@ class NonlinearStage(Computed[TrainedMotion]):
             linear = linear_motion(self)
             with record.timing("standing on the road"):
                 trainer = self._stood(linear.restoring, told)
-            return self._run(record, linear, trainer, told)
+            try:
+                return self._run(record, linear, trainer, told)
+            finally:
+                linear.factors.destroy()
 
     def _stood(self, restoring: RestoringForce, told: Callable[[str], None]) -> Trainer:
         """The training of the standing tire on the road under its footprint. Collective."""
@@ -181,7 +184,7 @@ class NonlinearStage(Computed[TrainedMotion]):
             told(
                 f"run {number} with {training.vectors.shape[1]} vectors and {len(training.force.cells)} cells: "
                 f"{100 * lacked:.3g} % of the motion outside at most, {100 * np.sqrt(np.mean(left.shares**2)):.2g} % in the mean "
-                f"square; {stopped or 'whole'}"
+                f"square, {100 * float(left.misread_shares.max()):.2g} % misread by the cells; {stopped or 'whole'}"
             )
             runs.append(Trained(f"run {number}", len(instants), lacked, 0.0, stopped or "whole"))
             if not stopped and (best is None or lacked < best[0]):
@@ -258,6 +261,7 @@ def linear_motion(stage: Any) -> LargeMotion:
         loaded=response.residual.shape[1],
         wheel=stage.wheel.product,
         rolling=rolling,
+        factors=Factors(stage.wheel.product, restoring),
     )
 
 

@@ -139,3 +139,64 @@ def test_with_friction_a_sticking_point_climbs_with_the_road() -> None:
     tip = base + t / stiffness
     assert t == pytest.approx(-stiffness * base, rel=1e-9)
     assert ALONG_Z * vertical == pytest.approx(rise + slope * tip, rel=1e-9)
+
+
+@pytest.mark.parametrize("coefficient", [0.0, 0.6])
+def test_a_step_solved_again_is_as_if_it_had_been_solved_once(coefficient: float) -> None:
+    """Bristles, places and forces go back to the step before, whatever displacements were tried first."""
+    patch = oval_patch((9, 5), (0.012, 0.015), 800.0)
+    compliance, p = elastic(patch), len(patch.points)
+    drive = Drive(
+        lambda x, y: 5e-4 * np.sin(90 * x + 40 * y),
+        lambda t: 0.0,
+        SPEED,
+        lambda x, y: 5e-4 * np.cos(90 * x + 40 * y)[..., None] * (90.0, 40.0),
+    )
+
+    def forces(pushes: tuple[float, ...]) -> np.ndarray:
+        friction, found = None, []
+        if coefficient:
+            brush = Brush(BrushLaw(1e5, coefficient), patch.points[:, 0], patch.line, SPEED, STEP)
+            brush.begin(patch.force > 0)
+            friction = BrushFriction(brush, compliance, None, tolerance=1e-10)
+        solver = ActiveSet(compliance[:p, :p])
+        problem = ContactProblem(patch, compliance, solver, friction, tolerance=1e-10)
+        for _, roads in drive.roads(patch, STEP, 12, 0, moving=True):
+            for road in roads:
+                for turn, push in enumerate(pushes):
+                    problem.commit(problem.solve(road, None, np.full(3 * p, push), again=turn > 0))
+                found.append(np.stack([problem.vertical, *problem.horizontal]))
+        return np.array(found)
+
+    once, twice = forces((0.0,)), forces((2e-5, -1e-5, 0.0))
+    assert np.abs(twice - once).max() < 1e-6 * once.max()
+    assert np.abs(np.diff(once, axis=0)).max() > 0.01 * once.max()
+
+
+def test_forces_yield_as_they_change_where_the_same_points_touch() -> None:
+    """`yields` is the derivative of the forces on the nodes, the road being met where it was."""
+    patch = oval_patch((9, 5), (0.012, 0.015), 800.0)
+    compliance, p = elastic(patch), len(patch.points)
+    plane = Drive(
+        lambda x, y: 1e-4 + 0.2 * x - 0.1 * y,
+        lambda t: 0.0,
+        0.0,
+        lambda x, y: np.stack([0.2 + 0 * x, -0.1 + 0 * y], axis=-1),
+    )
+    problem = ContactProblem(patch, compliance, ActiveSet(compliance[:p, :p]), tolerance=1e-13)
+    ((_, (road,)),) = plane.roads(patch, STEP, 1, 0, moving=True)
+
+    def forces(free: np.ndarray, again: bool = True) -> np.ndarray:
+        for turn in range(30):
+            problem.commit(problem.solve(road, None, free, again=again or turn > 0))
+        return problem.change.copy()
+
+    begun = forces(np.zeros(3 * p), again=False)
+    touching = problem._force > 0.0
+    assert 5 < np.count_nonzero(touching) < p
+    away = 1e-9 * np.random.default_rng(3).standard_normal(3 * p)
+    expected = problem.yields(away[:, None])[:, 0]
+    found = forces(away) - begun
+    assert np.array_equal(problem._force > 0.0, touching)
+    # On a plane, places count through the gap's change alone.
+    assert np.abs(found - expected).max() < 1e-3 * np.abs(found).max()

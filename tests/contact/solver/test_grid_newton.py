@@ -79,6 +79,27 @@ def test_a_loop_taken_up_again_has_the_same_bits() -> None:
     assert 10 < np.count_nonzero(slides & (force[0] > 0)) < np.count_nonzero(force[0]) - 10
 
 
+def again_and_again(problem: ContactProblem, push: float, steps: int = 6) -> np.ndarray:
+    """Forces (n, c) N of steps each solved for displacements that are `push` m off, then again for none."""
+    drive = Drive(height, lambda t: 0.0, SPEED, slope)
+    none, found = np.zeros(len(problem.change)), []
+    for _, roads in drive.roads(problem.patch, STEP, steps, 0, moving=True):
+        for road in roads:
+            if push:
+                problem.commit(problem.solve(road, None, none + push))
+            for _ in range(20 if push else 1):
+                solved = problem.solve(road, None, none, again=bool(push))
+                problem.commit(solved)
+            found.append(solved.force)
+    return np.array(found)
+
+
+def test_a_step_solved_again_is_as_if_it_had_been_solved_once(tight) -> None:
+    """Bristles and forces go back to the step before, whatever displacements were tried first."""
+    once, twice = (again_and_again(problem_of(1e-9, 1e-9), push) for push in (0.0, 1e-5))
+    assert np.abs(twice - once).max() < 1e-6 * once.max()
+
+
 def test_all_of_the_tire_and_its_neighbourhood_find_the_same(monkeypatch) -> None:
     """A Newton step needs the tire's compliance only about; what is found is that of all of it."""
     monkeypatch.setattr(grid_newton, "GAP_TOLERANCE", 1e-11)

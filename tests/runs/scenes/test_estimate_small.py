@@ -132,3 +132,13 @@ def test_results_between_writes_and_the_usual_set_are_in_it(
     """Measured on one process, GB; 0.38, 0.42 and 0.47 were estimated for the last three."""
     wanted = estimate(torus(tmp_path, *overrides))
     assert taken / 1.05 < sum(wanted.memory.values()) / 1e9 < 1.3 * taken
+
+
+def test_the_training_of_large_motions_is_in_it(tmp_path: Path) -> None:
+    """Fields of 300 states and stiffnesses of all cells: more on a finer mesh, nothing of a linear tire."""
+    name, large = "training of large motions", 'motion.kind="large"'
+    few = estimate(torus(tmp_path, large)).memory[name]
+    finer = estimate(torus(tmp_path, large, "tire.segments=48")).memory[name]
+    assert 2.0 < finer / few < 3.0
+    assert few > 8 * 2 * 300 * estimate(torus(tmp_path)).sizes.free
+    assert name not in estimate(torus(tmp_path)).memory
