@@ -41,6 +41,9 @@ MIXED = 5  # of them whose places are combined
 _POINTS_AHEAD, _STEPS_AHEAD = 200_000, 64
 _NO_FORCE, _NULL = np.zeros((2, 0)), COMPILED.ffi.NULL
 
+# How a contact yields: the changes (k, m) N of forces on the nodes by displacements (k, m) m of them.
+Yields = Callable[[np.ndarray], np.ndarray]
+
 
 @dataclass(frozen=True)
 class Steps:
@@ -210,9 +213,6 @@ class IteratedTire(LinearTire, Protocol):
     """
 
     def settle(self, force: np.ndarray, yields: Yields | None = None) -> np.ndarray | None: ...
-
-
-Yields = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
