@@ -37,7 +37,10 @@ from tireroad.fem.tire.material import Kind
 
 Array = np.ndarray
 
-_FULL, _REDUCED = 1, 0  # Gauss points around beyond the elements' order, for distortion and dilatation
+_FULL, _REDUCED = (
+    1,
+    0,
+)  # Gauss points around beyond the elements' order, for distortion and dilatation
 _ACROSS = 3  # Gauss points per radian of a wave within an element, for its Fourier integrals, and so many more
 
 

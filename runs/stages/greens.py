@@ -36,7 +36,7 @@ _UNITS = {
     "block_momentum": "kg^1/2",
 }
 # Of the rate of momentum, the last three rows of the slope, in s instead.
-_KNOWN = {"left_out": "kg m/N", "moments": "-", "slope": "m s"}
+_KNOWN = {"left_out": "kg m/N", "moments": "-", "slope": "m s", "offset": "m"}
 _ATTACHED = "attached"
 
 
