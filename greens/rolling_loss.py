@@ -27,7 +27,7 @@ from tireroad.greens.coupling import Wheel
 
 @dataclass(frozen=True)
 class Standing:
-    """What the static state becomes as it rolls: its `loss`, and the `motion` (3 s,) m of the outer face, rim held."""
+    """The static state as it rolls: its `loss`, and the `motion` (3 s,) m of the outer face to it, rim held."""
 
     loss: RollingLoss
     motion: Array

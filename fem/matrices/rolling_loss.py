@@ -1,4 +1,4 @@
-"""What the rubber of a rolling tire loses by the deformation that stands on the road, and the forces by which it does.
+"""Losses of the rubber of a rolling tire by the deformation that stands on the road, and the forces by which it loses.
 
 Material passes the static state with w = -r d/dtheta (per unit Omega, theta as in fem.tire.mesh.position). Its second
 Piola-Kirchhoff stress in cylindrical components, a Fourier series around each circle of points of the undeformed ring,
