@@ -59,6 +59,11 @@ REPORT = 1.6e6
 """Bytes of report.html and the text files: 0.9 to 2.1 MB in twenty runs (2026-11-25)."""
 HEADER = 3e4
 """Bytes of a file's scene, settings and empty datasets."""
+RELAXING, ROLLED_OUT = 0.8, 0.07
+"""Poles of slow rubber over loads of the patch, of a tire that stands (435 of 549 loads) and of one that rolls at 80 km/h (55 of
+741 in quickstart.toml)."""
+SOFTENED = 12
+"""Matrices between all loads of the patch held while slow rubber is found (greens.slow)."""
 INSTANTS = 400
 """Instants of the outer face in motion.h5 at most (runs.stages.vibration)."""
 MOST_OF_VIBRATION = 2e8
@@ -92,6 +97,7 @@ singular values 1 (contact.solver.stick_slip). Not during pivoting."""
 
 FOOTPRINT = "columns of the footprint"
 FACTOR = "factor of the stiffness"
+SLOW = "slow rubber"
 
 # Keys that determine the size of each part.
 KEYS = {
@@ -105,6 +111,7 @@ KEYS = {
     "rotating pencil": "modal.count or modal.up_to",
     "flexibility of the patch": "greens.residual, the mesh, contact.reach, the road's height",
     "contact": "contact.points, contact.reach, the road's height",
+    SLOW: "contact.points, contact.reach, the road's height, moduli over frequency",
     "receptances": "output.receptance.step, output.receptance.to, the number of forces",
     "time series": "time.duration, time.step",
     "contact.h5": "time.duration, time.step, contact.points",
@@ -451,6 +458,9 @@ def _contact_memory(scene: Scene, size: Sizes) -> dict[str, float]:
     }
     if scene.time.scheme == "convolution":
         parts["time series"] += 8.0 * size.steps * loads**2
+    if residual_of(scene.greens.residual).solves and scene.tire.shape.varies(scene.tire):
+        poles = (ROLLED_OUT if turning(scene) else RELAXING) * loads
+        parts[SLOW] = 16.0 * 4 * 2 * loads * poles + 8.0 * SOFTENED * loads**2
     return parts
 
 
