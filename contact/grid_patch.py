@@ -4,9 +4,10 @@ The finite elements find the static state with the road touching nodes only, and
 On the grid, or on the nodes with their tread, the contact therefore settles again under the same
 load, linearised about that state: f >= 0, g >= 0, f . g = 0 with
 
-    g = z_surface - z_road + delta + C~ f + W A_static (W^T f - f_nodes),  sum f = load,
+    g = z_surface - z_road + delta + C~ f + W (A_static (W^T f - f_nodes) + u_0),  sum f = load,
 
-where A_static is the exact static flexibility between the nodes and delta the rise of the tire.
+where A_static is the exact static flexibility between the nodes, delta the rise of the tire, and u_0 what moves the nodes
+besides, such as the losses of a rolling tire (greens.rolling_loss).
 """
 
 from __future__ import annotations
@@ -130,15 +131,21 @@ def _check_count(
 
 
 def equilibrate(
-    patch: Patch, solver: ContactSolver, flexibility: np.ndarray, nodal_force: np.ndarray
+    patch: Patch,
+    solver: ContactSolver,
+    flexibility: np.ndarray,
+    nodal_force: np.ndarray,
+    offset: np.ndarray | None = None,
 ) -> tuple[Patch, float]:
     """The patch in its static state, and the rise delta (m) of the tire.
 
     `solver` is made for W A_static W^T + C~; `flexibility` A_static (p, p) m/N; `nodal_force` (p,)
-    N of the finite elements, whose sum is preserved. ConvergenceError if no rise yields that load.
+    N of the finite elements, whose sum is preserved; `offset` (p,) m: what moves the nodes besides.
+    ConvergenceError if no rise yields that load.
     """
     load = float(nodal_force.sum())
-    flat = patch.gap - patch.at_points(flexibility @ nodal_force)
+    moved = -(flexibility @ nodal_force) if offset is None else offset - flexibility @ nodal_force
+    flat = patch.gap + patch.at_points(moved)
     if load == 0.0:  # clear of the road
         rise = max(0.0, -float(flat.min()))
         return replace(patch, force=np.zeros_like(flat), gap=flat + rise), rise

@@ -122,11 +122,13 @@ def rolling_steadily(
 
     The contact problem on a smooth road, in steps of a point each and then in the loop's own of `step` s, of a tire that
     follows its forces at once (`response` at 0 Hz). Freely rolling, the slip along the road is set from step to step so that
-    the force along it is none,
+    nothing has to drive the wheel: the road's forces have no moment M_y about the axle,
 
-        s+ = s_0 - F_x / (K way),   s_0 = s - (F_x - F_x before) / (K way),
+        s+ = s_0 - D / (K way),   s_0 = s - (D - D before) / (K way),   D = -M_y / R,
 
-    K the tire's stiffness along the road, `way` that of a step: s_0 is the slip at which F_x would not have changed. What
+    D the force along the road with their moment, R the height of the axle, K the tire's stiffness along the road, `way` that
+    of a step: s_0 is the slip at which D would not have changed. Of a tire that loses nothing it is the force along the
+    road; what the losses of rolling move ahead of the axle, the road's drag makes up for. What
     `setup.slip` has along the road comes on top, afterwards. Steady: from one length of the footprint to the next forces
     change by less than 1e-4 of the load. The setup itself where bristles do not roll: without friction, at standstill,
     with springs in their place. A tread that creeps begins at rest, with that slip. ConvergenceError if nothing is steady
@@ -140,7 +142,8 @@ def rolling_steadily(
     p, pitch = len(patch.index), _pitch(patch)
     flexibility = (response.static() + response.residual)[: 3 * p, : 3 * p]
     length = float(np.ptp(patch.points[touching, 0])) + pitch
-    rolled = _Rolled(spec, setup, flexibility, pitch)
+    shifted = np.zeros(3 * p) if response.offset is None else response.offset[: 3 * p]
+    rolled = _Rolled(spec, setup, flexibility, shifted, pitch)
     found = setup
     if setup.free:
         rolled.freely(given[1])
@@ -152,7 +155,7 @@ def rolling_steadily(
     if spec.law.creep is not None:
         return found
     if (way := setup.rolled.speed * step) < pitch:
-        rolled = _Rolled(spec, setup, flexibility, way, rolled)
+        rolled = _Rolled(spec, setup, flexibility, shifted, way, rolled)
         rolled.held(found.slip)
         rolled.until_steady(length)
     contact = rolled.loop.contact
@@ -169,10 +172,12 @@ class _Rolled:
         spec: ContactSpec,
         setup: ContactSetup,
         flexibility: Array,
+        shifted: Array,
         way: float,
         before: _Rolled | None = None,
     ) -> None:
-        """In steps of `way` m, from rest or where it was `before`; `flexibility` (3p, 3p) m/N to constant forces."""
+        """In steps of `way` m, from rest or where it was `before`; `flexibility` (3p, 3p) m/N to constant forces, and where the
+        nodes are `shifted` (3p,) m to by what always acts inside the tire."""
         patch, p = setup.patch, len(setup.patch.index)
         step = way / setup.rolled.speed
         self.loop = make_loop(spec, setup.smooth(step), StaticTire(flexibility), step, FINE)
@@ -182,6 +187,7 @@ class _Rolled:
         stiffness = 1.0 / float(nodes @ flexibility[p : 2 * p, p : 2 * p] @ nodes)
         self._more = stiffness * way  # N of force along the road for a step at a slip of 1
         self._road, self._free = RoadMet.level(patch), np.zeros(3 * p)
+        self._patch, self._shifted, self._flexibility = patch, shifted, flexibility
         self._shape = replace(setup, slip=(0.0, 0.0)).slips
         self._across: float | None = None
         self._slip, self.way, self._before = (0.0, 0.0), 0.0, 0.0
@@ -235,7 +241,7 @@ class _Rolled:
         )
 
     def _roll(self) -> Array:
-        """A step; the forces (3,) N of the road."""
+        """A step; the forces (3,) N of the road, of a free wheel the drag of their moment in place of that along it."""
         contact, memory = self.loop.contact, self.loop.memory
         tread = memory.predict() if memory else None
         contact.commit(contact.solve(self._road, tread, self._free))
@@ -243,10 +249,23 @@ class _Rolled:
             memory.advance(contact.at_points)
         force, self.way = contact.resultant.copy(), self.way + self._step
         if self._across is not None:
+            force[0] = self._drag()
             unchanged = self.slip - (force[0] - self._before) / self._more
             self._before = force[0]
             self._creep(float(np.clip(unchanged - force[0] / self._more, *MOST_SLIP)), self._across)
         return force
+
+    def _drag(self) -> float:
+        """Force along the road, N, whose moment about the axle is that of the road's forces, where the points have moved to."""
+        contact, patch = self.loop.contact, self._patch
+        moved = (self._shifted + self._flexibility @ contact.change).reshape(3, -1)
+        moved = np.stack([patch.at_points(part) for part in moved[[1, 2, 0]]], axis=-1)
+        force = np.column_stack([contact.horizontal.T, contact.vertical])
+        if patch.frames is not None:
+            moved, force = (np.einsum("ci,cij->cj", one, patch.frames) for one in (moved, force))
+        places = patch.points + moved
+        moment = float(places[:, 2] @ force[:, 0] - places[:, 0] @ force[:, 2])
+        return moment * self._load / float(places[:, 2] @ patch.force)
 
 
 def _pitch(patch: Patch) -> float:

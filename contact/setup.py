@@ -209,14 +209,14 @@ class ContactSetup:
         return replace(self, road=road, rolled=still, pattern=None)
 
     def equilibrated(self, response: Response, nodal_force: np.ndarray, spec: ContactSpec) -> tuple:
-        """(setup, rise in m): settle the points on the tread, which the elements lack.
+        """(setup, rise in m): settle the points on the tread, which the elements lack, and where losses move the tire.
 
-        `nodal_force` (s,) N of the finite elements on the outer face. Nodes without a tread are
-        settled already.
+        `nodal_force` (s,) N of the finite elements on the outer face. Nodes without a tread that nothing
+        moves are settled already.
         """
-        patch, force = self.patch, nodal_force[self.patch.index]
+        patch, force, offset = self.patch, nodal_force[self.patch.index], response.offset
         pull = None if self.pull is None else self.pull[patch.index]
-        if patch.weights is None and not spec.law.compliant:
+        if patch.weights is None and not spec.law.compliant and offset is None:
             return replace(self, patch=replace(patch, pull=pull)), 0.0
         if self.pattern is not None:
             patch = replace(patch, gap=patch.gap + self.begun)
@@ -227,7 +227,8 @@ class ContactSetup:
             normal = resolved[:p, :p]
             flexibility, patch = flexibility - normal, before_equilibrium(patch, normal, force)
         solver = static_solver(spec, patch, flexibility, self.rolled.speed)
-        settled, rise = equilibrate(patch, solver, flexibility, force)
+        moved = None if offset is None else offset[:p]
+        settled, rise = equilibrate(patch, solver, flexibility, force, moved)
         if pull is not None:
             settled = replace(settled, pull=spread_pull(settled, pull, force))
         return replace(self, patch=settled, resolved=resolved), rise

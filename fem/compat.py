@@ -271,7 +271,7 @@ def begin_form(expression: ufl.Form) -> None:
 def evaluate(
     expression: ufl.core.expr.Expr, points: np.ndarray, mesh: dmesh.Mesh, cells: np.ndarray
 ) -> np.ndarray:
-    """A scalar UFL expression (cells, points) in this process's cells at reference `points` (p, 3).
+    """A UFL expression (cells, points, ...) in this process's cells at reference `points` (p, 3), scalar or a vector.
     Collective."""
     made = form_cache.compiled(
         mesh.comm, lambda folder: fem.Expression(expression, points, **_options(folder))
@@ -279,7 +279,7 @@ def evaluate(
     own = cells.astype(np.int32)
     asks_mesh = "mesh" in inspect.signature(made.eval).parameters
     values = made.eval(mesh, own) if asks_mesh else made.eval(own)
-    return np.asarray(values).reshape(len(cells), len(points))
+    return np.asarray(values).reshape(len(cells), len(points), *expression.ufl_shape)
 
 
 def force_vector(form: Any, space: fem.FunctionSpace) -> Any:

@@ -39,6 +39,7 @@ from tireroad.fem.matrices.compliance import (
 )
 from tireroad.fem.matrices.operators import Compound, Operators, RimMotion, Rotation
 from tireroad.fem.model import SmallMotions
+from tireroad.fem.tire.body import Body
 from tireroad.fem.wheel import Axle, Turning
 from tireroad.greens.basis import (
     Array,
@@ -162,8 +163,8 @@ class Wheel:
     (gamma1 1/s, gamma2 s) damps motions outside the modes, and the full matrices: it is given if
     `damping` (modal.damping) is by strain energy, which has no full matrices. `growth`, likewise, of
     the stiffness of these motions over that of the operators. `corner` adds a
-    wheel, held or not, to a projection; `rim`: motions of a held rim, for hub moments. Properties
-    are collective at first use."""
+    wheel, held or not, to a projection; `rim`: motions of a held rim, for hub moments; `pressed`:
+    the body at its static state, None where no road presses on it. Properties are collective at first use."""
 
     operators: Operators
     rotation: Rotation | None
@@ -175,6 +176,7 @@ class Wheel:
     growth: float | None = None
     corner: Callable[[Projection, Modes], Projection] | None = None
     rim: Callable[[], RimMotion | None] | None = None
+    pressed: Callable[[], Body] | None = None
 
     @cached_property
     def rotating_stiffness(self) -> PETSc.Mat:
@@ -392,7 +394,8 @@ class Wheel:
         projection = project(grown, self.rotation, operators.carried, comm, same, compounds)
         if known is not None:
             stays = dynamic(projection, self.speed, known.own)
-            projection, grown = projection.among(stays), grown.among(stays)
+            if not stays.all():
+                projection, grown = projection.among(stays), grown.among(stays)
         projection = self.with_air(projection, grown)
         projection = self.corner(projection, grown) if self.corner else projection
         states, shape = self.decouple(projection, comm), operators.trace(grown.vectors)
@@ -502,4 +505,5 @@ def wheel_of(
         growth=growth,
         corner=corner,
         rim=rim,
+        pressed=(lambda: motions.body) if motions.static.force.any() else None,
     )

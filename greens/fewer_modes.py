@@ -5,7 +5,7 @@ The first modes stay as they are. What joins modes, rotation shapes (modal.rotat
 
     T = [1 0; 0 W],   X~ = T^T X T  for every projected matrix X,   W^T Lambda_r W diagonal,  W^T W = 1.
 
-The run's static response stays that of the finite elements, and what relaxes (greens.slow) as it is. The new states differ from those of as few modes on the finite
+The run's static response stays that of the finite elements, and what relaxes (greens.slow) or always acts as it is. The new states differ from those of as few modes on the finite
 elements by what static shapes lack outside the run's coordinates.
 """
 
@@ -113,7 +113,7 @@ def _coupled(response: Response, rolling: RollingModes, probes: sparse.csr_matri
     outputs[: len(seen)] = seen
     carried = Basis.of(rolling).carried
     made = couple(rolling.states, outputs, seen[: response.residual.shape[1]], carried)
-    return replace(made, pulse=response.pulse)
+    return replace(made, pulse=response.pulse, offset=response.offset)
 
 
 def _completed(made: Response, response: Response) -> Response:

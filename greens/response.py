@@ -70,7 +70,8 @@ class Response:
     with a pulse 1/step high and one step long, in place of its delta(t) (thesis (C.4)). `left_out`
     (3 or 9, k) kg m/N, where known: the same rows of all motions outside the states, which follow
     statically; their rates are what the axle force lacks. The last `relaxing` poles are real and carry no
-    momentum: what slow motions find softer than the modes (greens.slow).
+    momentum: what slow motions find softer than the modes (greens.slow). `offset` (r,) m, where there is one: displacements
+    of the outputs from the static state by forces that always act inside the tire (greens.rolling_loss).
 
         u(t) = Re[C z(t)] + C_b y(t) + G_res f(t),   z' = s z + P f,   y' = T y + P_b f
         g(t) = Re[C e^{st} P] + C_b e^{Tt} P_b  (+ G_res delta(t)),   g(0) = 0 without truncation
@@ -93,6 +94,7 @@ class Response:
     moments: np.ndarray | None = None
     slope: np.ndarray | None = None
     relaxing: int = 0
+    offset: np.ndarray | None = None
 
     @property
     def of_modes(self) -> slice:
@@ -224,6 +226,7 @@ class Response:
             left_out=None if self.left_out is None else self.left_out[:, forces],
             moments=None if self.moments is None else self.moments[outputs],
             slope=None if self.slope is None else self.slope[self._with_rates(outputs)][:, forces],
+            offset=None if self.offset is None else self.offset[outputs],
         )
 
     def _with_rates(self, outputs: slice) -> np.ndarray:

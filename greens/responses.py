@@ -26,7 +26,8 @@ from tireroad.fem.errors import ConvergenceError, NearlySingular
 from tireroad.greens.coupling import FASTEST, Basis, Wheel, between, together
 from tireroad.greens.residuals import residual_of
 from tireroad.greens.response import Response, keep
-from tireroad.greens.slow import slowed
+from tireroad.greens.rolling_loss import standing
+from tireroad.greens.slow import lowest, slowed
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.damping import beyond
 from tireroad.modal.rolling import RollingModes, rolling_modes
@@ -36,6 +37,7 @@ Answer = TypeVar("Answer")
 # Points and frequencies at which the truncation error is estimated: enough for its magnitude.
 _SAMPLE = 40
 _FREQUENCIES = 25
+LOST = "power lost in the rubber by the static state as it rolls"
 
 
 @dataclass(frozen=True)
@@ -138,9 +140,27 @@ def make_response(
     `wheel` returns the full matrices and `fields` the modes on all unknowns; each is called only if
     the residual needs it. InputError for an unknown residual. Collective.
     """
-    kind, probes = residual_of(residual), (outputs, loads)
-    if not kind.solves:
+    if not residual_of(residual).solves:
         return _made(Basis.of(rolling).couple(outputs, loads))
+    made = _solved(wheel, rolling, outputs, loads, residual, fields)
+    rolled = standing(wheel(), lowest(rolling.basis.projection))
+    if rolled is None:
+        return made
+    offset = outputs[:, : len(rolled.motion)] @ rolled.motion
+    figures = made.figures | {LOST: (rolled.loss.whole, "W")}
+    return replace(made, response=replace(made.response, offset=offset), figures=figures)
+
+
+def _solved(
+    wheel: Callable[[], Wheel],
+    rolling: RollingModes,
+    outputs: sparse.csr_matrix,
+    loads: sparse.csr_matrix,
+    residual: str,
+    fields: Callable[[], ModalBasis],
+) -> Made:
+    """The response with a residual that is solved for. Collective."""
+    kind, probes = residual_of(residual), (outputs, loads)
     relaxes = rolling.basis.projection.parts is not None and not rolling.full
     if relaxes:  # between all of them, where what relaxes is symmetric
         probes = (together(outputs, loads),) * 2

@@ -79,6 +79,11 @@ def slowed(wheel: Wheel, basis: Basis, probes: Probes, response: Response) -> Sl
     return _Slow(wheel, basis.held, probes, response).response()
 
 
+def lowest(projection: Projection) -> float:
+    """Frequency of the lowest mode that is not rigid, Hz."""
+    return float(projection.frequency[projection.frequency > 0].min())
+
+
 class _Slow:
     """The flexibilities dA(f) between the probes."""
 
@@ -87,7 +92,7 @@ class _Slow:
         self._projection = projection = basis.projection
         kinds = [kind for kind, _ in wheel.operators.body.wall.kinds()]
         self._kinds = [kind for kind in kinds if kind.spectrum != CONSTANT]
-        self._lowest = float(projection.frequency[projection.frequency > 0].min())
+        self._lowest = lowest(projection)
         own = projection.squares > 0
         self._flexible = np.pad(own, (0, basis.coordinates - len(own)), constant_values=True)
         self._seen = basis.seen(probes)[:, self._flexible]

@@ -75,21 +75,20 @@ def extended(modes: Modes, columns: Array, operators: Operators) -> Modes:
     join now form one space, on all of which K is made diagonal.
     """
     comm, root = operators.body.comm, np.sqrt(operators.mass)[:, None]
-    basis, extra = root * modes.vectors, columns
+    extra = columns
     extra *= root
     whole = summed(comm, np.einsum("ij,ij->j", extra, extra))
     extra /= np.sqrt(np.where(whole > 0, whole, 1.0))  # a load on the clamped rim moves nothing
     largest = 1.0
     while largest > _CLEAN:  # a further pass removes the rounding of one that took off much
-        shares = gram(comm, basis, extra)
-        take_off(extra, basis, shares)
+        shares = gram(comm, modes.vectors, root * extra)
+        take_off(extra, modes.vectors, shares, root)
         largest = np.abs(shares).max(initial=0.0)
     lengths, directions = np.linalg.eigh(gram(comm, extra, extra))
     kept = lengths > _ROUNDING
     extra = combined(extra, directions[:, kept] / np.sqrt(lengths[kept]), extra)
     if lengths[kept].min(initial=1.0) < _CLEAN:
-        take_off(extra, basis, gram(comm, basis, extra))
-    del basis
+        take_off(extra, modes.vectors, gram(comm, modes.vectors, root * extra), root)
     extra = combined(extra, np.linalg.inv(np.linalg.cholesky(gram(comm, extra, extra))).T, extra)
     extra /= root
     vectors = np.hstack([modes.vectors, extra])
@@ -101,11 +100,12 @@ def extended(modes: Modes, columns: Array, operators: Operators) -> Modes:
     return replace(modes, squares=squares, vectors=vectors)
 
 
-def take_off(fields: Array, basis: Array, shares: Array) -> None:
-    """fields (n, p) -= basis (n, m) shares (m, p), in place."""
+def take_off(fields: Array, basis: Array, shares: Array, weight: Array | None = None) -> None:
+    """fields (n, p) -= weight (n, 1) basis (n, m) shares (m, p), in place; no weight: 1."""
     for start in range(0, len(fields), _ROWS):
         rows = slice(start, start + _ROWS)
-        fields[rows] -= basis[rows] @ shares
+        part = basis[rows] @ shares
+        fields[rows] -= part if weight is None else weight[rows] * part
 
 
 def combined(fields: Array, change: Array, out: Array) -> Array:

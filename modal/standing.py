@@ -26,6 +26,7 @@ from tireroad.modal.waves import RIGID, FaceWaves
 _COUNT, _UP_TO = Limits(least=1), Limits(least=1e-3)  # -, Hz
 _SAME = 1e-6  # relative difference of the frequencies of one mode in two solutions
 _ALIKE = 1e-9  # relative difference of equal squares, which keep their order
+_ROWS = 4096  # of all fields at a time, when they are changed in place
 
 
 def standing_modes(
@@ -148,7 +149,7 @@ def named(basis: ModalBasis, lattice: NodeGrid) -> ModalBasis:
 
 
 def _by_own_frequency(modes: Modes, operators: Operators, up_to: float | None) -> Modes:
-    """The modes in the order of the frequencies that they have with moduli at these, to `up_to` Hz.
+    """The modes, used up, in the order of the frequencies that they have with moduli at these, to `up_to` Hz.
     Collective.
 
     The finite elements, by which they were counted, have the moduli of 100 Hz: above that frequency no
@@ -169,7 +170,12 @@ def _by_own_frequency(modes: Modes, operators: Operators, up_to: float | None) -
     if up_to is not None:
         below = own[order] <= (2 * np.pi * up_to) ** 2
         order = order[below] if below.any() else order
-    return replace(modes.among(order), residual=modes.residual[order])
+    vectors, kept = modes.vectors, len(order)
+    for start in range(0, len(vectors), _ROWS):  # in place: a copy of all modes takes gigabytes
+        rows = slice(start, start + _ROWS)
+        vectors[rows, :kept] = vectors[rows][:, order]
+    squares, residual = modes.squares[order], modes.residual[order]
+    return replace(modes, squares=squares, vectors=vectors[:, :kept], residual=residual)
 
 
 def with_fields(

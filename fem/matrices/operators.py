@@ -291,9 +291,11 @@ class Operators:
         inflation: float,
         support: Support = FIXED,
         rolling: Rolling = AT_REST,
+        unknowns: Unknowns | None = None,
     ) -> None:
+        """On the unknowns that a `support` leaves, or on given ones."""
         self.body = body
-        self.unknowns = Unknowns(body, support)
+        self.unknowns = unknowns or Unknowns(body, support)
         self.mass, self.carried = self.unknowns.mass, self.unknowns.carried
         self.stiffness = self._assemble(_stiffness(body, inflation))
         if self.unknowns.rim:

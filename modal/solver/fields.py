@@ -26,6 +26,7 @@ from tireroad.modal.solver.slicing import ProcessGroup, Slice, SymmetricPart
 
 _AT_ONCE = 16  # vectors that one process holds whole
 CHUNK = 64  # columns per matrix product, to avoid a second copy of all vectors
+_ROWS = 4096  # of all vectors at a time, when they are changed in place
 _BETWEEN = 4 * CHUNK  # per product with all vectors: with 64, BLAS packs them half of the time
 # Defect above which a correction pays: neighbouring slices are orthogonal to about 1e-11.
 _REPAIR = 1e-12
@@ -183,12 +184,15 @@ def orthonormalise(comm: MPI.Comm, vectors: np.ndarray, part: np.ndarray) -> flo
     worst = 0.0
     for one in np.unique(part):
         columns = np.flatnonzero(part == one)
-        mine = vectors[:, columns]
+        mine = vectors if len(columns) == len(part) else vectors[:, columns]
         defect = gram(comm, mine, mine) - np.eye(len(columns))
         if np.abs(defect).max() > _REPAIR:
             # Leave what is rounding already: mixing it in would carry stiff modes into soft ones.
-            mine -= mine @ (np.where(np.abs(defect) > _REPAIR / 10, defect, 0.0) / 2)
-            vectors[:, columns] = mine
+            change = np.where(np.abs(defect) > _REPAIR / 10, defect, 0.0) / 2
+            for start in range(0, len(mine), _ROWS):
+                mine[start : start + _ROWS] -= mine[start : start + _ROWS] @ change
+            if mine is not vectors:
+                vectors[:, columns] = mine
             defect = gram(comm, mine, mine) - np.eye(len(columns))
         worst = max(worst, float(np.abs(defect).max()))
     return worst

@@ -158,7 +158,7 @@ class _Problem:
         return self._together(split, spectrum.slices(boundaries), min(count, proof.inertia), proof)
 
     def _together(self, split: _Split, found: list[Slice], count: int, proof: _Proof) -> Modes:
-        """The lowest `count` modes of all slices, orthonormal and by rule, with residuals.
+        """The lowest `count` modes of all slices, which are used up, orthonormal and by rule, with residuals.
         Collective.
         """
         parts, bottom = split.parts, proof.bottom
@@ -170,6 +170,8 @@ class _Problem:
         order, group = order[:end], group[:end]
         vectors = collect(self.scaled, parts, found, order, self.team)
         part = np.concatenate([np.full(len(one.values), one.part) for one in found])[order]
+        slices = len(found)
+        found.clear()  # as many numbers as the modes again
         defect = orthonormalise(self.comm, vectors, part)
         vectors /= np.sqrt(self.mass)[:, None]
         normalise_modes(self.comm, vectors, self.rank, group)
@@ -183,7 +185,7 @@ class _Problem:
             counted_below=proof.top,
             rigid=int((squares == 0).sum()),
             sectors=tuple(part.matrix.shape[1] * part.copies for part in parts),
-            slices=len(found),
+            slices=slices,
             segments=split.segments,
             symmetries=split.symmetries,
         )

@@ -172,6 +172,7 @@ DATASETS: Mapping[str, tuple[Dataset, ...]] = {
             ("WHERE/left_out", "3, k", "kg m/N", "momentum of the motions outside the states"),
             ("WHERE/moments", "r", "-", "1 of outputs that are moments of the hub"),
             ("WHERE/slope", "6, k", "m s, s", "response to the rate of a force, where states are made static"),
+            ("WHERE/offset", "r", "m", "displacement by the losses of the static state as it rolls"),
             ("contact/index", "c", "-", "nodes of the outer face that carry the contact points"),
             ("attached/reading", "k, m", "kg^-1/2", "what the counted probes read of the modes with attachment modes"),
             ("attached/PART", "", "as modes.h5 and rotating.h5", "modes with attachment modes, for the energy"),

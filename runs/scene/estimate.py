@@ -60,6 +60,11 @@ REPORT = 1.6e6
 """Bytes of report.html and the text files: 0.9 to 2.1 MB in twenty runs (2026-11-25)."""
 HEADER = 3e4
 """Bytes of a file's scene, settings and empty datasets."""
+RELAXING, ROLLED_OUT = 0.8, 0.07
+"""Poles of slow rubber over loads of the patch, of a tire that stands (435 of 549 loads) and of one that rolls at 80 km/h (55 of
+741 in quickstart.toml)."""
+SOFTENED = 12
+"""Matrices between all loads of the patch held while slow rubber is found (greens.slow)."""
 INSTANTS = 400
 """Instants of the outer face in motion.h5 at most (runs.stages.vibration)."""
 MOST_OF_VIBRATION = 2e8
@@ -98,6 +103,7 @@ answers, forces and what is made of both (runs.stages.training)."""
 FOOTPRINT = "columns of the footprint"
 TRAINING = "training of large motions"
 FACTOR = "factor of the stiffness"
+SLOW = "slow rubber"
 
 # Keys that determine the size of each part.
 KEYS = {
@@ -112,6 +118,7 @@ KEYS = {
     "flexibility of the patch": "greens.residual, the mesh, contact.reach, the road's height",
     "contact": "contact.points, contact.reach, the road's height",
     TRAINING: "motion.kind, and the mesh",
+    SLOW: "contact.points, contact.reach, the road's height, moduli over frequency",
     "receptances": "output.receptance.step, output.receptance.to, the number of forces",
     "time series": "time.duration, time.step",
     "contact.h5": "time.duration, time.step, contact.points",
@@ -473,6 +480,9 @@ def _contact_memory(scene: Scene, size: Sizes) -> dict[str, float]:
     }
     if keeps_history(scene.time.scheme):
         parts["time series"] += 8.0 * size.steps * loads**2
+    if residual_of(scene.greens.residual).solves and scene.tire.shape.varies(scene.tire):
+        poles = (ROLLED_OUT if turning(scene) else RELAXING) * loads
+        parts[SLOW] = 16.0 * 4 * 2 * loads * poles + 8.0 * SOFTENED * loads**2
     return parts
 
 

@@ -13,7 +13,7 @@ from tireroad.fem.static.state import StaticState
 from tireroad.greens.coupling import Wheel
 from tireroad.greens.residuals import residual_of
 from tireroad.greens.response import Response
-from tireroad.greens.responses import Made, Wanted, band, judged, make_response, selected
+from tireroad.greens.responses import LOST, Made, Wanted, band, judged, make_response, selected
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
@@ -36,7 +36,7 @@ _UNITS = {
     "block_momentum": "kg^1/2",
 }
 # Of the rate of momentum, the last three rows of the slope, in s instead.
-_KNOWN = {"left_out": "kg m/N", "moments": "-", "slope": "m s"}
+_KNOWN = {"left_out": "kg m/N", "moments": "-", "slope": "m s", "offset": "m"}
 _ATTACHED = "attached"
 
 
@@ -206,6 +206,9 @@ class GreensStage(Computed[Responses]):
                 "rolling speed": (setup.rolled.speed, "m/s"),
             }
             _share_of_residual(record, "contact points", responses.contact)
+            if LOST in record.indicators:
+                drag = record.indicators[LOST][0] / setup.rolled.speed
+                record.headline["rolling resistance"] = (100 * drag / self.static.product.load, "%")
         if scene.force:
             record.headline["driven points"] = (len(scene.force), "-")
         for name, response in responses.named.items():

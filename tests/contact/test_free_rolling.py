@@ -3,9 +3,17 @@
 import numpy as np
 import pytest
 
+from tireroad.contact.model import TreadContact
+from tireroad.contact.patch import Patch
+from tireroad.contact.roads.kinds.shapes import Flat
+from tireroad.contact.roads.under_tire import RoadUnderTire
+from tireroad.contact.rolling import rolling_steadily
+from tireroad.contact.setup import ContactSetup, Rolled
 from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.solver.stick_slip import BrushFriction
 from tireroad.contact.tread.brush import Brush, BrushLaw, shape_slip
+from tireroad.contact.tread.law import TREADS
+from tireroad.greens.response import Response
 
 
 def test_slip_of_a_rigid_wheel_and_of_a_cone() -> None:
@@ -64,3 +72,52 @@ def test_slips_follow_the_points_whatever_grid_they_are_on() -> None:
     assert ContactSetup(patch=Points(np.array([1]), None), **given).slips == pytest.approx(
         [0.5, 0.25]
     )
+
+
+def rolling_tire(offset: np.ndarray | None):
+    """A row of points on springs of their own, pressed on a flat road by 100 N, of a wheel of 0.3 m that rolls freely."""
+    x = np.linspace(-0.05, 0.05, 21)
+    c = len(x)
+    patch = Patch(
+        index=np.arange(c),
+        points=np.stack([x, 0 * x, np.full(c, -0.3)], axis=-1),
+        half_sizes=np.full((c, 2), 0.0025),
+        force=np.full(c, 100.0 / c),
+        gap=np.zeros(c),
+        edge=np.zeros(c, bool),
+        line=np.zeros(c, int),
+    )
+    response = Response(
+        eigenvalue=np.zeros(0, complex),
+        output=np.zeros((3 * c, 0), complex),
+        input=np.zeros((0, 3 * c), complex),
+        block=np.zeros((0, 0)),
+        block_output=np.zeros((3 * c, 0)),
+        block_input=np.zeros((0, 3 * c)),
+        residual=1e-6 * np.eye(3 * c),
+        momentum=np.zeros((3, 0)),
+        block_momentum=np.zeros((3, 0)),
+        offset=offset,
+    )
+    law = TREADS.make("half-space", youngs_modulus=1e8)
+    spec = TreadContact(law=law, friction=1.0)
+    road = RoadUnderTire(Flat()).prepare(0.1, 0.2, -0.1, 0.1)
+    given = {"reach": 0.01, "road": road, "rolled": Rolled(speed=20.0, duration=0.1)}
+    setup = ContactSetup(patch=patch, free=True, **given)
+    settled, _ = setup.equilibrated(response, patch.force, spec)
+    return settled, rolling_steadily(spec, settled, response, 1e-3)
+
+
+def test_what_losses_move_ahead_of_the_axle_the_road_drags() -> None:
+    """Points that losses move down ahead and up behind: the load stays, its centre is e ahead, and of a wheel that nothing
+    drives the road takes e / R of the load."""
+    x = np.linspace(-0.05, 0.05, 21)
+    level, rolled = rolling_tire(None)
+    assert level.patch.force @ x == pytest.approx(0.0, abs=1e-9)
+    assert abs(rolled.steady.horizontal[:, 0].sum()) < 2e-4 * 100.0
+    tilted, rolled = rolling_tire(np.r_[-1e-5 * x / 0.05, np.zeros(42)])
+    ahead = tilted.patch.force @ x / 100.0
+    assert tilted.patch.force.sum() == pytest.approx(100.0)
+    assert ahead > 0.002
+    drag = -rolled.steady.horizontal[:, 0].sum()
+    assert drag == pytest.approx(100.0 * ahead / 0.3, rel=0.02)

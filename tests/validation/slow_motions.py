@@ -80,7 +80,7 @@ def _of_wave(ring: InflatedRing, wave: int, lowest: float) -> list[float]:
 
 def _in_loop(title: str, resting: np.ndarray) -> Table:
     """The same of three-dimensional elements as a loop has them; `resting` (speeds, patches) of the Fourier series."""
-    chain, rows = Chain(KEPT, max(SPEEDS)), []
+    chain, rows = Chain.whole(KEPT, max(SPEEDS)), []
     probes = sparse.csr_matrix([chain.patch(0.0, 0.0, (WIDE, half)) for half in LONG])
     static = _static(chain, probes)
     for speed, wanted in zip((0.0, *SPEEDS), resting, strict=True):

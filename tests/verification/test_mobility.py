@@ -17,12 +17,27 @@ def test_modes_against_complex_moduli_by_fourier_series(monkeypatch):
     for name, value in small.items():
         monkeypatch.setattr(mobility, name, value)
     ring = InflatedRing(radial(mobility.SIZE), 12, 2, mobility.PRESSURE)
-    chain, (across, around) = mobility.Chain(300.0), mobility.HALF
-    for y in mobility.PLACES.values():
+    (across, around), places = mobility.HALF, list(mobility.PLACES.values())
+    found = mobility.by_halves(300.0, places, mobility.Bench(ring))
+    for y, receptance in zip(places, found, strict=True):
         exact = ring.receptance(ring.patch(y, across), around, FREQUENCY, mobility.ANGLES)
-        found = mobility.level(chain.receptance(y) / exact, 1 / (2 * np.pi))
+        found = mobility.level(receptance / exact, 1 / (2 * np.pi))
         assert np.abs(found[:, 0]).max() < 1.2
         assert np.abs(found[:, 2]).max() < 1.2
+
+
+@pytest.mark.slow
+def test_both_halves_are_the_whole(monkeypatch):
+    """Forces on the crown move one half alone, on the shoulder both: modes and their static rest, each with what relaxes below
+    its own lowest mode."""
+    small = {"FREQUENCY": FREQUENCY, "AROUND": 12, "ALONG": 8}
+    for name, value in small.items():
+        monkeypatch.setattr(mobility, name, value)
+    bench, places = mobility.Bench(), list(mobility.PLACES.values())
+    chain = mobility.Chain.whole(200.0, bench=bench)
+    for y, found in zip(places, mobility.by_halves(200.0, places, bench), strict=True):
+        exact = chain.receptance(y)
+        assert np.abs(found - exact).max() < 5e-3 * np.abs(exact).max()
 
 
 def test_a_patch_is_the_mean_over_its_strip():

@@ -537,7 +537,8 @@ class RotationTable:
     )
     free_rolling: bool | None = flag(
         None,
-        "the wheel turns at the rate at which a smooth road exerts no drag, to which contact.slip adds; bristles then feel "
+        "nothing drives the wheel: it turns at the rate at which a smooth road has no moment about the axle, to which "
+        "contact.slip adds, and is dragged by its rolling resistance; bristles then feel "
         "the local speeds of the static shape; absent: true with friction",
     )
     slip_angle: float = number(

@@ -142,3 +142,22 @@ def test_the_training_of_large_motions_is_in_it(tmp_path: Path) -> None:
     assert 2.0 < finer / few < 3.0
     assert few > 8 * 2 * 300 * estimate(torus(tmp_path)).sizes.free
     assert name not in estimate(torus(tmp_path)).memory
+
+
+def test_slow_rubber_takes_memory_where_moduli_depend_on_frequency(
+    root: Path, tmp_path: Path
+) -> None:
+    """435 poles for 549 loads standing, 55 for 741 at 80 km/h; none in a torus of one modulus."""
+    scene = root / "runs" / "scenes" / "quickstart.toml"
+    rolling, standing = load(scene), load(scene, ["rotation.speed=0"])
+    taken = [estimate(one) for one in (rolling, standing)]
+    loads = [(3 if one.contact.has_friction else 1) for one in (rolling, standing)]
+    poles = []
+    for one, each in zip(taken, loads, strict=True):
+        count = each * one.sizes.nodes
+        rest = one.memory["slow rubber"] - 8.0 * 12 * count**2
+        poles.append(rest / (128.0 * count) / count)
+    assert poles == pytest.approx([55 / 741, 435 / 549], rel=0.1)
+    assert "slow rubber" not in estimate(torus(tmp_path)).memory
+    without = estimate(load(scene, ['greens.residual="none"']))
+    assert "slow rubber" not in without.memory

@@ -98,8 +98,8 @@ def test_roads_that_cannot_be(tmp_path, old, new, named) -> None:
 
 
 @pytest.mark.long
-def test_a_freely_rolling_wheel_is_not_dragged(tmp_path, launch) -> None:
-    """On a smooth road, cambered: none of the force along the road is left, some of it across (camber thrust)."""
+def test_a_freely_rolling_wheel_is_dragged_by_what_rubs(tmp_path, launch) -> None:
+    """On a smooth drum, cambered, by 0.3 % of the load; some of the force across is left (camber thrust)."""
     scene = tmp_path / "scene.toml"
     text = SCENE.replace("free_rolling = false", "free_rolling = true")
     scene.write_text(text.replace("duration = 0.01", "duration = 0.05"))
@@ -108,7 +108,7 @@ def test_a_freely_rolling_wheel_is_not_dragged(tmp_path, launch) -> None:
     assert "slip of free rolling" in done.stdout
     with h5py.File(tmp_path / "out" / "contact.h5") as contact:
         total = contact["total_force"][:]
-    assert abs(total[-20:, 0].mean()) < 2e-3 * 800.0
+    assert -5e-3 * 800.0 < total[-20:, 0].mean() < 0
     assert abs(total[-1, 1]) > 5.0
 
 

@@ -57,7 +57,9 @@ def forces(ran, folder, *changes: str):
     ids=["freely", "at an angle", "braked", "cambered"],
 )
 def test_forces_on_a_smooth_road_stay(ran, tmp_path, changes) -> None:
-    """The steps of the steady state are a point long, those of the loop a fifth: half a per cent of the load lies between."""
+    """The steps of the steady state are a point long, those of the loop a fifth: half a per cent of the load lies between.
+
+    Freely rolling, the damping of 400 1/s drags the tire by 2 N: without driving it the road has no moment about the axle."""
     total, axle, slip, _ = forces(ran, tmp_path, *changes)
     for found in (total, axle):
         assert np.ptp(found, axis=0).max() < 0.02 * 800.0
@@ -65,7 +67,7 @@ def test_forces_on_a_smooth_road_stay(ran, tmp_path, changes) -> None:
     if "contact.slip=[-0.01, 0.0]" in changes:
         assert mean[0] < -100.0
     else:
-        assert abs(mean[0]) < 2e-3 * 800.0
+        assert -5e-3 * 800.0 < mean[0] < 0
     assert (abs(mean[1]) > 50.0) == ("rotation.slip_angle=1.0" in changes)
     assert 0 < abs(slip) < 0.02
 
