@@ -94,7 +94,7 @@ def wheel():
     residual = 1e-6 * (np.eye(p) + 0.1)
     face = np.zeros(41 * 21)
     face[patch.index] = patch.force
-    return setup, SimpleNamespace(static=lambda: 0.0, residual=residual), face
+    return setup, SimpleNamespace(static=lambda: 0.0, residual=residual, offset=None), face
 
 
 def test_nodes_settle_on_their_tread(wheel) -> None:

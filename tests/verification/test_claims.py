@@ -5,7 +5,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
-COMMANDS = {"validate": ROOT / "runs" / "validation", "bench": ROOT / "tests" / "bench"}
+COMMANDS = {"validate": ROOT / "tests" / "validation", "bench": ROOT / "tests" / "bench"}
 
 
 def _rows() -> dict[str, tuple[str, list[str]]]:

@@ -140,7 +140,7 @@ def test_a_road_that_has_risen_carries_the_static_load():
 
 @pytest.mark.slow
 def test_a_rise_of_centimetres_in_long_steps_ends_at_the_static_load():
-    """Without inertia that would help: the factor of the static state does not converge there."""
+    """Without inertia that would help: the factor of the static state alone does not converge there, with secants it does."""
     loader = pressed(0.002)
     state = static_state(loader.equilibrium, loader.touch)
     patch = patch_of(state, 0.03)
@@ -154,7 +154,6 @@ def test_a_rise_of_centimetres_in_long_steps_ends_at_the_static_load():
         loads=points,
     )
     found = risen(full, patch, FAR, step, 150)
-    assert full.factors > 1
     assert found == pytest.approx(pressed(0.002 + FAR).load(), rel=1e-4)
 
 

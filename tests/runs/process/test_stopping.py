@@ -1,6 +1,7 @@
 """Every way to be stopped ends in time, with status 4 and nothing that is half written."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -117,12 +118,23 @@ def processes_with(text: str) -> list[int]:
     return found
 
 
+def until_caught(pid: int, number: signal.Signals) -> None:
+    """Wait until a process has a handler of the signal."""
+    for _ in range(200):
+        caught = re.search(r"SigCgt:\s*(\w+)", Path(f"/proc/{pid}/status").read_text())
+        if caught and int(caught[1], 16) >> (number - 1) & 1:
+            return
+        time.sleep(0.02)
+    raise AssertionError(f"process {pid} does not catch {number.name}")
+
+
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
 @pytest.mark.parametrize("after", [0.0, 0.05, 0.2, 0.8])
 def test_in_the_first_second(scene: Path, number: signal.Signals, after: float) -> None:
     """From the launcher on: Python takes a while before it can hear anything."""
     with begin([ROOT / "tireroad", "run", scene, "--out", scene.parent / "o"]) as process:
-        time.sleep(0.1 + after)  # the shell's own first instruction sets its trap
+        until_caught(process.pid, number)  # the shell's own first instruction sets its trap
+        time.sleep(after)
         process.send_signal(number)
         _, error = process.communicate(timeout=LONG)
     assert process.returncode == 4, error

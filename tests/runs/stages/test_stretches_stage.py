@@ -172,7 +172,7 @@ def test_a_measured_road_has_as_many_windows_as_its_rest_has_room_for(
     surface, setup = measured(length)
     road = SimpleNamespace(surface=surface, start=0.0, drum_radius=None, run_in=0.1, kind="grid")
     module = "tireroad.runs.stages.stretches"
-    monkeypatch.setattr(f"{module}.made", lambda given: given)
+    monkeypatch.setattr(f"{module}.road_of", lambda given: given)
     monkeypatch.setattr(f"{module}.run_in", lambda *_: 0.01)
     found = _with_room(road, setup, StretchPlan(2, 10), 2000, 1e-4)
     assert (found.stretches, found.windows) == (stretches_, windows)
