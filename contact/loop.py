@@ -24,7 +24,7 @@ from tireroad.contact.solver.projected_cg import ProjectedCG
 from tireroad.contact.solver.stick_slip import BrushFriction, CompressedRows
 from tireroad.contact.tread.memory import TreadMemory
 from tireroad.fem.errors import ConvergenceError, InputError
-from tireroad.greens.recursion import LoadedColumns
+from tireroad.greens.recursion import LoadedColumns, Yields
 from tireroad.greens.schemes import SCHEMES
 
 _ROUNDING = 1e-9  # of the number of steps: a duration that is a multiple of the step stays one
@@ -40,9 +40,6 @@ MIXED = 5  # of them whose places are combined
 # What needs no contact is computed for as many steps at once as make this many points, and for at most so many.
 _POINTS_AHEAD, _STEPS_AHEAD = 200_000, 64
 _NO_FORCE, _NULL = np.zeros((2, 0)), COMPILED.ffi.NULL
-
-# How a contact yields: the changes (k, m) N of forces on the nodes by displacements (k, m) m of them.
-Yields = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -427,8 +424,8 @@ class ContactProblem:
         c = len(patch.points)
         p = c if patch.weights is None else patch.weights.shape[1]
         self.nodes, self.components = p, len(same_step) // p
-        felt = np.ascontiguousarray(same_step.T)  # (k, k)
-        self.answer = felt if of_nodes is None else np.ascontiguousarray(of_nodes.T)
+        self._felt = np.ascontiguousarray(same_step.T)  # (k, k)
+        self.answer = self._felt if of_nodes is None else np.ascontiguousarray(of_nodes.T)
         weights = sparse.identity(p, format="csr") if patch.weights is None else patch.weights
         self._weights: sparse.csr_matrix = weights.tocsr()
         self._slope: Array | None = None
@@ -456,7 +453,7 @@ class ContactProblem:
         doubles = {
             "gap0": np.ascontiguousarray(patch.gap), "at_rest": np.ascontiguousarray(patch.force), "q": self._q,
             "free": self._free, "vertical": self.vertical, "horizontal": self.horizontal, "change": self.at_points,
-            "nodal": self.change, "resultant": self.resultant, "answer": felt, "normal_force": self._force,
+            "nodal": self.change, "resultant": self.resultant, "answer": self._felt, "normal_force": self._force,
             "tangential": self._tangential, "shift": self._shift, "lifted": np.empty(len(same_step)),
             "added": np.empty(3 * c), "value": np.empty(3 * p),
         }  # fmt: skip
@@ -592,9 +589,9 @@ class ContactProblem:
             slopes = np.zeros((len(index), 2)) if self._slope is None else self._slope[index]
             normal += [sparse.diags(-r) @ weights for r in slopes.T]
         lean = sparse.hstack(normal, format="csr")
-        answer = self.answer.T
-        whole = (lean @ (lean @ answer).T).T
-        level = (weights @ (weights @ answer[:p, :p]).T).T
+        felt = self._felt.T
+        whole = (lean @ (lean @ felt).T).T
+        level = (weights @ (weights @ felt[:p, :p]).T).T
         stiff = self._solver.block(index) + whole - level
         return -(lean.T @ np.linalg.solve(stiff, lean @ moved[: lean.shape[1]]))
 

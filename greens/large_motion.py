@@ -26,14 +26,13 @@ from tireroad.fem.nonlinear.force import RestoringForce
 from tireroad.fem.nonlinear.reduced import ReducedForce, at_nodes, extra_loads
 from tireroad.greens.basis import Basis, Probes
 from tireroad.greens.coupling import Wheel
-from tireroad.greens.recursion import LoadedColumns, Recursion
+from tireroad.greens.recursion import LoadedColumns, Recursion, Yields
 from tireroad.greens.response import Response
 from tireroad.greens.schemes import SCHEMES
 from tireroad.modal.corner import READINGS
 from tireroad.modal.solver.slicing import Modes
 
 Array = np.ndarray
-Yields = Callable[[Array], Array]
 
 TOLERANCE = 1e-3  # of s, over the tire's whole motion in the same measure
 FLOOR = 0.1  # J^(1/2): of that motion

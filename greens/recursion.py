@@ -15,7 +15,7 @@ Other forces within a step are declared in greens.schemes.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -39,6 +39,8 @@ SHARED_FROM = 20e6
 _LIBRARY = "user_api", "internal_api", "version", "architecture"
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
+# How a contact yields: the changes (k, m) N of forces on the nodes by displacements (k, m) m of them.
+Yields = Callable[[Array], Array]
 LARGEST = 4e9  # bytes of sampled Green's functions
 
 

@@ -10,7 +10,8 @@ so that the elements lack
 
     C - W N W^T,
 
-which is positive whatever the mesh, and all of it within a few nodes. A tread law that is the tire's own outer rubber (not
+which is not negative on any mesh (as computed, beyond 4 % of the largest C: at the rim of a patch, where C^-1 is cut off), and all of
+it within a few nodes. A tread law that is the tire's own outer rubber (not
 `in_series` with it) counts for that alone: C between the points, and the compliance of the nodes less N.
 
 C is that of a raster of cells several times as close as the nodes, on which their shape functions are what they are between the
