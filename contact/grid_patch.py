@@ -22,6 +22,7 @@ from scipy import sparse
 from scipy.optimize import brentq
 
 from tireroad.contact.patch import Patch
+from tireroad.contact.solver.anderson import Mixed
 from tireroad.contact.solver.conditions import ContactSolver
 from tireroad.contact.tread.kernel import GridPlaces
 from tireroad.fem.errors import ConvergenceError, UnsuitedSettings
@@ -29,6 +30,8 @@ from tireroad.fem.errors import ConvergenceError, UnsuitedSettings
 # Points of the largest grid that is laid out before the patch is known.
 MOST_POINTS = 1_000_000
 LOAD_TOLERANCE = 1e-7
+# Of a tread that creeps at rest: turns, and by what its displacements may change in the last, of the largest.
+MOST_TURNS, SETTLED = 60, 1e-6
 
 ACROSS = 8  # points across the footprint below which twice their spacing gives no estimate
 MOST = 1000  # points that touch at rest with half the spacing, up to which a factor solves them
@@ -136,11 +139,13 @@ def equilibrate(
     flexibility: np.ndarray,
     nodal_force: np.ndarray,
     offset: np.ndarray | None = None,
+    past: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> tuple[Patch, float]:
     """The patch in its static state, and the rise delta (m) of the tire.
 
     `solver` is made for W A_static W^T + C~; `flexibility` A_static (p, p) m/N; `nodal_force` (p,)
-    N of the finite elements, whose sum is preserved; `offset` (p,) m: what moves the nodes besides.
+    N of the finite elements, whose sum is preserved; `offset` (p,) m: what moves the nodes besides; `past`: displacements (c,) m
+    of the points by forces (c,) N on a tread that creeps, beyond those that the solver knows, found by Anderson's acceleration.
     ConvergenceError if no rise yields that load.
     """
     load = float(nodal_force.sum())
@@ -150,12 +155,27 @@ def equilibrate(
         rise = max(0.0, -float(flat.min()))
         return replace(patch, force=np.zeros_like(flat), gap=flat + rise), rise
 
-    def excess(rise: float) -> float:
-        return float(solver.solve(flat + rise).sum()) / load - 1.0
+    def settled(moved: np.ndarray | float) -> tuple[np.ndarray, float]:
+        def excess(rise: float) -> float:
+            return float(solver.solve(flat + moved + rise).sum()) / load - 1.0
 
-    low, high = _bracket(excess, 1e-4)
-    rise = brentq(excess, low, high, xtol=1e-16, rtol=1e-14)
-    force = solver.solve(flat + rise)
+        low, high = _bracket(excess, 1e-4)
+        rise = brentq(excess, low, high, xtol=1e-16, rtol=1e-14)
+        return solver.solve(flat + moved + rise), rise
+
+    crept, mixed = np.zeros((1, len(flat))), Mixed()
+    for _ in range(MOST_TURNS):
+        force, rise = settled(crept[0])
+        if past is None:
+            break
+        rest = past(force)[None] - crept
+        if np.abs(rest).max() <= SETTLED * np.abs(crept).max():
+            break
+        crept = mixed.next(crept, rest, np.where(force > 0.0, 1.0, 0.0)[None])
+    else:
+        raise ConvergenceError(
+            f"contact: no state at rest of a tread that creeps was found in {MOST_TURNS} turns"
+        )
     if not abs(force.sum() / load - 1.0) < LOAD_TOLERANCE:
         raise ConvergenceError(
             f"contact: the points carry {force.sum():.6g} N, not {load:.6g} N; take a finer grid "

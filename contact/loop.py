@@ -18,6 +18,7 @@ from scipy import sparse
 
 from tireroad.contact.patch import Patch
 from tireroad.contact.solver.active_set import COMPILED
+from tireroad.contact.solver.anderson import Mixed
 from tireroad.contact.solver.conditions import Array, ContactSolver, Mask
 from tireroad.contact.solver.grid_newton import GridNewton
 from tireroad.contact.solver.projected_cg import ProjectedCG
@@ -35,7 +36,6 @@ MEETING = 3e-2
 MEETINGS = 20  # solutions of a step, at most
 # Slopes up to which points are followed wholly, and from which on they are not.
 GENTLE, STEEP = 0.5, 1.0
-MIXED = 5  # of them whose places are combined
 
 # What needs no contact is computed for as many steps at once as make this many points, and for at most so many.
 _POINTS_AHEAD, _STEPS_AHEAD = 200_000, 64
@@ -649,33 +649,6 @@ def _in_plane(same_step: Array, weights: sparse.csr_matrix, p: int) -> Array:
     return 0.5 * (x + y)
 
 
-class Mixed:
-    """Anderson's acceleration of places p that are sought where their rest d(p) = 0: the last few are combined so that
-    their rests, weighted, cancel as well as they can."""
-
-    def __init__(self) -> None:
-        self._place: list[Array] = []
-        self._rest: list[Array] = []
-        self._weighted: list[Array] = []
-
-    def next(self, place: Array, rest: Array, weight: Array) -> Array:
-        """The next place, from one and its rest; `weight`: what the rest is judged by."""
-        self._place.append(place)
-        self._rest.append(rest)
-        self._weighted.append((weight * rest).sum(axis=0))
-        for held in (self._place, self._rest, self._weighted):
-            del held[:-MIXED]
-        ahead: Array = place + rest
-        if len(self._place) == 1:
-            return ahead
-        last = self._weighted[-1]
-        apart = np.stack([last - one for one in self._weighted[:-1]], axis=1)
-        share, *_ = np.linalg.lstsq(apart, last, rcond=1e-6)
-        for one, p, d in zip(share, self._place[:-1], self._rest[:-1], strict=True):
-            ahead = ahead - one * (place + rest - p - d)
-        return ahead
-
-
 def _pointer(values: Array | None) -> Any:
     return _NULL if values is None else COMPILED.doubles(values)
 
@@ -753,6 +726,8 @@ class Loop:
         """
         assert isinstance(self.tire, SteadyTire), f"{type(self.tire).__name__} begins at rest only"
         self.contact.set_state(state)
+        if self.memory:
+            self.memory.set_state(state)
         return replace(self, begun=(change, self.tire.start_steady(change)))
 
     def snapshot(self) -> dict[str, np.ndarray]:

@@ -15,7 +15,8 @@ from tireroad.contact.solver.solvers import make_solver
 from tireroad.contact.tread.between_nodes import on_nodes, rastered
 from tireroad.contact.tread.kernel import KernelTread
 from tireroad.contact.tread.law import TreadLaw
-from tireroad.contact.tread.memory import TreadMemory, steady
+from tireroad.contact.tread.laws.elastic import FREQUENCY
+from tireroad.contact.tread.memory import TreadMemory, WholeGrid, softened
 from tireroad.contact.tread.shear import KernelShear, MatrixShear, Shear
 from tireroad.fem.errors import InputError, UnsuitedSettings
 
@@ -98,42 +99,24 @@ def solver_name(spec: ContactSpec, patch: Patch) -> str:
     return "projected-cg" if many and patch.places is not None else "active-set"
 
 
-def static_solver(spec: ContactSpec, patch: Patch, tire: Array, speed: float) -> ContactSolver:
-    """The solver for the static state of a patch that rolls at `speed` m/s.
-
-    As `step_solver`; a viscoelastic tread has all of its past, C~ (1 + sum c_k F_k)
-    (contact.tread.memory).
-    """
-    if spec.law.creep is None:
-        return step_solver(spec, patch, tire)
-    check_creeps(patch)
-    past = steady(spec.law.creep, patch, speed)
-    return make_solver("active-set", _spread(patch, tire) + tread_matrix(spec, patch) @ past)
-
-
-def check_creeps(patch: Patch) -> None:
-    """InputError if a viscoelastic tread has no grid, or one too large for its static state."""
+def past_tread(spec: ContactSpec, patch: Patch, in_plane: bool) -> WholeGrid:
+    """The tread that creeps between the points of a grid, normal to the road or `in_plane` too; InputError at nodes."""
     if patch.places is None:
         raise InputError(
             "contact.tread: a viscoelastic tread needs a grid of points: contact.points = { dx, dy }"
         )
-    if len(patch.points) > MOST_DENSE:
-        raise UnsuitedSettings(
-            f"contact.tread: a viscoelastic tread takes at most {MOST_DENSE} points, here are "
-            f"{len(patch.points)}: take a coarser contact.points or a smaller contact.reach"
-        )
+    farthest = _farthest(patch)
+    shear = spec.law.shear(farthest) if in_plane else None
+    return WholeGrid(patch.places, spec.law.influence(farthest), shear)
 
 
 def tread_memory(spec: ContactSpec, patch: Patch, speed: float, step: float) -> TreadMemory | None:
     """Memory of a viscoelastic tread rolling at `speed` m/s in steps of `step` s; else None."""
     if spec.law.creep is None:
         return None
-    check_creeps(patch)
-    farthest = _farthest(patch)
-    shear = spec.law.shear(farthest) if spec.has_shear else None
-    return TreadMemory(
-        spec.law.creep, spec.law.influence(farthest), patch, speed, step, shear=shear
-    )
+    tread = past_tread(spec, patch, spec.has_shear)
+    assert patch.places is not None
+    return TreadMemory(spec.law.creep, tread, patch.places.spacing[0], speed, step)
 
 
 def tread_shear(spec: ContactSpec, patch: Patch, at_once: float = 1.0) -> Shear | None:
@@ -151,22 +134,18 @@ def tread_shear(spec: ContactSpec, patch: Patch, at_once: float = 1.0) -> Shear 
 
 
 def resolved_tread(spec: ContactSpec, patch: Patch, surface: DeformedTread | None) -> Array | None:
-    """Compliance that the elements resolve of a tread that is the tire's own: N (p, p) or, with shear, (3p, 3p) m/N between the nodes.
+    """Compliance that the elements resolve of a tread that is the tire's own: N (p, p) or, with shear, (3p, 3p) m/N between the nodes,
+    of a tread that creeps at the modulus that it has at 1 kHz.
 
     `surface`: the deformed tread of a grid of points. None of a tread in series, and at nodes, where the elements have all of it.
-    InputError for a tread that creeps, of which this is not known.
     """
     if spec.in_series or patch.places is None:
         return None
-    if spec.law.creep is not None:
-        raise InputError(
-            "contact.in_series = false: what elements resolve of a tread that creeps is not known; take contact.tread = "
-            '"layer", whose losses are those of the elements, or contact.in_series = true'
-        )
     assert surface is not None, "the nodes of a grid of points"
     farthest = _farthest(patch)
     shear = spec.law.shear(farthest) if spec.has_shear else None
-    return on_nodes(rastered(surface, patch), spec.law.influence(farthest), shear)
+    known = on_nodes(rastered(surface, patch), spec.law.influence(farthest), shear)
+    return known if spec.law.creep is None else softened(spec.law.creep, FREQUENCY) * known
 
 
 def _spread(patch: Patch, tire: Array) -> Array:

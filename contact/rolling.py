@@ -23,6 +23,7 @@ PASSAGES = 100  # lengths of the footprint, within which a tire is to roll stead
 FEWEST_STEPS = 8  # of a length
 STEADY = 1e-4  # of the load: changes of the forces from one length to the next
 MOST_SLIP = (-0.2, 0.2)
+SECANTS = 8  # steps to the slip without drag
 FIRST_SLIP = 2e-3  # of a wheel that is to slip; doubled with each step
 FINE = 1e-6  # tolerance of stick and slip, so that the slip is not that of its residual
 
@@ -124,14 +125,14 @@ def rolling_steadily(
     follows its forces at once (`response` at 0 Hz). Freely rolling, the slip along the road is set from step to step so that
     nothing has to drive the wheel: the road's forces have no moment M_y about the axle,
 
-        s+ = s_0 - D / (K way),   s_0 = s - (D - D before) / (K way),   D = -M_y / R,
+        s+ = s_0 - D / (K l),   s_0 = s - (D - D before) / (K way),   D = -M_y / R,
 
     D the force along the road with their moment, R the height of the axle, K the tire's stiffness along the road, `way` that
-    of a step: s_0 is the slip at which D would not have changed. Of a tire that loses nothing it is the force along the
+    of a step and l the length of the footprint: s_0 is the slip at which D would not have changed. Of a tire that loses nothing it is the force along the
     road; what the losses of rolling move ahead of the axle, the road's drag makes up for. What
     `setup.slip` has along the road comes on top, afterwards. Steady: from one length of the footprint to the next forces
     change by less than 1e-4 of the load. The setup itself where bristles do not roll: without friction, at standstill,
-    with springs in their place. A tread that creeps begins at rest, with that slip. ConvergenceError if nothing is steady
+    with springs in their place. ConvergenceError if nothing is steady
     after 100 lengths of the footprint. Not collective: each process finds the same.
     """
     patch, given = setup.patch, setup.slip
@@ -143,24 +144,25 @@ def rolling_steadily(
     flexibility = (response.static() + response.residual)[: 3 * p, : 3 * p]
     length = float(np.ptp(patch.points[touching, 0])) + pitch
     shifted = np.zeros(3 * p) if response.offset is None else response.offset[: 3 * p]
-    rolled = _Rolled(spec, setup, flexibility, shifted, pitch)
-    found = setup
+    found, rolled = setup, _Rolled(spec, setup, flexibility, shifted, length, pitch)
     if setup.free:
         rolled.freely(given[1])
-        rolled.until_steady(length)
+        rolled.until_steady()
         found = setup.with_slip(rolled.slip)
     if given[0] or not setup.free:
         rolled.held(found.slip)
-        rolled.until_steady(length)
-    if spec.law.creep is not None:
-        return found
+        rolled.until_steady()
     if (way := setup.rolled.speed * step) < pitch:
-        rolled = _Rolled(spec, setup, flexibility, shifted, way, rolled)
+        rolled = _Rolled(spec, setup, flexibility, shifted, length, way, rolled)
         rolled.held(found.slip)
-        rolled.until_steady(length)
-    contact = rolled.loop.contact
+        drag = rolled.until_steady()
+        if setup.free and not given[0]:
+            rolled.rid_of(drag)
+            found = setup.with_slip(rolled.slip)
+    contact, memory = rolled.loop.contact, rolled.loop.memory
     forces = contact.vertical.copy(), contact.horizontal.T.copy()
     state = contact.state() | {"lagging": np.zeros(2, int)}  # counted from the loop's first step on
+    state |= memory.state() if memory else {}
     return replace(found, steady=SteadyRolling(state, contact.change.copy(), *forces, rolled.way))
 
 
@@ -173,6 +175,7 @@ class _Rolled:
         setup: ContactSetup,
         flexibility: Array,
         shifted: Array,
+        length: float,
         way: float,
         before: _Rolled | None = None,
     ) -> None:
@@ -181,19 +184,23 @@ class _Rolled:
         patch, p = setup.patch, len(setup.patch.index)
         step = way / setup.rolled.speed
         self.loop = make_loop(spec, setup.smooth(step), StaticTire(flexibility), step, FINE)
-        self._load, self._step = float(patch.force.sum()), way
+        self._load, self._step, self._length = float(patch.force.sum()), way, length
         share = patch.force / self._load
         nodes = share if patch.weights is None else patch.weights.T @ share
         stiffness = 1.0 / float(nodes @ flexibility[p : 2 * p, p : 2 * p] @ nodes)
-        self._more = stiffness * way  # N of force along the road for a step at a slip of 1
+        # N of force along the road for a step, and for the length of the footprint, at a slip of 1.
+        self._more, self._whole = stiffness * way, stiffness * length
         self._road, self._free = RoadMet.level(patch), np.zeros(3 * p)
         self._patch, self._shifted, self._flexibility = patch, shifted, flexibility
         self._shape = replace(setup, slip=(0.0, 0.0)).slips
         self._across: float | None = None
-        self._slip, self.way, self._before = (0.0, 0.0), 0.0, 0.0
+        self._before: float | None = None
+        self._slip, self.way = (0.0, 0.0), 0.0
         if before is not None:
             self._slip, self.way = before._slip, before.way
             self.loop.contact.set_state(before.loop.contact.state())
+            if self.loop.memory and before.loop.memory:
+                self.loop.memory.set_state(before.loop.memory.state())
 
     def freely(self, across: float) -> None:
         """From now on the slip along the road lets the wheel roll freely, with a slip `across`."""
@@ -220,40 +227,56 @@ class _Rolled:
         self._slip = along, across
         self.loop.contact.creep(self._shape + (along, across))
 
-    def until_steady(self, length: float) -> None:
-        """Roll until the mean forces of a `length` (m) are those of the one before."""
-        steps, last = max(math.ceil(length / self._step), FEWEST_STEPS), None
+    def until_steady(self) -> float:
+        """The drag, N, of a length of the footprint whose mean forces are those of the one before."""
+        steps, last = max(math.ceil(self._length / self._step), FEWEST_STEPS), None
         for _ in range(PASSAGES):
             mean = np.mean([self._roll() for _ in range(steps)], axis=0)
             if last is not None:
-                drag = abs(mean[0]) if self._across is not None else 0.0
-                if max(drag, *np.abs(mean - last)[:2]) <= STEADY * self._load:
-                    return
+                drag = abs(mean[2]) if self._across is not None else 0.0
+                if max(drag, *np.abs(mean - last)) <= STEADY * self._load:
+                    return float(mean[2])
             last = mean
         wanted = (
             "no slip at which the road does not drag the tire"
             if self._across is not None
             else "no steady rolling"
         )
-        raise ConvergenceError(
-            f"contact: {wanted} was found within {self.way:.3g} m of a smooth road (last {mean[0]:.3g} N along and "
+        raise self._unsteady(wanted, mean)
+
+    def rid_of(self, drag: float) -> None:
+        """Find the slip along the road without the `drag` (N) of the one now held, from one steady state to the next by secants."""
+        change = -drag / self._whole
+        for _ in range(SECANTS):
+            if abs(drag) <= STEADY * self._load:
+                return
+            self.held((self.slip + change, self._slip[1]))
+            before, drag = drag, self.until_steady()
+            change *= drag / (before - drag)
+        raise self._unsteady(
+            "no slip at which the road does not drag the tire", np.array([0.0, 0.0, drag])
+        )
+
+    def _unsteady(self, wanted: str, mean: Array) -> ConvergenceError:
+        return ConvergenceError(
+            f"contact: {wanted} was found within {self.way:.3g} m of a smooth road (last {mean[2]:.3g} N of drag and "
             f"{mean[1]:.3g} N across it): raise contact.friction, or take rotation.free_rolling = false"
         )
 
     def _roll(self) -> Array:
-        """A step; the forces (3,) N of the road, of a free wheel the drag of their moment in place of that along it."""
+        """A step; the road's forces along and across it, and the drag of their moment, (3,) N."""
         contact, memory = self.loop.contact, self.loop.memory
         tread = memory.predict() if memory else None
         contact.commit(contact.solve(self._road, tread, self._free))
         if memory:
             memory.advance(contact.at_points)
-        force, self.way = contact.resultant.copy(), self.way + self._step
+        drag, self.way = self._drag(), self.way + self._step
         if self._across is not None:
-            force[0] = self._drag()
-            unchanged = self.slip - (force[0] - self._before) / self._more
-            self._before = force[0]
-            self._creep(float(np.clip(unchanged - force[0] / self._more, *MOST_SLIP)), self._across)
-        return force
+            before = drag if self._before is None else self._before
+            unchanged = self.slip - (drag - before) / self._more
+            self._before = drag
+            self._creep(float(np.clip(unchanged - drag / self._whole, *MOST_SLIP)), self._across)
+        return np.array([*contact.resultant[:2], drag])
 
     def _drag(self) -> float:
         """Force along the road, N, whose moment about the axle is that of the road's forces, where the points have moved to."""

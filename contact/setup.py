@@ -10,13 +10,15 @@ import numpy as np
 
 from tireroad.contact.grid_patch import DeformedTread, equilibrate, make_grid_patch, spread_pull
 from tireroad.contact.loop import Drive, no_motion
-from tireroad.contact.model import ContactSpec, resolved_tread, static_solver
+from tireroad.contact.model import ContactSpec, past_tread, resolved_tread, step_solver
 from tireroad.contact.patch import LEAST_REACH, Patch, make_patch
 from tireroad.contact.roads.cell_mean import CellMean
 from tireroad.contact.roads.kinds.shapes import Flat
 from tireroad.contact.roads.under_tire import NOTHING, PreparedRoad, RoadUnderTire
 from tireroad.contact.tread.between_nodes import before_equilibrium
 from tireroad.contact.tread.brush import shape_slip
+from tireroad.contact.tread.laws.elastic import FREQUENCY
+from tireroad.contact.tread.memory import softened, steadily
 from tireroad.contact.tread.pattern import Pattern
 from tireroad.fem.static.road import RoadShape
 from tireroad.greens.response import Response
@@ -223,16 +225,46 @@ class ContactSetup:
             patch = replace(patch, gap=patch.gap + self.begun)
         p = len(patch.index)
         flexibility = (response.static() + response.residual)[:p, :p]
-        resolved = resolved_tread(spec, patch, self.surface)
-        if resolved is not None:
-            normal = resolved[:p, :p]
+        resolved, past, at_rest = resolved_tread(spec, patch, self.surface), None, 1.0
+        normal = None if resolved is None else resolved[:p, :p]
+        if spec.law.creep is not None:
+            # The nodes' part has in the static state no other moduli than its elements.
+            if normal is not None:
+                normal = normal / softened(spec.law.creep, FREQUENCY)
+            past, at_rest = self._past(spec, normal)
+        if normal is not None:
+            normal = at_rest * normal
             flexibility, patch = flexibility - normal, before_equilibrium(patch, normal, force)
-        solver = static_solver(spec, patch, flexibility, self.rolled.speed)
+        solver = step_solver(spec, patch, flexibility, at_rest)
         moved = None if offset is None else offset[:p]
-        settled, rise = equilibrate(patch, solver, flexibility, force, moved)
+        settled, rise = equilibrate(patch, solver, flexibility, force, moved, past)
         if pull is not None:
             settled = replace(settled, pull=spread_pull(settled, pull, force))
         return replace(self, patch=settled, resolved=resolved), rise
+
+    def _past(
+        self, spec: ContactSpec, resolved: np.ndarray | None
+    ) -> tuple[Callable[[np.ndarray], np.ndarray], float]:
+        """Displacements (c,) m by forces (c,) N at rest of a tread that creeps, as far as the nodes do not have it, beyond those at
+        once times a factor, and the factor. `resolved` (p, p) m/N: what they have of it, at its instantaneous modulus."""
+        creep, speed, patch = spec.law.creep, self.rolled.speed, self.patch
+        assert creep is not None
+        tread = past_tread(spec, patch, in_plane=False)
+        # In the middle between a pressure that has just come and one that has long been there.
+        middle = 1.0 + float(creep[0].sum()) * (1.0 if speed == 0 else 0.5)
+
+        def past(force: np.ndarray) -> np.ndarray:
+            crept, field = (
+                steadily(creep, patch, speed, force) - middle * force,
+                np.zeros(tread.shape),
+            )
+            field.ravel()[tread.place] = crept
+            moved = tread(field.reshape(1, -1))[0]
+            if resolved is not None and patch.weights is not None:
+                moved -= patch.at_points(resolved @ (patch.weights.T @ crept))
+            return moved
+
+        return past, middle
 
 
 def freely_rolling(

@@ -36,12 +36,13 @@ from tireroad.contact.roads.under_tire import RoadUnderTire
 from tireroad.contact.rolling import bristles, make_loop, rolling_steadily
 from tireroad.contact.setup import ContactSetup, Rolled, contact_setup, freely_rolling
 from tireroad.contact.tread.law import TREADS, TreadLaw
+from tireroad.contact.tread.laws.elastic import FREQUENCY
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.matrices import probe
 from tireroad.fem.model import SmallMotions, TireModel
 from tireroad.fem.parallel import on_root
 from tireroad.fem.parameters import plain
-from tireroad.fem.sections.mesh2d import Ring, crown_layer
+from tireroad.fem.sections.mesh2d import crown_layer
 from tireroad.fem.sections.torus import Torus
 from tireroad.fem.static.footprint import Footprint
 from tireroad.fem.static.press import press as press_tire
@@ -629,7 +630,7 @@ def drive(
 
     `step` s: time step, by default small enough for the fastest mode. `tread`: a law of
     contact.tread.laws, which lies on the tire's own tread; by default a half-space of 10 MPa, and with a `spacing` on a tire with
-    cords what its elements do not resolve of its tread, a layer of 10 MPa (contact.tread.between_nodes). `spacing` (m, or m, m along and across) of
+    cords what its elements do not resolve of its tread, a layer of 10 MPa at 1 kHz with the losses of its compound (contact.tread.between_nodes). `spacing` (m, or m, m along and across) of
     a grid of contact points, by default the nodes of the mesh. `friction`: coefficient between tread and road,
     where the tread shears (half-space, layer, viscoelastic); 0: none, and horizontal forces come from the road's
     slope alone.
@@ -651,7 +652,7 @@ def drive(
     if not (math.isfinite(friction) and friction >= 0.0):
         raise InputError(f"drive: friction = {friction!r} must be a number of 0 or more")
     own = tread is None and pitches is not None and bool(motions.tire.section.section.plies)
-    law = _own_tread(motions.tire.section) if own else _law(tread)
+    law = _own_tread(motions.tire, turning.speed) if own else _law(tread)
     spec = TreadContact(law=law, friction=friction, in_series=not own)
     if spec.has_friction and rolled.speed > 0:
         setup = freely_rolling(setup, static, motions.lattice.ring, static.rolling_radius())
@@ -678,10 +679,11 @@ def _check_motions(motions: SmallMotions) -> None:
         raise InputError(f"drive: modes with {key} {why}")
 
 
-def _own_tread(ring: Ring) -> TreadLaw:
-    """A layer of 10 MPa as thick as the tire's own tread at the crown."""
-    _, thickness = crown_layer(ring.section)
-    return TREADS.make("layer", youngs_modulus=TREAD_RUBBER, thickness=thickness)
+def _own_tread(tire: TireModel, speed: float) -> TreadLaw:
+    """A layer of 10 MPa at 1 kHz, as thick as the tire's own tread at the crown, if it turns with the losses of its compound."""
+    region, thickness = crown_layer(tire.section.section)
+    loss = tire.body.wall.materials[region].loss(FREQUENCY) if speed else 0.0
+    return TREADS.make("layer", youngs_modulus=TREAD_RUBBER, thickness=thickness, loss_factor=loss)
 
 
 def _law(tread: TreadLaw | None) -> TreadLaw:

@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.contact.tread.kernel import GridPlaces
+from tireroad.contact.tread.memory import cubic
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
-_NODES = np.arange(-1.0, 3.0)  # steps between which a gap is interpolated, by a cubic
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def squeezed(
     ahead = cells.ahead if speed > 0 else cells.point
     back = int(np.floor(over / step))
     at = 1.0 - (over / step - back)  # from back + 1 steps ago to back
-    weights = _cubic(at) if back and at < 1.0 else np.array([0.0, 1.0 - at, at, 0.0])
+    weights = np.array(cubic(at)) if back and at < 1.0 else np.array([0.0, 1.0 - at, at, 0.0])
     kept: Array | None = None
     rates, total, count = [], 0.0, 0
     for block in gaps:
@@ -107,14 +107,3 @@ def squeezed(
         total, count = total + float(here.sum()), count + here.size
         kept = known[n:]
     return SqueezedAir(np.concatenate(rates), over, total / max(count, 1))
-
-
-def _cubic(at: float) -> Array:
-    """Weights (4,) of values at -1, 0, 1, 2 for the cubic through them at a place between 0 and 1."""
-    apart = at - _NODES
-    coefficients = np.ones(4)
-    for k in range(4):
-        for j in range(4):
-            if j != k:
-                coefficients[k] *= apart[j] / (_NODES[k] - _NODES[j])
-    return coefficients

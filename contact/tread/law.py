@@ -25,6 +25,11 @@ class TreadLaw(Parameters):
     shears = False
 
     @property
+    def creeps(self) -> bool:
+        """Whether past pressure moves it."""
+        return False
+
+    @property
     def creep(self) -> tuple[Array, Array] | None:
         """Shares and times (k,), - and s, of its creep (contact.tread.memory), or None."""
         return None

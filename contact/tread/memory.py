@@ -10,22 +10,33 @@ c_k (1 - e^(-t/l_k))]. Over a step h with linear pressure, q of the material adv
 
     q+ = e^x q + (h/l) [(phi_1 - phi_2)(x) p + phi_2(x) p+],   x = -h/l.
 
-Material points keep their own values, and values between them are interpolated when read: no
-numerical diffusion as they travel.
+Where the material of a point was a step before, q and p are interpolated by cubics along the road, in every step alike: values kept
+by material points and read between them would shake the tire as often as points pass. Of a tread that is the tire's own, the nodes lose what their elements have of it
+(contact.tread.between_nodes), as stiff as it is at 1 kHz and without losses, since the tread's own motions are far above the modes.
+
+Rubber of a loss factor tan d over a band has a storage modulus that rises with the power (2/pi) d of frequency (Kramers and Kronig);
+`relaxation_of` fits a Prony series to
+
+    E(f) = E (f/f_0)^a e^(i a pi/2) / cos(a pi/2),   a = (2/pi) arctan(tan d).
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import optimize, signal
 
 from tireroad.contact.patch import Patch
 from tireroad.contact.tread.compliance import Influence
 from tireroad.contact.tread.kernel import GridPlaces, KernelTread
-from tireroad.contact.tread.shear import KernelShear
+from tireroad.contact.tread.shear import GridTread, KernelShear
 from tireroad.fem.errors import InputError
 
 Array = NDArray[np.float64]
+
+# Hz: relaxation of a constant loss factor. Between 40 and 2500 Hz loss and storage of 0.1 to 0.3 are within 7 and 2.5 % of the power law.
+RATES, BAND = (30.0, 300.0, 3000.0), (40.0, 2500.0)
+_FITTED = 60  # frequencies of the band
 
 
 def creep_of(share: Array, time: Array) -> tuple[Array, Array]:
@@ -71,30 +82,75 @@ def weights(lag: Array, step: float) -> tuple[Array, Array, Array]:
     return decay, x * (first - second), x * second
 
 
-def steady(creep: tuple[Array, Array], patch: Patch, speed: float) -> Array:
-    """1 + sum_k c_k F_k (c, c): the filter of a stationary pressure while the tread rolls."""
+def relaxation_of(loss_factor: float, reference: float) -> tuple[float, Array, Array]:
+    """(E_0 over E, shares, times in s) of rubber with the storage modulus E at `reference` Hz and a `loss_factor` from 40 to 2500 Hz.
+
+    E_0 is the instantaneous modulus, as for `creep_of`.
+    """
+    frequency = np.geomspace(*BAND, _FITTED)
+    power = 2 / np.pi * np.arctan(loss_factor)
+    wanted = (1j * frequency / reference) ** power / np.cos(power * np.pi / 2)
+    over = 1j * frequency[:, None] / np.array(RATES)
+    parts = np.hstack([np.ones((_FITTED, 1)), over / (1 + over)]) / wanted[:, None]
+    moduli, _ = optimize.nnls(np.vstack([parts.real, parts.imag]), np.repeat([1.0, 0.0], _FITTED))
+    whole = float(moduli.sum())
+    return whole, moduli[1:] / whole, 1 / (2 * np.pi * np.array(RATES))
+
+
+def softened(creep: tuple[Array, Array], frequency: float) -> float:
+    """E_0 over the storage modulus at a frequency, Hz."""
+    size, lag = creep
+    compliance = 1.0 + (size / (1.0 + 2j * np.pi * frequency * lag)).sum()
+    return float(1.0 / (1.0 / compliance).real)
+
+
+def steadily(creep: tuple[Array, Array], patch: Patch, speed: float, pressed: Array) -> Array:
+    """p + sum_k c_k q_k (c, ...) of a stationary pressure p (c, ...) while the tread rolls at `speed` m/s."""
     size, lag = creep
     if speed == 0:
-        return (1.0 + size.sum()) * np.eye(len(patch.points))
+        whole: Array = (1.0 + size.sum()) * pressed
+        return whole
     assert patch.places is not None, "creep is for a grid of points"
     shape, place = patch.places.shape, patch.places.place
-    decay, old, new = weights(lag, patch.places.spacing[0] / speed)
-    n = shape[0]
-    apart = np.arange(n)[None, :] - np.arange(n)[:, None]  # points upstream
-    line = np.eye(n)
-    for c, e, b0, b1 in zip(size, decay, old, new, strict=True):
-        far = np.where(apart > 0, e ** np.maximum(apart - 1, 0) * (b0 + e * b1), 0.0)
-        line = line + c * (far + b1 * np.eye(n))
-    i, j = np.divmod(place, shape[1])
-    return line[np.ix_(i, i)] * (j[:, None] == j[None, :])
+    field = np.zeros((shape[0] * shape[1], *pressed.shape[1:]))
+    field[place] = pressed
+    field = field.reshape(*shape, *pressed.shape[1:])
+    past, rates = field.copy(), weights(lag, patch.places.spacing[0] / speed)
+    for c, e, old, new in zip(size, *rates, strict=True):
+        # Material comes in at the front, the last row.
+        past += c * signal.lfilter([new, old], [1.0, -e], field[::-1], axis=0)[::-1]
+    return past.reshape(-1, *pressed.shape[1:])[place]
+
+
+class WholeGrid:
+    """The tread between all cells of the grid of a patch, under whose c points it is read.
+
+    `influence` of the tread, and `shear` if it deforms in shear (contact.tread.shear). What has passed beyond the points presses, too.
+    """
+
+    def __init__(
+        self, places: GridPlaces, influence: Influence, shear: Influence | None = None
+    ) -> None:
+        self.shape, self.place = places.shape, places.place
+        self.parts = 1 if shear is None else 3
+        grid = GridPlaces(places.shape, places.spacing, np.arange(np.prod(places.shape)))
+        tread = KernelTread(grid, influence)
+        if shear is None:
+            self._moved = lambda pressed: tread.apply(pressed[0])[None]
+        else:
+            whole = GridTread(tread, KernelShear(grid, shear))
+            self._moved = whole.inside(whole.box)
+
+    def __call__(self, pressed: Array) -> Array:
+        """Displacements (parts, c) m of the points under forces (parts, nx ny) N on the cells."""
+        return self._moved(pressed).take(self.place, axis=1)  # in rows
 
 
 class TreadMemory:
     """The memory of a viscoelastic tread under c points of a regular grid that rolls over the road.
 
-    `creep` (c_k, l_k); `influence` of the tread at its instantaneous modulus, and `shear` if it
-    deforms in shear (contact.tread.shear); `speed` m/s, `step` s. `predict` returns the
-    displacements (1, c) m at the end of a step due to past pressure, or (3, c) with `shear`, z
+    `creep` (c_k, l_k); `tread` at its instantaneous modulus; `spacing` m of the points along, `speed` m/s, `step` s. `predict`
+    returns the displacements (1, c) m at the end of a step due to past pressure, or (3, c) of a tread that shears, z
     before x and y. `advance` takes the change of the forces (c,) or (3 c,) N relative to the static
     ones. `at_once` is the factor of C~ for new forces.
     """
@@ -102,88 +158,72 @@ class TreadMemory:
     def __init__(
         self,
         creep: tuple[Array, Array],
-        influence: Influence,
-        patch: Patch,
+        tread: WholeGrid,
+        spacing: float,
         speed: float,
         step: float,
-        shear: Influence | None = None,
     ) -> None:
-        if patch.places is None:
-            raise InputError(
-                "contact.tread: a viscoelastic tread needs a grid of points: contact.points = { dx, dy }"
-            )
-        self._shape, self._place = patch.places.shape, patch.places.place
         self._size, lag = creep
         self._decay, self._old, self._new = weights(lag, step)
         self.at_once = 1.0 + float(self._size @ self._new)
-        every = np.arange(np.prod(self._shape))
-        grid = GridPlaces(self._shape, patch.places.spacing, every)
-        self._tread = KernelTread(grid, influence)
-        self._shear = None if shear is None else KernelShear(grid, shear)
-        parts = 1 if shear is None else 3
-        self._way = speed * step / patch.places.spacing[0]
-        self._offset = 0.0
-        self._kept = np.zeros((len(lag), parts, *self._shape))
-        self._force = np.zeros((parts, *self._shape))
+        self._tread = tread
+        way = speed * step / spacing
+        jump = int(way)
+        self._taps = [
+            (jump + beside, weight)
+            for beside, weight in zip((-1, 0, 1, 2), cubic(way - jump), strict=True)
+            if weight
+        ]
+        self._kept = np.zeros((len(lag), tread.parts, *tread.shape))
+        self._force = np.zeros((tread.parts, *tread.shape))
 
     def predict(self) -> Array:
         """Displacements (1 or 3, c) m at the end of the next step without a new force."""
-        offset = self._offset + self._way
-        jump = int(offset)
-        relaxed = _each(self._decay) * self._kept + _each(self._old) * self._force
-        self._ahead, self._next = _shifted(relaxed, jump), offset - jump
-        field = np.asarray(np.tensordot(self._size, self._ahead, 1), dtype=float)
-        here = (1.0 - self._next) * field + self._next * _shifted(field, 1)
-        return self._moved(here.reshape(len(here), -1)).take(self._place, axis=1)  # in rows
+        self._ahead = self._carried(
+            _each(self._decay) * self._kept + _each(self._old) * self._force
+        )
+        field: Array = np.asarray(np.tensordot(self._size, self._ahead, 1), dtype=float)
+        return self._tread(field.reshape(len(field), -1))
 
-    def _moved(self, pressed: Array) -> Array:
-        """Displacements (1 or 3, n) m of filtered forces (1 or 3, n) N on the whole grid."""
-        down = self._tread.apply(pressed[0])
-        if self._shear is None:
-            return down[None]
-        sideways = pressed[1] + 1j * pressed[2]
-        moved = self._shear.spread(sideways) + self._shear.drag(pressed[0])
-        return np.stack([down + self._shear.lift(sideways), moved.real, moved.imag])
+    def _carried(self, field: Array) -> Array:
+        """The field (..., nx, ny) with the material moved by a step towards -x; zero enters."""
+        out, n = np.zeros_like(field), field.shape[-2]
+        for jump, weight in self._taps:
+            low, high = max(-jump, 0), max(min(n - jump, n), 0)
+            out[..., low:high, :] += weight * field[..., low + jump : high + jump, :]
+        return out
 
     def advance(self, change: Array) -> None:
         """Set the change (c,) or (3 c,) N of the forces at the end of the step; after `predict`.
 
         Components beyond those of the memory are ignored.
         """
-        parts = len(self._force)
-        force = np.zeros((parts, int(np.prod(self._shape))))
-        force[:, self._place] = change.reshape(-1, len(self._place))[:parts]
-        force = force.reshape(self._force.shape)
-        behind = np.zeros_like(force)
-        behind[:, 1:] = force[:, :-1]
-        self._offset = self._next
-        self._force = (1.0 - self._offset) * force + self._offset * behind
+        place, parts = self._tread.place, len(self._force)
+        force = np.zeros((parts, self._force[0].size))
+        force[:, place] = change.reshape(-1, len(place))[:parts]
+        self._force = force.reshape(self._force.shape)
         self._kept = self._ahead + _each(self._new) * self._force
 
     def state(self) -> dict[str, Array]:
         """The state that a checkpoint keeps."""
-        return {
-            "creep": self._kept,
-            "creep_force": self._force,
-            "creep_offset": np.array(self._offset),
-        }
+        return {"creep": self._kept, "creep_force": self._force}
 
     def set_state(self, state: dict[str, Array]) -> None:
         """Continue from `state`."""
         self._kept, self._force = state["creep"], state["creep_force"]
-        self._offset = float(state["creep_offset"])
+
+
+def cubic(at: float) -> tuple[float, float, float, float]:
+    """Weights of values at -1, 0, 1, 2 for the cubic through them at a place from 0 to 1."""
+    before, after = 1.0 - at, 2.0 - at
+    return (
+        -at * before * after / 6,
+        (1 - at * at) * after / 2,
+        at * (1 + at) * after / 2,
+        -at * (1 - at * at) / 6,
+    )
 
 
 def _each(factor: Array) -> Array:
     """Factors (k,) for fields (k, parts, nx, ny)."""
     return factor[:, None, None, None]
-
-
-def _shifted(field: Array, jump: int) -> Array:
-    """The field (..., nx, ny) with the material moved by `jump` points towards -x; zero enters."""
-    if jump == 0:
-        return field
-    out = np.zeros_like(field)
-    if jump < field.shape[-2]:
-        out[..., :-jump, :] = field[..., jump:, :]
-    return out

@@ -256,6 +256,10 @@ class Material:
         if not (self.density > 0 and math.isfinite(self.density)):
             raise InputError(f"material: density = {self.density:g} kg/m3 must be above 0")
 
+    def loss(self, frequency: float) -> float:
+        """Loss factor at a frequency, Hz."""
+        return self.loss_factor * float(self.spectrum.loss_factor(np.array([frequency]))[0])
+
     def at(self, temperature: float) -> Material:
         """The rubber at a temperature, degrees C; it is given at REFERENCE."""
         shift, spectrum = wlf(temperature), self.spectrum

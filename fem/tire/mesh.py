@@ -218,18 +218,18 @@ class Wall:
         if missing:
             raise InputError(f"section: no material for region {missing[0]!r}")
         self._owner = section.region[tire.section_cell]  # region number of each cell
-        self._materials = [materials[name] for name in section.regions]
-        self.density = self._by_cell([m.density for m in self._materials])
-        self.stiffens = any(m.dynamic != 1 for m in self._materials)
+        self.materials = [materials[name] for name in section.regions]
+        self.density = self._by_cell([m.density for m in self.materials])
+        self.stiffens = any(m.dynamic != 1 for m in self.materials)
         self._laws = [
             (law.energy, [self._coefficient(name, law) for name in law.coefficients])
             for law in map(MATERIALS.__getitem__, MATERIALS)
-            if any(type(m.law) is law for m in self._materials)
+            if any(type(m.law) is law for m in self.materials)
         ]
 
     def _coefficient(self, name: str, law: type[MaterialLaw]) -> fem.Function:
         """A coefficient of the law by cell; 0 where the material follows another law."""
-        own = [m.law for m in self._materials]
+        own = [m.law for m in self.materials]
         return self._by_cell([getattr(value, name) if type(value) is law else 0.0 for value in own])
 
     def _by_cell(self, values: Sequence[float]) -> fem.Function:
@@ -239,11 +239,11 @@ class Wall:
 
     def stiffening(self) -> fem.Function:
         """Excess of the dynamic modulus over the static one, as a fraction of it: dynamic - 1."""
-        return self._by_cell([m.dynamic - 1 for m in self._materials])
+        return self._by_cell([m.dynamic - 1 for m in self.materials])
 
     def kinds(self) -> list[tuple[Kind, fem.Function]]:
         """The kinds of compounds, each with its part of the static modulus by cell."""
-        given = [(m.spectrum, m.loss_factor, m.dynamic) for m in self._materials]
+        given = [(m.spectrum, m.loss_factor, m.dynamic) for m in self.materials]
         return [(kind, self._by_cell(share)) for kind, share in kinds(given).items()]
 
     def energy(self, C: Expr) -> tuple[Expr, Expr]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from tireroad.contact.choices import USABLE
-from tireroad.contact.tread.laws.elastic import ElasticLayer, ElasticTread
+from tireroad.contact.tread.laws.elastic import FREQUENCY, ElasticLayer, ElasticTread
 from tireroad.fem.parameters import second_digit
 from tireroad.fem.sections.mesh2d import crown_layer
 from tireroad.fem.tire.material import REFERENCE, wlf
@@ -191,14 +191,16 @@ def own_tread(scene: Scene, file: SceneFile) -> Scene:
     section = tire.shape.ring(tire).section
     region, thickness = crown_layer(section)
     rubber = tire.shape.rubbers(tire)[section.regions[region]].at(scene.temperature)
-    own = {"thickness": float(f"{thickness:.4g}")}
+    rolls = scene.rotation is not None and (scene.rotation.speed or scene.rotation.travel_speed)
+    loss = rubber.loss(FREQUENCY) if rolls else 0.0  # of a tire that stands, the slow poles have it
+    own = {"thickness": float(f"{thickness:.4g}"), "loss_factor": float(f"{loss:.3g}")}
     if tire.section != "radial":
         own["youngs_modulus"] = float(f"{rubber.dynamic * rubber.law.youngs:.4g}")
     changes = {key: value for key, value in own.items() if key not in file.keys("contact")}
     law = replace(contact.law, **changes)
     file.say(
-        f"contact.in_series = false: of the tire's tread, {1e3 * law.thickness:.3g} mm of {1e-6 * law.youngs_modulus:.3g} MPa, the "
-        "contact counts what the elements do not resolve"
+        f"contact.in_series = false: of the tire's tread, {1e3 * law.thickness:.3g} mm of {1e-6 * law.youngs_modulus:.3g} MPa and a "
+        f"loss factor of {law.loss_factor:.3g}, the contact counts what the elements do not resolve"
     )
     return replace(scene, contact=replace(contact, law=law, in_series=False))
 

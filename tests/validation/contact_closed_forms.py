@@ -30,7 +30,7 @@ from tireroad.contact.tread.compliance import (
     winkler_compliance,
 )
 from tireroad.contact.tread.kernel import GridPlaces, KernelTread
-from tireroad.contact.tread.memory import steady
+from tireroad.contact.tread.memory import steadily
 from tireroad.contact.tread.pattern import Pattern, pitch_starts
 from tireroad.contact.tread.shear import KernelShear, half_space_shear
 from tireroad.fem.errors import ConvergenceError
@@ -411,7 +411,10 @@ def matrix(patch: Patch) -> np.ndarray:
 def rolled_strip(time: float) -> np.ndarray:
     """Pressures (MPa) of the rolling cylinder with one relaxation `time` (s), modulus halved."""
     patch, creep = cylinder(), (np.array([1.0]), np.array([time]))
-    return pressed(ActiveSet(matrix(patch) @ steady(creep, patch, CREEP_SPEED)), patch.gap)
+    return pressed(
+        ActiveSet(matrix(patch) @ steadily(creep, patch, CREEP_SPEED, np.eye(len(patch.points)))),
+        patch.gap,
+    )
 
 
 class Rigid:

@@ -44,6 +44,11 @@ class Viscoelastic(ElasticTread):
             raise ParameterError("relaxation", str(problem).removeprefix("tread: ")) from None
 
     @property
+    def creeps(self) -> bool:
+        """True."""
+        return True
+
+    @property
     def creep(self) -> tuple[Array, Array]:
         """Shares and times (k,), - and s, of the creep."""
         from tireroad.contact.tread.memory import creep_of

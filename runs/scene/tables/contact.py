@@ -188,23 +188,16 @@ class ContactTable(Variants):
 
 def check_tread(contact: ContactTable, standing: bool, error: Where, has_friction: bool) -> None:
     """Raise an error for invalid treads and brushes; `has_friction`: the static state has friction."""
-    if contact.law.creep is not None and contact.on_nodes:
+    if contact.law.creeps and contact.on_nodes:
         raise error(
             ("contact", "tread"),
-            "= a tread that creeps needs a grid: contact.points = { dx, dy } (m)",
+            "= a tread that creeps, by its relaxation or loss_factor, needs a grid: contact.points = { dx, dy } (m)",
         )
-    if not contact.in_series:
-        if contact.law.creep is not None:
-            raise error(
-                ("contact", "in_series"),
-                '= false: what elements resolve of a tread that creeps is not known: take contact.tread = "layer", whose losses '
-                "are those of the elements, or true",
-            )
-        if contact.on_nodes:
-            raise error(
-                ("contact", "in_series"),
-                "= false: nodes have all of the tire's tread: take contact.points = { dx, dy } (m), or true",
-            )
+    if contact.on_nodes and not contact.in_series:
+        raise error(
+            ("contact", "in_series"),
+            "= false: nodes have all of the tire's tread: take contact.points = { dx, dy } (m), or true",
+        )
     if None not in (contact.brush_stiffness, contact.brush_stiffness_per_area):
         raise error(
             ("contact", "brush_stiffness_per_area"), "and brush_stiffness are two brushes: keep one"

@@ -1,11 +1,24 @@
 """A tread that creeps: against published rolling cylinders, its elastic limits, and in time."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy import sparse
 
+from tireroad.contact.grid_patch import equilibrate
 from tireroad.contact.solver.active_set import ActiveSet
+from tireroad.contact.tread.kernel import KernelTread
+from tireroad.contact.tread.laws.elastic import ElasticLayer
 from tireroad.contact.tread.laws.viscoelastic import Viscoelastic
-from tireroad.contact.tread.memory import TreadMemory, creep_of, steady
+from tireroad.contact.tread.memory import (
+    TreadMemory,
+    WholeGrid,
+    creep_of,
+    relaxation_of,
+    softened,
+    steadily,
+)
 from tireroad.fem.errors import InputError
 from tireroad.tests.validation.contact_closed_forms import (
     CREEP_SPEED,
@@ -38,16 +51,17 @@ def test_published_pressure_of_rolling_cylinders(time, published) -> None:
 def test_rolled_in_time_it_comes_to_the_steady_state(share) -> None:
     """Steps of a point, and of 0.3 of it, where material is read between the points."""
     patch, creep = cylinder(), (np.array([0.6, 0.4]), np.array([0.003, 0.01]))
-    exact = pressed(ActiveSet(matrix(patch) @ steady(creep, patch, CREEP_SPEED)), patch.gap)
-    step = share * DX / CREEP_SPEED
-    memory = TreadMemory(creep, influence, patch, CREEP_SPEED, step)
+    past = steadily(creep, patch, CREEP_SPEED, np.eye(len(patch.points)))
+    exact = pressed(ActiveSet(matrix(patch) @ past), patch.gap)
+    step, tread = share * DX / CREEP_SPEED, WholeGrid(patch.places, influence)
+    memory = TreadMemory(creep, tread, DX, CREEP_SPEED, step)
     solver = ActiveSet(matrix(patch) * memory.at_once)
     for k in range(int(0.06 / step)):
         past = memory.predict()[0]
         pressure = pressed(solver, patch.gap + past)
         memory.advance(pressure * DX * DY * 1e6)
         if k == 40:
-            again = TreadMemory(creep, influence, patch, CREEP_SPEED, step)
+            again = TreadMemory(creep, tread, DX, CREEP_SPEED, step)
             again.set_state(memory.state())
             assert (again.predict() == memory.predict()).all()
     assert np.abs(pressure - exact).max() < (1e-6 if share == 1.0 else 0.01) * exact.max()
@@ -55,7 +69,8 @@ def test_rolled_in_time_it_comes_to_the_steady_state(share) -> None:
 
 def test_standing_it_creeps_to_its_relaxed_modulus() -> None:
     patch, creep = cylinder(), (np.array([0.5]), np.array([0.01]))
-    memory, force = TreadMemory(creep, influence, patch, 0.0, 1e-3), patch.gap[::-1] * 1e6
+    memory = TreadMemory(creep, WholeGrid(patch.places, influence), DX, 0.0, 1e-3)
+    force = patch.gap[::-1] * 1e6
     for _ in range(100):
         past = memory.predict()[0]
         memory.advance(force)
@@ -65,6 +80,56 @@ def test_standing_it_creeps_to_its_relaxed_modulus() -> None:
         0.5 * (1 - (1 - np.exp(-0.1)) / 0.1) * np.exp(-9.9)
     )  # the first force came up over a step
     assert whole == pytest.approx((grown - first) * (matrix(patch) @ force), rel=2e-4)
+
+
+@pytest.mark.parametrize("loss_factor", [0.1, 0.2, 0.3])
+def test_relaxation_of_a_loss_factor(loss_factor) -> None:
+    """Losses and storage over frequency, those of Kramers and Kronig's power of it; 1 at 1 kHz."""
+    whole, share, time = relaxation_of(loss_factor, 1000.0)
+    frequency = np.geomspace(40.0, 2500.0, 25)
+    over = 2j * np.pi * frequency[:, None] * time
+    modulus = whole * (1 - share.sum() + (share * over / (1 + over)).sum(axis=1))
+    assert modulus.imag / modulus.real == pytest.approx(np.full(25, loss_factor), rel=0.08)
+    power = 2 / np.pi * np.arctan(loss_factor)
+    assert modulus.real == pytest.approx((frequency / 1000.0) ** power, rel=0.03)
+
+
+def test_a_sine_meets_modulus_and_losses_of_its_frequency() -> None:
+    """A standing layer under 300 Hz: displacement over force is that of an elastic one over E'(1 + 0.3 i)/E, within the fit."""
+    law = ElasticLayer(youngs_modulus=1e7, poisson_ratio=0.49, thickness=0.008, loss_factor=0.3)
+    assert softened(law.creep, 1000.0) == pytest.approx(relaxation_of(0.3, 1000.0)[0], rel=0.02)
+    elastic = ElasticLayer(youngs_modulus=1e7, poisson_ratio=0.49, thickness=0.008)
+    patch, step, frequency = cylinder(), 5e-5, 300.0
+    memory = TreadMemory(law.creep, WholeGrid(patch.places, law.influence(1.0)), DX, 0.0, step)
+    at_once = KernelTread(patch.places, law.influence(1.0)).apply
+    shape, moved = np.exp(-((patch.points[:, 0] / 2e-3) ** 2)), []
+    time = step * (1 + np.arange(2000))
+    force = np.sin(2 * np.pi * frequency * time)
+    for one in force:
+        moved.append((memory.predict()[0] + memory.at_once * at_once(one * shape)).sum())
+        memory.advance(one * shape)
+    wave = np.exp(-2j * np.pi * frequency * time[-400:])  # six periods
+    found = (wave @ moved[-400:]) / (wave @ force[-400:])
+    once = KernelTread(patch.places, elastic.influence(1.0)).apply(shape).sum()
+    modulus = once / found
+    assert modulus.imag / modulus.real == pytest.approx(0.3, rel=0.08)
+    assert modulus.real == pytest.approx(0.3 ** (2 / np.pi * np.arctan(0.3)), rel=0.03)
+
+
+def test_at_rest_it_has_crept_as_it_rolls() -> None:
+    """The state under a load by turns, beside the contact problem of the whole past at once."""
+    patch, creep = cylinder(), (np.array([1.0]), np.array([0.009]))
+    past, stiff = steadily(creep, patch, CREEP_SPEED, np.eye(len(patch.points))), matrix(patch)
+    exact = rolled_strip(0.009) * DX * DY * 1e6
+    nodes = np.array([exact.sum()])
+    on_nodes = replace(
+        patch, index=np.zeros(1, int), weights=sparse.csr_matrix(np.ones((len(exact), 1)))
+    )
+    settled, _ = equilibrate(
+        on_nodes, ActiveSet(1.5 * stiff), np.zeros((1, 1)), nodes, None,
+        lambda force: stiff @ (past @ force - 1.5 * force),
+    )  # fmt: skip
+    assert settled.force == pytest.approx(exact, abs=2e-5 * exact.max())
 
 
 def test_relaxation_as_creep() -> None:

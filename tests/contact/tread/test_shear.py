@@ -1,7 +1,5 @@
 """Horizontal displacements of half-space and layer: kernels against integrals and equations, in the loop."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -13,7 +11,7 @@ from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import half_space_compliance, half_space_influence
 from tireroad.contact.tread.kernel import GridPlaces
 from tireroad.contact.tread.layer import LayerInfluence, LayerShear, transforms
-from tireroad.contact.tread.memory import TreadMemory
+from tireroad.contact.tread.memory import TreadMemory, WholeGrid
 from tireroad.contact.tread.shear import KernelShear, MatrixShear, half_space_shear
 from tireroad.greens.recursion import Recursion
 from tireroad.tests.validation.cases import RollingStrip, oval_patch
@@ -186,12 +184,10 @@ def test_a_loop_goes_on_with_the_same_bits_on_a_shearing_tread() -> None:
 
 def test_sideways_too_a_tread_creeps_to_its_relaxed_modulus() -> None:
     grid, points, half_sizes = cells(6, 5, 0.01, 0.01)
-    patch = SimpleNamespace(places=grid, points=points)
     creep = np.array([0.5]), np.array([0.01])
     tread = half_space(0.3)
-    memory = TreadMemory(
-        creep, lambda *at: half_space_influence(*at, YOUNG, 0.3), patch, 0.0, 1e-3, shear=tread
-    )
+    past = WholeGrid(grid, lambda *at: half_space_influence(*at, YOUNG, 0.3), tread)
+    memory = TreadMemory(creep, past, 0.01, 0.0, 1e-3)
     force = np.random.default_rng(3).standard_normal((3, 30))
     for _ in range(150):
         past = memory.predict()

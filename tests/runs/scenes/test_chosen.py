@@ -154,15 +154,20 @@ def test_a_contact_that_is_left_open_is_the_tires_own_tread(
 
 
 @pytest.mark.parametrize(
-    ("contact", "why"),
+    ("scene", "loss_factor"),
     [
-        ('points = "nodes"\nin_series = false', "nodes have all"),
-        (
-            'tread = "viscoelastic"\npoints = { dx = 5e-3, dy = 5e-3 }\nin_series = false',
-            "creeps is not known",
-        ),
+        (RADIAL, 0.0),
+        (RADIAL + "[rotation]\ntravel_speed = 20.0\n", 0.3),
+        (RADIAL + "loss_factor = 0.1\n[rotation]\nspeed = 70.0\n", 0.1),
+        (RADIAL + 'tread = "layer"\n[rotation]\nspeed = 70.0\n', 0.0),
     ],
+    ids=["standing", "rolling", "given", "in series"],
 )
-def test_a_tread_of_the_tires_own_where_that_is_not_known(scene_file, contact, why) -> None:
-    with pytest.raises(InputError, match=f"contact.in_series = false.*{why}"):
-        load(scene_file(RADIAL + contact))
+def test_the_tires_own_tread_has_its_losses(scene_file, scene, loss_factor) -> None:
+    """Of a tire that stands, its slow rubber has them."""
+    assert load(scene_file(scene)).contact.law.loss_factor == loss_factor
+
+
+def test_a_tread_of_the_tires_own_where_that_is_not_known(scene_file) -> None:
+    with pytest.raises(InputError, match="contact.in_series = false.*nodes have all"):
+        load(scene_file(RADIAL + 'points = "nodes"\nin_series = false'))
