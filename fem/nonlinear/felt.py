@@ -25,7 +25,7 @@ def felt_by_road(
 ) -> Array:
     """Forces f (t,) N at t points that touch by a load b (n,) N left out at a motion q (n,) m.
 
-    `normal` W n^T (n, t) on own rows; `tread` (t, t) m/N. ConvergenceError where K_T is singular. Collective.
+    `normal` W n^T (n, t) on own rows; `tread` (t, t) m/N. NearlySingular where K_T is. Collective.
     """
     stiffness, comm = force.tangent(motion, motion), force.body.comm
     factor = factorise(stiffness)

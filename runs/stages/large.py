@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -12,6 +13,7 @@ from scipy import sparse
 
 from tireroad.contact.loop import STEPS_AHEAD, ContactProblem, LinearTire
 from tireroad.fem.collective import summed
+from tireroad.fem.errors import NearlySingular
 from tireroad.fem.matrices.compliance import (
     LoadedShapes,
     factorise,
@@ -252,23 +254,26 @@ class LargeMotion:
             size=sizes(restoring, motion, answer),
         )
 
-    def felt(self, instants: Instants, step: float) -> Felt:
-        """What the road feels of what the reduced force leaves out, at some of the instants. Collective."""
+    def felt(self, instants: Instants, step: float) -> Felt | None:
+        """What the road feels of what the reduced force leaves out, at some of the instants; None if at all of them the tire has
+        no stiffness of its own. Collective."""
         some, contact = instants.some(self._spread(instants)), instants.contact
         begun, count = instants.at_begin, len(contact.change)
         motions = self.motions(some, step)
         loads = self._lacking(motions) - self._lacking(self.motions(begun, step))
         own = on_own_rows(self.restoring.operators, self.points[:count]).tocsc()
-        force = np.zeros((len(some), 3))
+        force = np.full((len(some), 3), np.nan)
         for k, touching in enumerate(np.moveaxis(some.columns[4], -1, 0)):
             lean, tread = contact.bearing(touching)
-            if lean.shape[0]:
-                normal = (own @ lean.T).tocsr()
-                given = motions[:, k], loads[:, k], normal, tread
+            given = motions[:, k], loads[:, k], (own @ lean.T).tocsr(), tread
+            with suppress(NearlySingular):
                 force[k] = contact.total(lean.T @ felt_by_road(self.restoring, *given))
         pushed = some.columns[3][:count] - begun.columns[3][:count]
         changed = np.stack([contact.total(one) for one in pushed.T])
-        return Felt(time=some.columns[0], force=force, changed=changed)
+        known = np.isfinite(force[:, 0])
+        if not known.any():
+            return None
+        return Felt(time=some.columns[0][known], force=force[known], changed=changed[known])
 
     def _lacking(self, motion: Array) -> Array:
         """The load r - K V s (n, i) N that the reduced force leaves out of motions (n, i). Collective."""

@@ -1,10 +1,10 @@
-"""Stage nonlinear: the reduced nonlinear force of the tire, trained on the road of the run and by the run itself.
+"""Stage nonlinear: the reduced nonlinear force of the tire, trained on the road of the run and judged by the run itself.
 
 First the standing tire climbs rises, and the road as it lies under the footprint at places along the run. Then the time
-loop runs with the force found so far: at instants of it the elements' force of the whole motion is evaluated, and where
-the vectors lack some of it the instants join the states. Standing tires alone do not do: one of 205/60 R15 that rolls
-over a bar of 10 mm at 30 km/h swings by millimetres, and two thirds of its motion were outside the training on 94 such
-states. Runs alone do not, either: with vectors of a linear tire's motion the loop did not settle.
+loop runs with the first few vectors of these states, and it is found what the road feels of what they leave out: more of them
+follow where it is much, and at last states of the run. States of a run are the last resort: a belted tire does not move where its
+reduced force lets it, and its vectors then answer to what no tire does. Vectors of a linear tire's motion alone did
+not let the loop settle.
 """
 
 from __future__ import annotations
@@ -55,6 +55,7 @@ RUNS, INSTANTS, STEPS = 8, 60, 4000  # at most: runs, instants of each, steps of
 FEW = 8  # vectors of the first run; twice as many where they leave out too much
 ENOUGH = 0.05  # of the change of the road's force: what the training may leave out of a run
 SETTINGS = Settings(most=160, turns=6, precision=5e-3)
+DONE, MORE, STATES, NO_BETTER = "little is left out", "more vectors", "its states", "no better"
 _RESPONSE = "response"
 
 
@@ -182,23 +183,24 @@ class NonlinearStage(Computed[TrainedMotion]):
                 kept = replace(plan, response=motion.response.resolved(plan.step))
                 instants, stopped = self._rolled(motion, setup, kept)
             with record.timing("forces of the elements"):
-                left_out = motion.felt(instants, plan.step).share
+                felt = None if stopped else motion.felt(instants, plan.step)
+            left_out = felt.share if felt else np.inf
             count = training.vectors.shape[1]
             told(
-                f"run {number} with {count} vectors and {len(training.force.cells)} cells: {100 * left_out:.3g} % of the change of "
-                f"the road's force left out; {stopped or 'whole'}"
+                f"run {number} with {count} vectors and {len(training.force.cells)} cells: "
+                + (stopped or f"{100 * left_out:.3g} % of the change of the road's force left out")
             )
             runs.append(Trained(f"run {number}", len(instants), left_out, 0.0, stopped or "whole"))
-            worse = best is not None and left_out >= best[0]
-            if not stopped and not worse:
+            before = best[0] if best else np.inf
+            if not stopped and (best is None or left_out < before):
                 best = left_out, training, motion
-            if not stopped and left_out <= ENOUGH:
+            more = count == most < SETTINGS.most
+            next_one = after_run(left_out, before, more, len(seen) > 1)
+            if next_one in (DONE, NO_BETTER):
                 break
-            if count == most < SETTINGS.most:
+            if next_one == MORE:
                 most = min(2 * most, SETTINGS.most)
                 continue
-            if worse and len(seen) > 1:
-                break
             with record.timing("forces of the elements"):
                 left = motion.left_out(instants, plan.step)
             some = left.shares > ENOUGH / 2
@@ -254,6 +256,17 @@ class NonlinearStage(Computed[TrainedMotion]):
         return TrainedMotion(held, read_response(file[_RESPONSE]))
 
 
+def after_run(left_out: float, before: float, more: bool, joined: bool) -> str:
+    """What follows a run whose training leaves out a share of the force, inf if it stopped, and the best run `before` another:
+    nothing if it is little; vectors of the states known if there are `more`; the run's own states; nothing if those of
+    an earlier run have `joined` and made it no better."""
+    if left_out <= ENOUGH:
+        return DONE
+    if more:
+        return MORE
+    return NO_BETTER if joined and left_out >= before < np.inf else STATES
+
+
 def linear_motion(stage: Any) -> LargeMotion:
     """The motion of a stage's linear tire, with what its large motions need. Collective."""
     rolling, fields = stage.rotating.product, stage.fields.product
@@ -286,8 +299,9 @@ def _describe(record: Record, training: Training, left_out: float) -> None:
         "vectors": (training.vectors.shape[1], "-"),
         "cells of the mesh": (len(training.force.cells), "-"),
         "largest motion of a state left out": (100 * training.left, "%"),
-        "force of the run left out": (100 * left_out, "%"),
     }
+    if np.isfinite(left_out):
+        record.headline["force of the run left out"] = (100 * left_out, "%")
     record.indicators["error of the weighted cells"] = (100 * training.error, "%")
     short = [one for one in roads if one.how.startswith("to ")]
     if short:
