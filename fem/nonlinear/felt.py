@@ -1,4 +1,4 @@
-"""What the road feels of a load that a reduced force leaves out.
+"""The answer of the road to a load that a reduced force leaves out.
 
 The linear tire answers such a load by up to ten times the motion that the tire itself does: its belts have moved, and resist
 where they did not. So the answer is that of the elements' tangent K_T at the motion q, with the points that touch:

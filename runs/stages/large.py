@@ -51,7 +51,7 @@ class Instants:
     (ContactProblem.touching), at some times, s."""
 
     def __init__(self, linear: LinearTire, contact: ContactProblem) -> None:
-        """Of a loop that begins. Collective where the recursion is."""
+        """The instants of a loop that begins. Collective where the recursion is."""
         self._linear, self.contact = linear, contact
         self.begun = self._now(0.0)
         self.kept: list[Instant] = []
@@ -128,7 +128,7 @@ class Greatest(Instants):
 
 @dataclass(frozen=True, kw_only=True)
 class Felt:
-    """What the road feels of what a reduced force leaves out, at i instants `time` (i,) s: `force` (i, 3) N
+    """The force of the road by what a reduced force leaves out, at i instants `time` (i,) s: `force` (i, 3) N
     (fem.nonlinear.felt), beside the force that has `changed` (i, 3) N since the loop began."""
 
     time: Array
@@ -255,7 +255,7 @@ class LargeMotion:
         )
 
     def felt(self, instants: Instants, step: float) -> Felt | None:
-        """What the road feels of what the reduced force leaves out, at some of the instants; None if at all of them the tire has
+        """The force of the road by what the reduced force leaves out, at some of the instants; None if at all of them the tire has
         no stiffness of its own. Collective."""
         some, contact = instants.some(self._spread(instants)), instants.contact
         begun, count = instants.at_begin, len(contact.change)

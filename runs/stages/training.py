@@ -257,7 +257,7 @@ class NonlinearStage(Computed[TrainedMotion]):
 
 
 def after_run(left_out: float, before: float, more: bool, joined: bool) -> str:
-    """What follows a run whose training leaves out a share of the force, inf if it stopped, and the best run `before` another:
+    """The step that follows a run whose training leaves out a share of the force, inf if it stopped, and the best run `before` another:
     nothing if it is little; vectors of the states known if there are `more`; the run's own states; nothing if those of
     an earlier run have `joined` and made it no better."""
     if left_out <= ENOUGH:
