@@ -38,7 +38,7 @@ MEETINGS = 20  # solutions of a step, at most
 GENTLE, STEEP = 0.5, 1.0
 
 # What needs no contact is computed for as many steps at once as make this many points, and for at most so many.
-_POINTS_AHEAD, _STEPS_AHEAD = 200_000, 64
+_POINTS_AHEAD, STEPS_AHEAD = 200_000, 64
 _NO_FORCE, _NULL = np.zeros((2, 0)), COMPILED.ffi.NULL
 
 
@@ -164,7 +164,7 @@ def _packed(found: Solved) -> Array:
 
 def block_size(points: int) -> int:
     """Steps of a block for this many contact points, a power of two."""
-    most: int = min(max(_POINTS_AHEAD // points, 1), _STEPS_AHEAD)
+    most: int = min(max(_POINTS_AHEAD // points, 1), STEPS_AHEAD)
     return 1 << (most.bit_length() - 1)
 
 
@@ -576,24 +576,39 @@ class ContactProblem:
         self._touching = None
         return self.change
 
+    @property
+    def touching(self) -> Array:
+        """Where points touch, (c, 3): 1 or 0, and the slope (r_x, r_y) of the road that they meet, after `commit`."""
+        slope = np.zeros((len(self._force), 2)) if self._slope is None else self._slope
+        return np.column_stack([self._force > 0.0, slope])
+
+    def bearing(self, touching: Array) -> tuple[sparse.csr_matrix, Array]:
+        """n (t, k) between points that are `touching` and the nodes' components, (1, -r_x, -r_y) in z, x, y; C (t, t) m/N of
+        the tread there beyond what the nodes have of it."""
+        index, p = np.flatnonzero(touching[:, 0]), self.nodes
+        weights = self._weights[index]
+        normal = [weights]
+        if self.components == 3:
+            normal += [sparse.diags(-r) @ weights for r in touching[index, 1:].T]
+        lean = sparse.hstack(normal, format="csr")
+        level = (weights @ (weights @ self._felt.T[:p, :p]).T).T
+        resolved = (lean @ (lean @ (self.answer - self._felt).T).T).T
+        return lean, self._solver.block(index) - level - resolved
+
+    def total(self, nodal: Array) -> Array:
+        """Sum (3,) N of forces (k,) on the nodes."""
+        z, *plane = nodal.reshape(self.components, self.nodes).sum(axis=1)
+        return np.array([*(plane or (0.0, 0.0)), z])
+
     def yields(self, moved: Array) -> Array:
         """Changes (k, m) N of the forces on the nodes by further displacements (r, m) m of them, after `commit`: of normal forces,
         while the same points touch the road where they do.
 
-            f' = -(n A n^T + C)^-1 n w,   n = (1, -r_x, -r_y) between points that touch and nodes, C of the tread.
+            f' = -n^T (n A n^T + C)^-1 n w,   n and C of `bearing`, A that of the nodes within a step.
         """
-        index, p = np.flatnonzero(self._force > 0.0), self.nodes
-        weights = self._weights[index]
-        normal = [weights]
-        if self.components == 3:
-            slopes = np.zeros((len(index), 2)) if self._slope is None else self._slope[index]
-            normal += [sparse.diags(-r) @ weights for r in slopes.T]
-        lean = sparse.hstack(normal, format="csr")
-        felt = self._felt.T
-        whole = (lean @ (lean @ felt).T).T
-        level = (weights @ (weights @ felt[:p, :p]).T).T
-        stiff = self._solver.block(index) + whole - level
-        return -(lean.T @ np.linalg.solve(stiff, lean @ moved[: lean.shape[1]]))
+        lean, tread = self.bearing(self.touching)
+        whole = (lean @ (lean @ self.answer.T).T).T
+        return -(lean.T @ np.linalg.solve(whole + tread, lean @ moved[: lean.shape[1]]))
 
     def creep(self, slip: Array) -> None:
         """Set the slip (s_x, s_y), or (c, 2) at the points, of the steps to come (contact.tread.brush); with friction only."""
@@ -666,7 +681,7 @@ class Loop:
     begun: tuple[Array, Array] | None = None
 
     def roll(
-        self, drive: Drive, step: float, steps: int, *, done: int = 0, at_once: int = _STEPS_AHEAD
+        self, drive: Drive, step: float, steps: int, *, done: int = 0, at_once: int = STEPS_AHEAD
     ) -> Iterator[Block]:
         """Yield the states after each of `steps` steps of `step` s, in blocks. Collective if the tire is.
 

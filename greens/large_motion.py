@@ -34,13 +34,15 @@ from tireroad.modal.solver.slicing import Modes
 
 Array = np.ndarray
 
-TOLERANCE = 1e-3  # of s, over the tire's whole motion in the same measure
-FLOOR = 0.1  # J^(1/2): of that motion
+# Of the motion of the points. In the measure of K it says little: the belts' membrane energy, of which a road feels next to
+# nothing on a stiff tire. Forces on a soft torus are then 0.05 % off.
+TOLERANCE = 2e-5
+FLOOR = 1e-4  # m: of that motion, all components together
 TURNS, STALE = 25, 6  # evaluations of a step at most; after so many the derivative is taken anew
-SPACES = 1e-9  # of a motion: changes that say nothing of the derivative
+SPACES = 1e-9  # of s: changes that say nothing of the derivative
+LEFT = 0.1  # of a rest by a step, at least: what one that was lucky does not promise for the next
 # Evaluations from which on a rest of this share of the motion is small enough.
-ENOUGH, ROUGH = 13, 2e-2
-CAUTIOUS = 0.3  # of the tolerance: rest that a step leaves, if as much as the last one did, for it not to be evaluated
+ENOUGH, ROUGH = 13, 1e-2
 
 
 def large_response(
@@ -110,7 +112,8 @@ class _Newton:
     the next; where that does not do it, taken anew.
 
     The contact is solved to a tolerance of its own (contact.loop.MEETING), by which s(s) jumps: where the rest falls no further,
-    the best s is taken if its rest is small. `settled`: the s that `next` gave needs no evaluation.
+    the best s is taken if its rest is small. `settled`: the s that `next` gave needs no evaluation, since its rest
+    is small if it falls as it did last.
     """
 
     def __init__(self, count: int) -> None:
@@ -126,11 +129,10 @@ class _Newton:
         self._best: tuple[float, Array] = (np.inf, np.zeros(0))
 
     def next(
-        self, s: Array, rest: Array, size: float, derivative: Callable[[], Array]
+        self, s: Array, rest: Array, off: float, derivative: Callable[[], Array]
     ) -> Array | None:
-        """The next s to be evaluated, None if this one is found; `size` J^(1/2) of the motion. ConvergenceError after 25
-        evaluations."""
-        off = float(np.linalg.norm(rest)) / size
+        """The next s to be evaluated, None if this one is found; `off`: what its rest moves the points by, over their motion.
+        ConvergenceError after 25 evaluations."""
         if off <= TOLERANCE:
             return None
         self._turns += 1
@@ -150,12 +152,12 @@ class _Newton:
             self.taken += 1
         elif self._tried is not None:
             step, change = s - self._tried[0], rest - self._tried[1]
-            if step @ step > (SPACES * size) ** 2:
+            if step @ step > SPACES**2 * (s @ s):
                 lacking = change - self.derivative @ step
                 self.derivative += np.outer(lacking, step) / (step @ step)
         if np.isfinite(self._off):
-            self.left = off / self._off
-        self.settled = off * self.left <= CAUTIOUS * TOLERANCE
+            self.left = max(off / self._off, LEFT)
+        self.settled = off * self.left <= TOLERANCE
         self._tried, self._off = (s, rest), off
         return s - np.linalg.solve(self.derivative, rest)
 
@@ -197,7 +199,7 @@ class LargeTire:
 
     @property
     def rough(self) -> int:
-        """Number of steps in which s is right within 2 % of the motion only."""
+        """Number of steps in which s is right within 1 % of the points' motion only."""
         return self._newton.rough
 
     def predict(self) -> Array:
@@ -227,7 +229,8 @@ class LargeTire:
         """The next s to be tried where the kept nodes move by `inner`; None if it is the right one."""
         self.evaluations += 1
         rest = self.s - (self._force.evaluate(inner) - self._begun)
-        size = max(float(np.linalg.norm(self._now + self.s)), FLOOR)
+        moved = max(float(np.linalg.norm(self._free - self._moved @ self.s)), FLOOR)
+        off = float(np.linalg.norm(self._moved @ rest)) / moved
 
         def derivative() -> Array:
             along = self._bent[: self._inner]
@@ -235,7 +238,7 @@ class LargeTire:
                 along = along + self._inside.columns.T[: self._inner] @ yields(self._moved)
             return np.eye(len(rest)) + self._force.jacobian(inner, along)
 
-        return self._newton.next(self.s, rest, size, derivative)
+        return self._newton.next(self.s, rest, off, derivative)
 
     def advance(self, force: Array) -> None:
         """Set the contact forces (c,) N at the end of the step."""

@@ -129,13 +129,12 @@ def _rolling(results: Results, indicator: Indicator) -> list[Fact]:
 
 
 def _large(indicator: Indicator) -> list[Fact]:
-    """Whether motions were large, and what of them was outside the training."""
-    outside = indicator("contact", "motion outside the training at most")
-    if outside is None:
+    """Whether motions were large, and what the road feels of what their training leaves out."""
+    share = indicator("contact", "force left out by the nonlinear training")
+    if share is None:
         return []
-    return [
-        ("motion of the tire", f"large; at most {digits(outside)} % outside the nonlinear training")
-    ]
+    told = f"large; the nonlinear training leaves out {digits(share)} % of what the road's force has changed by"
+    return [("motion of the tire", told)]
 
 
 def _of_spectra(results: Results, name: str) -> Any:

@@ -711,7 +711,7 @@ class AccuracyStage(Computed[Accuracy]):
         _describe(record, product, exact, limit)
         if self.nonlinear is not None:
             record.notes.append(
-                "the error bars are those of the linear tire; what the training of large motions leaves out is told by the stage contact"
+                "the error bars are those of the linear tire: they do not contain the force left out by the nonlinear training, which the stage contact tells"
             )
         return product
 

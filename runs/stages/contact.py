@@ -622,7 +622,8 @@ class ContactStage(Stage[ContactHistory]):
             driven = driven_tire(self.job, chosen, setup.patch, moved)
             loop = self._loop(record, setup, driven or moved or chosen.tire, chosen.step)
         totals = Totals(setup.patch, setup.reach, scheme.limit, work=Work(scheme.scheme))
-        losses, instants = Losses(chosen, response, self._states), Greatest(moved, chosen.tire)
+        losses = Losses(chosen, response, self._states)
+        instants = Greatest(moved, chosen.tire, loop.contact)
         with ExitStack() as stack, record.timing("time loop"):
             attributes = {"step": chosen.step, "scheme": chosen.scheme, "road_relief": setup.relief}
             attributes |= {"free_slip": setup.free_slip or 0.0, "scheme_reason": scheme.reason}
@@ -654,9 +655,9 @@ class ContactStage(Stage[ContactHistory]):
         highest = self.rotating.product.highest / (2 * np.pi)
         edges(record, self.job.scene.road, setup.patch, abs(setup.rolled.speed), highest)
         if large and moved:
-            left_out = large.left_out(instants, chosen.step) if len(instants) else None
+            felt = large.felt(instants, chosen.step) if len(instants) else None
             large.factors.destroy()
-            describe_large(record, moved, left_out, totals.figures.steps, totals.figures.excursion)
+            describe_large(record, moved, felt, totals.figures.steps, totals.figures.excursion)
         else:
             deflection, held = self.static.product.deflection, self.job.scene.axle.kind == "fixed"
             excursion(record, totals.figures.excursion, deflection, held=held)
@@ -730,7 +731,7 @@ class ContactStage(Stage[ContactHistory]):
     ) -> None:
         """Take the remaining steps; stops between two blocks of them when requested. Collective."""
         done, steps = totals.figures.steps, chosen.steps
-        blocks = loop.roll(setup.drive, chosen.step, steps, done=done)
+        blocks = loop.roll(setup.drive, chosen.step, steps, done=done, at_once=instants.apart)
         watch = Watch(self.job.comm, self.job.scene.time.checkpoint)
         with (
             Deferred() as deferred,

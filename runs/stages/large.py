@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -9,14 +11,16 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from tireroad.contact.loop import LinearTire
+from tireroad.contact.loop import STEPS_AHEAD, ContactProblem, LinearTire
 from tireroad.fem.collective import summed
+from tireroad.fem.errors import NearlySingular
 from tireroad.fem.matrices.compliance import (
     LoadedShapes,
     factorise,
     on_own_rows,
     solve_columns,
 )
+from tireroad.fem.nonlinear.felt import felt_by_road
 from tireroad.fem.nonlinear.force import RestoringForce
 from tireroad.fem.nonlinear.reduced import ReducedForce, at_nodes, extra_loads, outside, sizes
 from tireroad.greens.basis import Basis, Probes
@@ -33,37 +37,66 @@ from tireroad.runs.stages.stage import Record
 Array = np.ndarray
 
 KEPT = 10  # instants, those of the greatest reduced force
-FAR = 0.1  # of the motion: what may be outside the training without a warning
+FELT = 5  # of them, of which it is found what the road feels
+SEEN = 8  # steps from one instant that is looked at to the next
+FAR = 0.1  # of the force's change: what the training may leave out without a warning
+LEFT_OUT = "force left out by the nonlinear training"
 _SLIGHT = 1 / 20  # of the largest motion: smaller ones are not told from none
+Instant = tuple[float, Array, Array, Array, Array]
+_PARTS = "time", "states", "block", "loads", "touching"  # of an instant
 
 
 class Instants:
-    """The states (q,) and the block's (b,) of a `linear` recursion, and its loads (c + k,), at some times, s."""
+    """The states (q,) and the block's (b,) of a `linear` recursion, its loads (c + k,), and where points of the `contact` touch
+    (ContactProblem.touching), at some times, s."""
 
-    def __init__(self, linear: LinearTire) -> None:
-        self._linear = linear
-        self.kept: list[tuple[float, Array, Array, Array]] = []
+    def __init__(self, linear: LinearTire, contact: ContactProblem) -> None:
+        """The instants of a loop that begins. Collective where the recursion is."""
+        self._linear, self.contact = linear, contact
+        self.begun = self._now(0.0)
+        self.kept: list[Instant] = []
 
     def add(self, time: float) -> None:
         """Keep the present instant. Collective where the recursion is."""
+        self.kept.append(self._now(time))
+
+    def _now(self, time: float) -> Instant:
         held = self._linear.snapshot()
-        self.kept.append((time, held["state"], held["block_state"], held["push_force"]))
+        states = held["state"], held["block_state"], held["push_force"]
+        return time, *states, self.contact.touching.T
 
     def __len__(self) -> int:
         return len(self.kept)
 
     @property
     def columns(self) -> tuple[Array, ...]:
-        """Times (n,) s, states (q, n), the block's (b, n), loads (c + k, n)."""
+        """Times (n,) s, states (q, n), the block's (b, n), loads (c + k, n), contacts (p, 3, n)."""
         return tuple(np.array(part).T for part in zip(*self.kept, strict=True))
+
+    @property
+    def at_begin(self) -> Instants:
+        """The one in which the loop began."""
+        return self._of([self.begun])
+
+    def some(self, which: Array) -> Instants:
+        """Those of the numbers (m,)."""
+        return self._of([self.kept[k] for k in which])
+
+    def _of(self, kept: list[Instant]) -> Instants:
+        found = copy(self)
+        found.kept = kept
+        return found
 
 
 class Greatest(Instants):
-    """The instants of the greatest reduced force of a `tire`; none of a linear one."""
+    """The instants of the greatest reduced force of a `tire`; none of a linear one. `apart`: steps from one that is seen to the
+    next."""
 
-    def __init__(self, tire: LargeTire | None, linear: LinearTire) -> None:
-        super().__init__(linear)
-        self._tire = tire
+    def __init__(self, tire: LargeTire | None, linear: LinearTire, contact: ContactProblem) -> None:
+        self._tire, self.kept = tire, []
+        self.apart = STEPS_AHEAD if tire is None else SEEN
+        if tire is not None:
+            super().__init__(linear, contact)
 
     def see(self, time: float) -> None:
         """Keep the present instant if it is one of the greatest. Collective where the tire is."""
@@ -76,23 +109,46 @@ class Greatest(Instants):
         self.kept.sort(key=lambda one: (-self._size(one), one[0]))
         del self.kept[KEPT:]
 
-    def _size(self, one: tuple[float, Array, Array, Array]) -> float:
+    def _size(self, one: Instant) -> float:
         assert self._tire is not None
         return float(np.linalg.norm(one[3][len(one[3]) - len(self._tire.s) :]))
 
     def state(self) -> dict[str, Array]:
         """The state that a checkpoint keeps."""
-        names = "time", "states", "block", "loads"
         if not self.kept:
             return {}
-        return {f"instants_{k}": v for k, v in zip(names, self.columns, strict=True)}
+        return {f"instants_{k}": v for k, v in zip(_PARTS, self.columns, strict=True)}
 
     def set_state(self, state: dict[str, Array]) -> None:
         """Continue from a `state`."""
         if "instants_time" in state:
-            names = "time", "states", "block", "loads"
-            columns = [state[f"instants_{name}"].T for name in names]
+            columns = [state[f"instants_{name}"].T for name in _PARTS]
             self.kept = [(float(t), *rest) for t, *rest in zip(*columns, strict=True)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Felt:
+    """The force of the road by what a reduced force leaves out, at i instants `time` (i,) s: `force` (i, 3) N
+    (fem.nonlinear.felt), beside the force that has `changed` (i, 3) N since the loop began."""
+
+    time: Array
+    force: Array
+    changed: Array
+
+    @property
+    def share(self) -> float:
+        """The force left out over the one that has changed, each in the median of the instants: at some of a run with friction the
+        tangent is nearly singular, and its answer as large as the load."""
+        left_out, changed = (
+            float(np.median(np.linalg.norm(one, axis=1))) for one in (self.force, self.changed)
+        )
+        return left_out / max(changed, np.finfo(float).tiny)
+
+    @property
+    def largest(self) -> tuple[float, float]:
+        """The largest force (N) left out, and its time (s)."""
+        size = np.linalg.norm(self.force, axis=1)
+        return float(size.max()), float(self.time[size.argmax()])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -179,7 +235,7 @@ class LargeMotion:
     def motions(self, instants: Instants, step: float) -> Array:
         """The motion (n, i) m on own unknowns at the instants, relative to the wheel: that of the states, and what all loads
         cause beside them (Wheel.beyond_modes). Collective."""
-        _, z, y, loads = instants.columns
+        _, z, y, loads, _ = instants.columns
         pushed = (self.wheel.growth or 1.0) * extra_loads(self.restoring, self.vectors)
         own = on_own_rows(self.restoring.operators, self.points[: self.loaded])
         acting = own @ loads[: self.loaded] + pushed @ loads[self.loaded :]
@@ -191,23 +247,57 @@ class LargeMotion:
         motion, restoring = self.motions(instants, step), self.restoring
         forces = restoring.nonlinear(motion)
         answer = self.factors.answers(forces)
+        right = summed(restoring.body.comm, self.vectors.T @ forces)
         return LeftOut(
             time=instants.columns[0],
             motion=motion,
             answer=answer,
             outside=outside(restoring, self.vectors, answer, forces),
-            misread=self._misread(motion, forces),
+            misread=np.linalg.norm(right - self._read(motion), axis=0),
             size=sizes(restoring, motion, answer),
         )
 
-    def _misread(self, motion: Array, forces: Array) -> Array:
-        """|V^T r - s| (s,) J^(1/2) at motions and their forces r (n, s): what the weighted cells are off. Collective."""
+    def felt(self, instants: Instants, step: float) -> Felt | None:
+        """The force of the road by what the reduced force leaves out, at some of the instants; None if at all of them the tire has
+        no stiffness of its own. Collective."""
+        some, contact = instants.some(self._spread(instants)), instants.contact
+        begun, count = instants.at_begin, len(contact.change)
+        motions = self.motions(some, step)
+        loads = self._lacking(motions) - self._lacking(self.motions(begun, step))
+        own = on_own_rows(self.restoring.operators, self.points[:count]).tocsc()
+        force = np.full((len(some), 3), np.nan)
+        for k, touching in enumerate(np.moveaxis(some.columns[4], -1, 0)):
+            lean, tread = contact.bearing(touching)
+            given = motions[:, k], loads[:, k], (own @ lean.T).tocsr(), tread
+            with suppress(NearlySingular):
+                force[k] = contact.total(lean.T @ felt_by_road(self.restoring, *given))
+        pushed = some.columns[3][:count] - begun.columns[3][:count]
+        changed = np.stack([contact.total(one) for one in pushed.T])
+        known = np.isfinite(force[:, 0])
+        if not known.any():
+            return None
+        return Felt(time=some.columns[0][known], force=force[known], changed=changed[known])
+
+    def _lacking(self, motion: Array) -> Array:
+        """The load r - K V s (n, i) N that the reduced force leaves out of motions (n, i). Collective."""
+        pushed = extra_loads(self.restoring, self.vectors) @ self._read(motion)
+        return self.restoring.nonlinear(motion) - pushed
+
+    def _spread(self, instants: Instants) -> Array:
+        """Numbers of at most FELT instants with at least half of the largest reduced force, spread over time."""
+        time, _, _, loads, _ = instants.columns
+        size = np.linalg.norm(loads[self.loaded :], axis=0)
+        great = np.flatnonzero(size >= 0.5 * size.max())
+        great = great[np.argsort(time[great])]
+        return great[np.unique(np.linspace(0, len(great) - 1, FELT).round().astype(int))]
+
+    def _read(self, motion: Array) -> Array:
+        """s (k, i) of motions (n, i) on own unknowns. Collective."""
         if self.force is None:
-            return np.zeros(motion.shape[1])
-        right = summed(self.restoring.body.comm, self.vectors.T @ forces)
+            return np.zeros((0, motion.shape[1]))
         read = at_nodes(self.restoring, motion, self.force.nodes)
         found = [self.force.evaluate(np.ascontiguousarray(one)) for one in read.T]
-        return np.linalg.norm(right - np.stack(found, axis=1), axis=0)
+        return np.stack(found, axis=1)
 
     @property
     def _basis(self) -> Basis:
@@ -234,28 +324,29 @@ class LargeMotion:
 
 
 def describe(
-    record: Record, tire: LargeTire, left_out: LeftOut | None, steps: int, excursion: float
+    record: Record, tire: LargeTire, felt: Felt | None, steps: int, excursion: float
 ) -> None:
-    """Record what the reduced force took and how far the motion is outside its training; warn if far."""
+    """Record what the reduced force took, and what the road feels of what it leaves out; warn if that is much."""
     record.headline["motion"] = ("large", "-")
     record.indicators |= {
         "largest motion of the contact beyond the static state": (excursion, "m"),
         "evaluations of the reduced force a step": (tire.evaluations / max(steps, 1), "-"),
         "derivatives of it taken anew": (tire.derivatives, "-"),
-        "steps in which it is right within 2 % of the motion only": (tire.rough, "-"),
+        "steps in which it is right within 1 % of the points' motion only": (tire.rough, "-"),
     }
-    if left_out is None:
+    if felt is None:
         return
-    share, when = float(left_out.shares.max()), left_out.time[left_out.shares.argmax()]
-    record.headline["motion outside the training at most"] = (100 * share, "%")
+    (largest, when), share = felt.largest, felt.share
+    record.headline[LEFT_OUT] = (100 * share, "%")
+    record.indicators["largest force that the training leaves out"] = (largest, "N")
     console.say(
-        f"  large motions: at most {100 * share:.2g} % of the motion is outside the training, at t = {when:.4g} s "
-        f"(of {len(left_out.time)} instants of the greatest nonlinear force); "
+        f"  large motions: the training leaves out {100 * share:.2g} % of what the road's force has changed by (median of "
+        f"{len(felt.time)} instants of great nonlinear forces), at most {largest:.3g} N at t = {when:.4g} s; "
         f"{tire.evaluations / max(steps, 1):.2g} evaluations a step"
     )
     if share > FAR:
         record.warnings.append(
-            f"{100 * share:.2g} % of the motion at t = {when:.4g} s is outside the training of the nonlinear force, and forces "
-            "may be off by as much: the run moves the tire there as no run of the training did. Take a lower speed or road, "
+            f"the training of the nonlinear force leaves out {100 * share:.2g} % of what the road's force has changed by, and forces "
+            "may be off by as much: the run moves the tire as no state of the training did. Take a lower speed or road, "
             'or motion.kind = "linear" to see by how much both differ'
         )

@@ -1,10 +1,10 @@
-"""Stage nonlinear: the reduced nonlinear force of the tire, trained on the road of the run and by the run itself.
+"""Stage nonlinear: the reduced nonlinear force of the tire, trained on the road of the run and judged by the run itself.
 
 First the standing tire climbs rises, and the road as it lies under the footprint at places along the run. Then the time
-loop runs with the force found so far: at instants of it the elements' force of the whole motion is evaluated, and where
-the vectors lack some of it the instants join the states. Standing tires alone do not do: one of 205/60 R15 that rolls
-over a bar of 10 mm at 30 km/h swings by millimetres, and two thirds of its motion were outside the training on 94 such
-states. Runs alone do not, either: with vectors of a linear tire's motion the loop did not settle.
+loop runs with the first few vectors of these states, and it is found what the road feels of what they leave out: more of them
+follow where it is much, and at last states of the run. States of a run are the last resort: a belted tire does not move where its
+reduced force lets it, and its vectors then answer to what no tire does. Vectors of a linear tire's motion alone did
+not let the loop settle.
 """
 
 from __future__ import annotations
@@ -51,9 +51,11 @@ Array = np.ndarray
 
 LIMIT = 0.03  # of forces: error of the linear tire from which on "auto" takes large motions
 BED = 1e9  # N/m3: springs of the tread under the standing tire, 10 MPa over 10 mm
-RUNS, INSTANTS, STEPS = 6, 60, 4000  # at most: runs, instants of each, steps of each
-ENOUGH = 0.05  # of the motion: what the vectors may lack
+RUNS, INSTANTS, STEPS = 8, 60, 4000  # at most: runs, instants of each, steps of each
+FEW = 8  # vectors of the first run; twice as many where they leave out too much
+ENOUGH = 0.05  # of the change of the road's force: what the training may leave out of a run
 SETTINGS = Settings(most=160, turns=6, precision=5e-3)
+DONE, MORE, STATES, NO_BETTER = "little is left out", "more vectors", "its states", "no better"
 _RESPONSE = "response"
 
 
@@ -97,7 +99,7 @@ class NonlinearStage(Computed[TrainedMotion]):
     def solver(self) -> str:
         """The solvers' settings, for the log."""
         return (
-            f"at most {RUNS} runs of {STEPS} steps, {INSTANTS} instants of each, until the vectors lack {ENOUGH:g}; at most "
+            f"at most {RUNS} runs of {STEPS} steps, {INSTANTS} instants of each, until {ENOUGH:g} of the road's force is left out or more than before; at most "
             f"{SETTINGS.most} vectors; weights of cells off by at most {SETTINGS.tolerance:g}; {MUMPS}"
         )
 
@@ -169,28 +171,38 @@ class NonlinearStage(Computed[TrainedMotion]):
             trainer.record,
         )
         best: tuple[float, Training, LargeMotion] | None = None
+        most = FEW
         for number in range(1, RUNS + 1):
             with record.timing("vectors and cells"):
                 states, answers = (np.hstack(part) for part in zip(*seen, strict=True))
-                training = trained_on(linear.restoring, states, answers, SETTINGS, runs)
+                settings = replace(SETTINGS, most=most)
+                training = trained_on(linear.restoring, states, answers, settings, runs)
             with record.timing("response to the force"):
                 motion = linear.trained(training.force, training.vectors)
             with record.timing("time loops"):
                 kept = replace(plan, response=motion.response.resolved(plan.step))
                 instants, stopped = self._rolled(motion, setup, kept)
             with record.timing("forces of the elements"):
-                left = motion.left_out(instants, plan.step)
-            lacked = float(left.shares.max())
+                felt = None if stopped else motion.felt(instants, plan.step)
+            left_out = felt.share if felt else np.inf
+            count = training.vectors.shape[1]
             told(
-                f"run {number} with {training.vectors.shape[1]} vectors and {len(training.force.cells)} cells: "
-                f"{100 * lacked:.3g} % of the motion outside at most, {100 * np.sqrt(np.mean(left.shares**2)):.2g} % in the mean "
-                f"square, {100 * float(left.misread_shares.max()):.2g} % misread by the cells; {stopped or 'whole'}"
+                f"run {number} with {count} vectors and {len(training.force.cells)} cells: "
+                + (stopped or f"{100 * left_out:.3g} % of the change of the road's force left out")
             )
-            runs.append(Trained(f"run {number}", len(instants), lacked, 0.0, stopped or "whole"))
-            if not stopped and (best is None or lacked < best[0]):
-                best = lacked, training, motion
-            if lacked <= ENOUGH and not stopped:
+            runs.append(Trained(f"run {number}", len(instants), left_out, 0.0, stopped or "whole"))
+            before = best[0] if best else np.inf
+            if not stopped and (best is None or left_out < before):
+                best = left_out, training, motion
+            more = count == most < SETTINGS.most
+            next_one = after_run(left_out, before, more, len(seen) > 1)
+            if next_one in (DONE, NO_BETTER):
                 break
+            if next_one == MORE:
+                most = min(2 * most, SETTINGS.most)
+                continue
+            with record.timing("forces of the elements"):
+                left = motion.left_out(instants, plan.step)
             some = left.shares > ENOUGH / 2
             seen.append((left.motion[:, some], left.answer[:, some]))
         if best is None:
@@ -198,8 +210,8 @@ class NonlinearStage(Computed[TrainedMotion]):
                 f"large motions: no run of the training went through ({runs[-1].how}); take a smaller time.step, a lower road, "
                 'or motion.kind = "linear"'
             )
-        lacked, training, motion = best
-        _describe(record, training, lacked)
+        left_out, training, motion = best
+        _describe(record, training, left_out)
         return TrainedMotion(stored(training, motion.restoring), motion.response)
 
     def _settled(self, response: Response, step: float) -> ContactSetup:
@@ -221,7 +233,7 @@ class NonlinearStage(Computed[TrainedMotion]):
         tire = motion.tire(chosen.tire, chosen.scheme)
         driven = driven_tire(self.job, chosen, setup.patch, tire)
         loop = make_loop(self.job.scene.contact, setup, driven or tire or chosen.tire, plan.step)
-        steps, instants = min(plan.steps, STEPS), Instants(chosen.tire)
+        steps, instants = min(plan.steps, STEPS), Instants(chosen.tire, loop.contact)
         try:
             for block in loop.roll(
                 setup.drive, plan.step, steps, at_once=max(steps // INSTANTS, 1)
@@ -242,6 +254,17 @@ class NonlinearStage(Computed[TrainedMotion]):
         """The same, read back."""
         held = Nonlinear(**store.read_fields(file, Nonlinear))
         return TrainedMotion(held, read_response(file[_RESPONSE]))
+
+
+def after_run(left_out: float, before: float, more: bool, joined: bool) -> str:
+    """The step that follows a run whose training leaves out a share of the force, inf if it stopped, and the best run `before` another:
+    nothing if it is little; vectors of the states known if there are `more`; the run's own states; nothing if those of
+    an earlier run have `joined` and made it no better."""
+    if left_out <= ENOUGH:
+        return DONE
+    if more:
+        return MORE
+    return NO_BETTER if joined and left_out >= before < np.inf else STATES
 
 
 def linear_motion(stage: Any) -> LargeMotion:
@@ -265,8 +288,8 @@ def linear_motion(stage: Any) -> LargeMotion:
     )
 
 
-def _describe(record: Record, training: Training, lacked: float) -> None:
-    """Record what was trained, what of the last run is outside, and the roads that were not climbed to their height."""
+def _describe(record: Record, training: Training, left_out: float) -> None:
+    """Record what was trained, what the road feels of what it leaves out in its best run, and the roads that were not climbed to their height."""
     runs = [one for one in training.record if one.road.startswith("run ")]
     roads = training.record[: len(training.record) - len(runs)]
     record.headline |= {
@@ -276,8 +299,9 @@ def _describe(record: Record, training: Training, lacked: float) -> None:
         "vectors": (training.vectors.shape[1], "-"),
         "cells of the mesh": (len(training.force.cells), "-"),
         "largest motion of a state left out": (100 * training.left, "%"),
-        "largest motion of the run outside": (100 * lacked, "%"),
     }
+    if np.isfinite(left_out):
+        record.headline["force of the run left out"] = (100 * left_out, "%")
     record.indicators["error of the weighted cells"] = (100 * training.error, "%")
     short = [one for one in roads if one.how.startswith("to ")]
     if short:

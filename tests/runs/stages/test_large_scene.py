@@ -94,7 +94,7 @@ def test_a_cleat_trains_the_tire_and_changes_its_forces(cleat):
     assert told["nonlinear"]["status"] == "skipped"
     assert not (straight / "nonlinear.h5").exists()
     assert stages["nonlinear"]["status"] == "computed"
-    assert value(stages, "nonlinear", "largest motion of the run outside") < 5.0
+    assert value(stages, "nonlinear", "force of the run left out") < 5.0
     with h5py.File(large / "nonlinear.h5") as file:
         assert 3 < file["shape"].shape[2] <= 160
         assert file.attrs["outside"] < 0.04
@@ -122,9 +122,11 @@ def test_energy_closes_and_the_motion_stays_in_the_training(cleat):
     moved = abs(value(stages, "contact", "work of contact on the tire"))
     assert abs(value(stages, "contact", "energy left in the nonlinear force")) > 1e-6 * moved
     assert abs(value(stages, "contact", "energy that does not add up")) < 0.01 * moved
-    assert value(stages, "contact", "motion outside the training at most") < 10.0
+    assert value(stages, "contact", "force left out by the nonlinear training") < 10.0
     write_report(large)
-    assert "outside the nonlinear training" in (large / "report.html").read_text(encoding="utf-8")
+    assert "the nonlinear training leaves out" in (large / "report.html").read_text(
+        encoding="utf-8"
+    )
 
 
 @pytest.mark.slow
@@ -220,7 +222,9 @@ def test_it_goes_on_from_a_checkpoint_with_the_same_bits(cleat, tmp_path, monkey
             assert np.array_equal(one[name][:], other[name][:])
     for name in ("energy left in the nonlinear force", "evaluations of the reduced force a step"):
         assert value(told, "contact", name) == value(stages, "contact", name)
-    outside = [value(s, "contact", "motion outside the training at most") for s in (stages, told)]
+    outside = [
+        value(s, "contact", "force left out by the nonlinear training") for s in (stages, told)
+    ]
     assert outside[1] == pytest.approx(outside[0], rel=1e-6)
 
 
