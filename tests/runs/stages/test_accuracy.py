@@ -112,7 +112,7 @@ def test_a_companion_is_the_run_it_stands_for(
     other, _ = run(f"{cause}-{friction}", "contact", f"contact.friction={friction}", *sets)
     told = companions(cause, given)
     assert len(told) == (2 if cause == "mesh" else 1)
-    forces, beside, part, _ = told[0]
+    forces, beside, part, *_ = told[0]
     assert forces.step == 2e-4 and (beside is None) == (cause == "step")
     # Elements of order 2 make 3; the footprint is a few points wide, so that finer ones tell, whose errors have
     # nothing to do with the run's.
