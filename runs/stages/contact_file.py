@@ -217,8 +217,7 @@ class ContactHistory:
     `axle_force` (n, 3) N if stored; `driven` (n, k, 3) m: displacement at driven points, if any;
     `wheel`: hub moments, and motions of a moving wheel, by the names of
     runs.stages.corner; `free_slip`: slip added so that the wheel rolls freely; `friction`: coefficient of
-    the loop, 0 without; `steady`: whether it began with steady rolling, or with the slip of it (a tread that creeps), not at
-    rest."""
+    the loop, 0 without; `steady`: false if it began at rest since no steady rolling was found."""
 
     step: float
     scheme: str
@@ -244,7 +243,7 @@ class ContactHistory:
             wheel={name: file[name][:] for name in corner.UNITS if name in file},
             free_slip=float(file.attrs["free_slip"]),
             friction=float(file.attrs["friction"]),
-            steady=INITIAL in file or file.attrs["free_slip"] != 0,
+            steady=bool(file.attrs["steady"]),
         )
 
 
