@@ -91,7 +91,8 @@ class ContactSetup:
     (s, 2) of the static shape at the outer face's nodes, for bristles, and `pull` (s, 2) N,
     horizontal forces of a static state with friction. `free`: the slip of free rolling is still to be found; `free_slip`:
     that slip, which is part of `slip`;
-    `steady`: the state of steady rolling in which a loop begins (contact.rolling.rolling_steadily). `surface`: the deformed
+    `steady`: the state of steady rolling in which a loop begins (contact.rolling.rolling_steadily); `at_rest`: it begins so since
+    none was found. `surface`: the deformed
     tread under a grid of points; `resolved` (p, p) or (3p, 3p) m/N: what the nodes have of the tread, which the contact counts
     less of them (contact.model.resolved_tread), once settled.
     """
@@ -109,6 +110,7 @@ class ContactSetup:
     free: bool = False
     free_slip: float | None = None
     steady: SteadyRolling | None = None
+    at_rest: bool = False
 
     @property
     def drive(self) -> Drive:

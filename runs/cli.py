@@ -335,7 +335,7 @@ def _bench(args: argparse.Namespace) -> None:
     _check_checkout("bench", args.command)
     from tireroad.runs.validation.tables import run_all
 
-    run_all("tireroad.tests.bench", args.names, args.out)
+    run_all("tireroad.tests.bench", args.names, args.out, only=args.only)
 
 
 def _validate(args: argparse.Namespace) -> None:
@@ -542,7 +542,17 @@ COMMANDS = {
     ),
     "bench": Command(
         "measure run time against error, scaling and lower bounds on this machine",
-        (argument("names", nargs="*", metavar="NAME", help="all by default"), TABLE),
+        (
+            argument("names", nargs="*", metavar="NAME", help="all by default"),
+            TABLE,
+            argument(
+                "--only",
+                action="append",
+                default=[],
+                metavar="WORDS",
+                help="of a benchmark of cases those with all these words, as in 'radial texture 30'; may be given several times",
+            ),
+        ),
         alone=_bench,
     ),
     "reproduce": Command(

@@ -33,6 +33,7 @@ from tireroad.runs.report.realism import unusual
 from tireroad.runs.report.scene_keys import scene_keys
 from tireroad.runs.report.sections import forces, modes, sound, spectra, tire
 from tireroad.runs.report.sections.speeds import speeds
+from tireroad.runs.results.datasets import ABSENT
 from tireroad.runs.scene.files import HEAD
 from tireroad.runs.scene.parts import Listing, listed
 from tireroad.runs.version import PROGRAM
@@ -116,14 +117,15 @@ def _rolling(results: Results, indicator: Indicator) -> list[Fact]:
     )
     there = indicator("accuracy", "deviation of the contact force in the window of the error bars")
     off = spread / there * varies if spread and there else spread
+    part = _partly(results)
     after = f" from {quantity(start * step, 's')} on" if start else ""
     what = "its standard deviation" + (f" to {quantity(end, 'Hz')}" if end else "")
     return [
         (
             f"vertical contact force, rolling (mean{after})",
-            bounded(float(force.mean()), error, "N") + ("" if error else ", error unknown"),
+            bounded(float(force.mean()), error, "N") + (part if error else ", error unknown"),
         ),
-        (what, bounded(varies, off, "N") + ("" if off else ", error unknown")),
+        (what, bounded(varies, off, "N") + (part if off else ", error unknown")),
         *_large(indicator),
     ]
 
@@ -160,7 +162,9 @@ def _levels(results: Results, indicator: Indicator) -> list[Fact]:
         total = indicator("spectra", f"level of the vertical {name}")
         if total is not None:
             error = results.optional("spectra.h5", f"third_octave/{key}_error")
-            text = f"{total:.1f} dB re 1 N, error {about(_error_of(total, level, error))}"
+            off = _error_of(total, level, error)
+            part = _partly(results) if np.isfinite(off) else ""
+            text = f"{total:.1f} dB re 1 N, error {about(off)}{part}"
             weighted = indicator("spectra", f"A-weighted level of the vertical {name}")
             text += f"; {weighted:.1f} dB(A) re 1 N" if weighted is not None else ""
             levels.append((f"{what} z{upto}", text.replace("-", "−")))
@@ -181,17 +185,28 @@ def _error_of(total: float, level: np.ndarray | None, error: np.ndarray | None) 
     return float((power * off)[known].sum() / held)
 
 
+def _partly(results: Results) -> str:
+    """The causes that the error bars leave out: ", without that by the points"; empty if none."""
+    try:
+        attributes = results.file("accuracy.h5").attrs
+    except (Absent, InputError):
+        return ""
+    causes = sorted(key.removeprefix(ABSENT) for key in attributes if key.startswith(ABSENT))
+    return f", without that by the {' and the '.join(causes)}" if causes else ""
+
+
 def _heard(results: Results, indicator: Indicator) -> list[Fact]:
     """A-weighted levels at the microphones, in the band of the run."""
     names = results.dataset("sound.h5", "microphones").attrs["names"]
     level = results.array("sound.h5", "total/level_a")
     error = results.optional("sound.h5", "total/level_a_error")
     error = np.full_like(level, np.nan) if error is None else error
+    part = _partly(results)
     top = float(results.array("sound.h5", "frequency")[-1])
     return [
         (
             f"A-weighted sound pressure level at {name}, to {quantity(top, 'Hz')}",
-            f"{value:.1f} dB(A) re 20 µPa, error {about(off)}",
+            f"{value:.1f} dB(A) re 20 µPa, error {about(off)}{part if np.isfinite(off) else ''}",
         )
         for name, value, off in list(zip(names, level, error, strict=True))[:_HEARD]
     ]

@@ -12,6 +12,8 @@ from typing import NamedTuple
 
 from tireroad.contact.results.error_bars import CAUSES
 
+ABSENT = "absent_"  # attributes of accuracy.h5: why a cause has no error bars
+
 CORNER = "kg, m, N, rad"  # rows of forces and moments, columns of translations and rotations
 STANDS_FOR = {
     "NAME": "[^/]+",

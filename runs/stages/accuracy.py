@@ -19,7 +19,7 @@ from tireroad.contact.results.error_bars import (
     CAUSES,
     Bars,
     Measured,
-    bars,
+    estimated,
     measured,
     orders,
     random_share,
@@ -28,7 +28,7 @@ from tireroad.contact.results.error_bars import (
     total,
 )
 from tireroad.contact.results.spectra import Limit, limits, lowest, pitch, wide_enough
-from tireroad.contact.rolling import bristles
+from tireroad.contact.rolling import bristles, rolling_steadily
 from tireroad.contact.setup import ContactSetup, on_shape
 from tireroad.contact.tread.between_nodes import (
     OuterRubber,
@@ -44,7 +44,6 @@ from tireroad.fem.sections.mesh2d import Ring, crown_layer
 from tireroad.fem.static.load_error import carried_over
 from tireroad.fem.static.state import StaticState
 from tireroad.greens.fewer_modes import of_fewer_modes
-from tireroad.greens.recursion import loop_communicator
 from tireroad.greens.response import Response
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.disk import Refused
@@ -52,6 +51,7 @@ from tireroad.runs.files.folder import make_folder
 from tireroad.runs.files.store import put
 from tireroad.runs.process import console
 from tireroad.runs.process.mpi import on_root
+from tireroad.runs.results.datasets import ABSENT
 from tireroad.runs.scene.estimate import estimate
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.stages.cavity import AirColumn
@@ -61,7 +61,7 @@ from tireroad.runs.stages.modes import Fields, ModesStage, Motions
 from tireroad.runs.stages.rolling import ContactForces, first_step, forces, recursive
 from tireroad.runs.stages.rotating import FullMatrices, RotatingStage
 from tireroad.runs.stages.setup import Probes, Setup, points_of, probes, tread_surface
-from tireroad.runs.stages.stage import Computed, Job, PipelinePart, Record, Result
+from tireroad.runs.stages.stage import UNKNOWN, Computed, Job, PipelinePart, Record, Result
 from tireroad.runs.stages.static import StaticStage
 from tireroad.runs.stages.training import TrainedMotion
 
@@ -83,7 +83,11 @@ SHARE = 0.5  # of the run's own cost: budget of all companion runs together
 # Of the run's loop: no more of them. On two processes one repeats loops while the other computes the run's own, then both: they
 # end half a loop's time after it.
 LOOPS = 1.75
-_FEWEST, _PERIODS = 64, 2  # least steps after the run-in, and periods of `up_to`, to repeat
+_FEWEST = 64  # steps after the run-in that companions repeat at least
+# Periods of `up_to` after the run-in that they repeat at least and at most, as many as lines of their spectra up to there: the
+# relative difference of two records by so many random lines is 0.8 to 1.25 times that of long ones in eight cases of ten; by
+# 4 lines, 0.6 to 1.6 times. Twice as many lines make a few per cent more of the bars good (docs/verification/error-bars.md).
+_PERIODS = 16, 32
 # Cost of five companion runs in time loops per repeated step, by the spacing of that of the points.
 _LOOPS = {2.0: 3.5, 0.5: 6.0}
 _COARSE = 0.14  # cost on elements of twice the size, as a share of the run's cost before the loop
@@ -161,7 +165,8 @@ class ReferenceRun:
     Its `job`, static state, patch and road (`setup`, not settled), response and rolling modes; the
     first `steps` of `step` s of its loop, integrated by `scheme`. `most`: touching points that a companion may
     have (contact.grid_patch.ratio). `comm`: the processes that repeat a loop together, by default those of the job.
-    `attached`: the modes with their attachment modes, if any (runs.stages.greens.Responses).
+    `attached`: the modes with their attachment modes, if any (runs.stages.greens.Responses). `steady`: whether its loop began
+    with steady rolling, as its companions then do.
     """
 
     job: Job
@@ -176,6 +181,7 @@ class ReferenceRun:
     comm: MPI.Comm | None = None
     large: bool = False
     attached: RollingModes | None = None
+    steady: bool = True
 
     @property
     def points_ratio(self) -> float:
@@ -186,6 +192,14 @@ class ReferenceRun:
     def equilibrated(self) -> ContactSetup:
         """The setup with its patch in the static state."""
         return equilibrated(self.job, self.setup, self.response, self.static.product.normal_force)
+
+    @cached_property
+    def rolled(self) -> ContactSetup:
+        """The setup in which loops of twice the step begin."""
+        spec, setup = self.job.scene.contact, self.equilibrated
+        if not self.steady:
+            return setup
+        return rolling_steadily(spec, setup, self.response, 2 * self.step)
 
     @property
     def probes(self) -> Probes:
@@ -203,7 +217,7 @@ class ReferenceRun:
     @cached_property
     def longer(self) -> ContactForces:
         """The run repeated with twice its time step. Collective on `comm`."""
-        return self.repeated(self.equilibrated, self.response, coarser=2)
+        return self.repeated(self.rolled, self.response, coarser=2)
 
     @cached_property
     def own(self) -> ContactForces | None:
@@ -234,7 +248,8 @@ class ReferenceRun:
 
     def first(self, steps: int) -> ReferenceRun:
         """The same for fewer steps."""
-        return self._keeping("equilibrated", steps=steps)
+        names = "equilibrated", "rolled"
+        return self._keeping(*(name for name in names if name in self.__dict__), steps=steps)
 
     def of(self, job: Job) -> ReferenceRun:
         """The same with another job; `base` stays that of the run."""
@@ -242,19 +257,18 @@ class ReferenceRun:
 
     def alone(self) -> ReferenceRun:
         """The same for this process by itself, with what all processes have found."""
-        names = ("equilibrated", "on_coarser_mesh", "longer", "own", "base")
+        names = ("equilibrated", "rolled", "on_coarser_mesh", "longer", "own", "base")
         known = (name for name in names if name in self.__dict__)
         return self._keeping(*known, comm=MPI.COMM_SELF)
 
     def same_loop(self, other: ReferenceRun) -> bool:
-        """Whether both repeat as many steps of the same size by the same scheme."""
-        return all(
-            getattr(self, name) == getattr(other, name) for name in ("step", "steps", "scheme")
-        )
+        """Whether both repeat as many steps of the same size by the same scheme, begun alike."""
+        names = ("step", "steps", "scheme", "steady")
+        return all(getattr(self, name) == getattr(other, name) for name in names)
 
     def keeping_what(self, other: ReferenceRun) -> ReferenceRun:
         """The same with what another has found for the same loop."""
-        names = ("equilibrated", "longer", "own", "base")
+        names = ("equilibrated", "rolled", "longer", "own", "base")
         narrowed = replace(self)
         narrowed.__dict__.update({name: vars(other)[name] for name in names if name in vars(other)})
         return narrowed
@@ -279,7 +293,8 @@ class ReferenceRun:
         times = coarser or (1 if self.base is self.own else 2)
         step, steps = times * self.step, self.steps // times
         comm = self.comm or self.job.comm
-        return forces(self.job, setup, response, step, steps, self.scheme, comm, contact)
+        given = self.job, setup, response, step, steps, self.scheme, comm, contact
+        return forces(*given, self.steady)
 
 
 def equilibrated(
@@ -371,9 +386,10 @@ def _made(
     return part.result() if part else None
 
 
-def least_steps(step: float, up_to: float) -> int:
-    """Fewest steps of `step` s after the run-in, for histories compared up to `up_to` Hz."""
-    return max(_FEWEST, int(np.ceil(_PERIODS / (up_to * step))))
+def records(step: float, up_to: float) -> tuple[int, int]:
+    """Fewest and most steps of `step` s after the run-in, for histories compared up to `up_to` Hz."""
+    least, most = (max(_FEWEST, int(np.ceil(periods / (up_to * step)))) for periods in _PERIODS)
+    return least, most
 
 
 @dataclass(frozen=True)
@@ -406,14 +422,14 @@ class Budget:
         """
         return max(MOST, self._whole / (_TOUCHING * least))
 
-    def window(self, least: int, reference: ReferenceRun) -> int:
-        """Last step of companion runs: `least`, more as far as the budget goes; even."""
+    def window(self, least: int, most: int, reference: ReferenceRun) -> int:
+        """Last step of companion runs: `least`, more up to `most` as far as the budget goes; even."""
         spacing = reference.points_ratio
         each = _LOOPS[spacing] * self.loop
         if spacing < 1 and (finer := finer_touching(reference.equilibrated.patch)) > MOST:
             each += _TOUCHING * finer / 2
         count = round((self._whole - _COARSE * self.before) / each)
-        count = int(np.clip(count, min(least, self.steps), self.steps))
+        count = int(np.clip(count, min(least, self.steps), min(most, self.steps)))
         return count - count % 2
 
 
@@ -452,15 +468,17 @@ def fewer_modes(reference: ReferenceRun) -> ContactForces:
 
     With attachment modes a response of the same kind (greens.fewer_modes): states that are made static lose their inertia, of
     which attachment modes are there to keep it. Without, the states from there to the highest are static; states above
-    the highest mode are kept: they belong to the rotation shapes, without which the band below would shift.
+    the highest mode are kept: they belong to the rotation shapes, without which the band below would shift. Either has the
+    static response of the run, so that it begins with the same steady rolling.
     """
     attached = reference.attached
+    begun = reference.equilibrated if reference.base is reference.own else reference.rolled
     if attached is not None and not attached.full:
         comm, points = reference.comm or reference.job.comm, reference.probes
         arguments = attached, attached.basis.shape, points.loads[points.counted], FEWER
         residual = reference.job.scene.greens.residual
         coarse = of_fewer_modes(reference.response, *arguments, residual, comm)
-        return reference.repeated(reference.equilibrated, coarse)
+        return reference.repeated(begun, coarse)
     highest = reference.rolling.highest
     joined = reference.rolling.basis.projection.shapes > 0
     limits = FEWER * highest, highest if joined else np.inf
@@ -469,7 +487,7 @@ def fewer_modes(reference: ReferenceRun) -> ContactForces:
     )
     if len(coarse.every) == len(reference.response.every):
         raise InputError("all states lie far below the highest mode: none can be left out")
-    return reference.repeated(reference.equilibrated, coarse)
+    return reference.repeated(begun, coarse)
 
 
 def coarser_mesh(reference: ReferenceRun) -> ContactForces:
@@ -517,21 +535,25 @@ class Companion(NamedTuple):
     """The `forces` of a companion run and their reference `beside` (None: the run itself).
 
     `share`: the fraction of their difference that is the error. `within`: of the run's band that in which they are compared, where
-    the error is the run's by similarity (contact.results.error_bars).
+    the error is the run's by similarity; `random`: its errors differ from line to line at random (contact.results.error_bars).
     """
 
     forces: ContactForces
     beside: ContactForces | None
     share: float = 1.0
     within: float = 1.0
+    random: bool = False
 
-    def bars(self, own: ContactForces, since: float, *limits: Any) -> dict[str, Bars]:
-        """Error bars of a run with its `own` forces after `since` s; `limits` as in `figures`."""
+    def bars(
+        self, own: ContactForces, since: float, *limits: Any, longer: float = 1.0
+    ) -> dict[str, Bars]:
+        """Error bars of a run with its `own` forces after `since` s, of a record so much `longer`; `limits` as in `figures`."""
         off = figures(self.forces, since, *limits)
         run = figures(self.beside or own, since, *limits)
         if self.within < 1.0:
             return {name: similar(run[name], off[name], self.within) for name in run}
-        return {name: bars(run[name], off[name], self.share) for name in run}
+        more = longer if self.random else None
+        return {name: estimated(run[name], off[name], self.share, more) for name in run}
 
 
 def figures(
@@ -563,7 +585,7 @@ def companions(cause: str, reference: ReferenceRun) -> list[Companion]:
         if cause == "modes":
             pairs = [Companion(told, beside, within=FEWER)]
         else:
-            pairs = [Companion(told, beside, _share(cause, reference))]
+            pairs = [Companion(told, beside, _share(cause, reference), random=cause == "points")]
         if cause == "mesh":
             with suppress(InputError, ConvergenceError):
                 pairs.append(Companion(*finer_wall(reference)))
@@ -674,20 +696,24 @@ class AccuracyStage(Computed[Accuracy]):
         return {"contact": self.contact.key, "up_to": self.job.scene.accuracy.up_to}
 
     def compute(self, record: Record) -> Accuracy:
-        """Run the companions, beside each other where a process holds a loop by itself; a failed one is reported, its cause
-        absent. Collective."""
+        """Run the companions beside each other, each on a process by itself; a failed one is reported, its cause absent.
+        Collective."""
         history = self.contact.product
         if self._at_rest:
-            return self._none("nothing excites the tire: its forces vary by rounding only")
+            return self._none(record, "nothing excites the tire: its forces vary by rounding only")
         window = self._window()
         if window is None:
-            return self._none("the run is too short for a companion run with twice the step")
+            return self._none(
+                record, "the run is too short for a companion run with twice the step"
+            )
         reference, start, limit, up_to = window
         steps = reference.steps
         axle = None if history.axle_force is None else history.axle_force[:steps]
         own = ContactForces(history.total_force[:steps], axle, history.step)
         since = start * history.step
-        bands = wide_enough(1 / (len(history.time) * history.step - since), limit)
+        length = len(history.time) * history.step - since
+        longer = length / (steps * history.step - since)
+        bands = wide_enough(1 / length, limit)
         exact = figures(own, since, limit, up_to, bands)
         bars_of: dict[str, dict[str, Bars]] = {name: {} for name in exact}
         absent: dict[str, str] = {}
@@ -695,7 +721,7 @@ class AccuracyStage(Computed[Accuracy]):
             if isinstance(told, Exception):
                 absent[cause] = str(told)
                 continue
-            parts = [one.bars(own, since, limit, up_to, bands) for one in told]
+            parts = [one.bars(own, since, limit, up_to, bands, longer=longer) for one in told]
             for name in exact:
                 bars_of[name][cause] = total(dict(enumerate(part[name] for part in parts)))
         product = Accuracy(
@@ -722,10 +748,10 @@ class AccuracyStage(Computed[Accuracy]):
         start += start % 2  # even: where a step of the companion with twice the step begins
         limit = model_limit(setup, self.rotating.product, history.step).frequency
         up_to = min(limit, self.job.scene.accuracy.up_to)
-        least = start + least_steps(history.step, up_to)
+        least, most = (start + count for count in records(history.step, up_to))
         budget = Budget.of(self.job.scene, len(history.time))
         reference = self._given(budget.steps, budget.most_touching(least))
-        steps = budget.window(least, reference)
+        steps = budget.window(least, most, reference)
         return Window(reference.first(steps), start, limit, up_to) if steps - start >= 2 else None
 
     def ahead(self, ended: Callable[[], bool]) -> None:
@@ -741,7 +767,11 @@ class AccuracyStage(Computed[Accuracy]):
         self.job.ahead[self.name] = Ahead(reference, found, dict(record.cost))
 
     def _companions(self, reference: ReferenceRun, record: Record) -> dict[str, Told]:
-        """The companions of each cause, or why it has none. Collective."""
+        """The companions of each cause, or why it has none. Collective.
+
+        A process takes a whole loop also where the run's own is shared: those share the states of a loop, its contact is
+        solved by one (greens.recursion), so that several loops at once take less time than one after the other.
+        """
         comm, mine = self.job.comm, self.job.ahead.pop(self.name, None)
         if mine is not None and mine.reference.same_loop(reference):
             reference, known = reference.keeping_what(mine.reference), (mine.found, mine.cost)
@@ -758,14 +788,7 @@ class AccuracyStage(Computed[Accuracy]):
         coarse = _attempted(record, "coarser mesh", lambda: reference.on_coarser_mesh)
         if isinstance(coarse, ConvergenceError | InputError):
             told_by["mesh"] = coarse
-        alone = (
-            loop_communicator(reference.response.resolved(reference.step), comm).size < comm.size
-        )
         left = [cause for cause in _LONGEST_FIRST if cause not in told_by]
-        if not alone:
-            for cause in left:
-                told_by[cause] = _attempted(record, cause, partial(companions, cause, reference))
-            return {cause: told_by[cause] for cause in CAUSES}
         one, more = reference.alone(), dict[str, Told]()
         for cause in _dealt(left, comm.size)[comm.rank]:
             more[cause] = _attempted(record, cause, partial(companions, cause, one))
@@ -785,8 +808,9 @@ class AccuracyStage(Computed[Accuracy]):
         still = scene.road.kind == "flat" and scene.road.motion.kind == "none"
         return still and not scene.force
 
-    def _none(self, reason: str) -> Accuracy:
+    def _none(self, record: Record, reason: str) -> Accuracy:
         console.say(f"  no error bars: {reason}")
+        record.headline["numerical error"] = (f"{UNKNOWN}: {reason}", "-")
         absent = dict.fromkeys(CAUSES, reason)
         return Accuracy(
             centre=np.zeros(0), window=0.0, up_to=0.0, mean={}, by_cause={}, absent=absent
@@ -805,6 +829,7 @@ class AccuracyStage(Computed[Accuracy]):
             most=most,
             large=self.nonlinear is not None,
             attached=self.greens.product.attached,
+            steady=self.contact.product.steady,
         )
 
     def write(self, file, product: Accuracy) -> None:
@@ -814,7 +839,7 @@ class AccuracyStage(Computed[Accuracy]):
         for force, mean in product.mean.items():
             put(file, f"{force}_mean", mean, "N")
         for cause, reason in product.absent.items():
-            file.attrs[f"absent_{cause}"] = reason
+            file.attrs[f"{ABSENT}{cause}"] = reason
         for force, causes in product.by_cause.items():
             for cause, bar in causes.items():
                 for name, unit in _UNITS.items():
@@ -831,9 +856,9 @@ class AccuracyStage(Computed[Accuracy]):
             if force in file
         }
         absent = {
-            key.removeprefix("absent_"): str(reason)
+            key.removeprefix(ABSENT): str(reason)
             for key, reason in file.attrs.items()
-            if key.startswith("absent_")
+            if key.startswith(ABSENT)
         }
         return Accuracy(
             centre=file["centre"][:],
@@ -860,34 +885,33 @@ def _describe(
 ) -> None:
     """Record the vertical force's errors: mean, deviation (up to `limit` Hz), worst band."""
     record.indicators["deviations are taken up to"] = (limit, "Hz")
+    nothing = np.full(3, np.nan)
     for name, figures in exact.items():
-        bar, what = product.total(name), name.replace("_", " ")
-        if bar is None:
-            continue
-        record.headline |= {
-            f"error of the mean {what}": (float(bar.mean[2]), "N"),
-            f"error of the deviation of the {what}": (float(bar.deviation[2]), "N"),
-            f"error of the {what}'s history up to {product.up_to:.4g} Hz": (
-                100 * float(bar.history[2]),
-                "%",
-            ),
-        }
+        what = name.replace("_", " ")
+        bar = product.total(name) or Bars(nothing, nothing, np.full((0, 3), np.nan), nothing)
+        record.tell(f"error of the mean {what}", bar.mean[2], "N")
+        record.tell(f"error of the deviation of the {what}", bar.deviation[2], "N")
+        record.tell(
+            f"error of the {what}'s history up to {product.up_to:.4g} Hz",
+            100 * bar.history[2],
+            "%",
+        )
         record.indicators[f"deviation of the {what} in the window of the error bars"] = (
             float(figures.deviation[2]),
             "N",
         )
         known = bar.level[np.isfinite(bar.level[:, 2]), 2]
-        if len(known):
-            record.headline[f"largest error of a third octave of the {what}"] = (
-                float(known.max()),
-                "dB",
-            )
+        record.tell(
+            f"largest error of a third octave of the {what}", known.max(initial=-np.inf), "dB"
+        )
+        if count := len(figures.centre) - len(known):
+            record.headline[f"third octaves of the {what} whose error is unknown"] = (count, "-")
         for cause, part in product.by_cause[name].items():
             record.indicators[f"error of the deviation of the {what} by the {cause}"] = (
                 float(part.deviation[2]),
                 "N",
             )
     for cause, reason in product.absent.items():
-        console.say(f"  error by the {cause} not estimated: {reason}")
-        record.headline[f"error by the {cause}"] = (f"not estimated: {reason}", "-")
+        console.say(f"  error by the {cause} unknown: {reason}")
+        record.headline[f"error by the {cause}"] = (f"{UNKNOWN}: {reason}", "-")
     console.say(f"  error bars from the first {product.window:.4g} s of the run")

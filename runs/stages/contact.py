@@ -590,7 +590,7 @@ class ContactStage(Stage[ContactHistory]):
             record.warnings.append(
                 f"the run begins at rest, without the slip of free rolling: {error}"
             )
-            return replace(setup, free=False)
+            return replace(setup, free=False, at_rest=True)
         if setup.free_slip is not None:
             record.headline["slip of free rolling"] = (100 * setup.free_slip, "%")
         if (steady := setup.steady) is not None:
@@ -629,6 +629,7 @@ class ContactStage(Stage[ContactHistory]):
             attributes |= {"free_slip": setup.free_slip or 0.0, "scheme_reason": scheme.reason}
             attributes["scheme_limit"] = scheme.limit
             attributes["friction"] = self._coefficient
+            attributes["steady"] = not setup.at_rest
             file = ContactFile(self.job, key, setup, attributes)
             written = file.open(stack, self.job.path(self.name))
             if written is None:

@@ -62,6 +62,7 @@ _OF_BLOCK = (
     "time", "gap", "displacement", "axle_force", "active", "residual", "penetration", "moved", "total_force",
 )  # fmt: skip
 DRIVEN = "driven_displacement"  # (nt, k, 3) m at the k prescribed forces, if the scene has them
+INITIAL = "initial_normal_force"  # (c,) N of steady rolling, if the loop begins with it
 
 
 def create(file: h5py.File, name: str, rows: int, width: tuple[int, ...]) -> h5py.Dataset:
@@ -216,7 +217,7 @@ class ContactHistory:
     `axle_force` (n, 3) N if stored; `driven` (n, k, 3) m: displacement at driven points, if any;
     `wheel`: hub moments, and motions of a moving wheel, by the names of
     runs.stages.corner; `free_slip`: slip added so that the wheel rolls freely; `friction`: coefficient of
-    the loop, 0 without."""
+    the loop, 0 without; `steady`: false if it began at rest since no steady rolling was found."""
 
     step: float
     scheme: str
@@ -227,6 +228,7 @@ class ContactHistory:
     wheel: dict[str, np.ndarray] = field(default_factory=dict)
     free_slip: float = 0.0
     friction: float = 0.0
+    steady: bool = True
 
     @staticmethod
     def of(file: h5py.File) -> ContactHistory:
@@ -241,6 +243,7 @@ class ContactHistory:
             wheel={name: file[name][:] for name in corner.UNITS if name in file},
             free_slip=float(file.attrs["free_slip"]),
             friction=float(file.attrs["friction"]),
+            steady=bool(file.attrs["steady"]),
         )
 
 
@@ -320,7 +323,7 @@ class ContactFile:
         if patch.pull is not None:
             store.put(self._file, "static_horizontal_force", patch.pull, "N")
         if (steady := self._setup.steady) is not None:
-            store.put(self._file, "initial_normal_force", steady.normal, "N")
+            store.put(self._file, INITIAL, steady.normal, "N")
             store.put(self._file, "initial_horizontal_force", steady.horizontal, "N")
         stages_setup.fill(self._file, self._setup)
         fill(self._file, self._setup)

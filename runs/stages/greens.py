@@ -22,7 +22,7 @@ from tireroad.runs.scene.tables.scene import PointForceTable, has_air
 from tireroad.runs.stages import cavity, corner, rotating
 from tireroad.runs.stages.modes import fill_projection, read_projection
 from tireroad.runs.stages.setup import Probes, components, points_of, probes
-from tireroad.runs.stages.stage import MUMPS, Computed, Record, Result
+from tireroad.runs.stages.stage import MUMPS, UNKNOWN, Computed, Record, Result
 
 _UNITS = {
     "eigenvalue": "1/s",
@@ -209,6 +209,7 @@ class GreensStage(Computed[Responses]):
             if LOST in record.indicators:
                 drag = record.indicators[LOST][0] / setup.rolled.speed
                 record.headline["rolling resistance"] = (100 * drag / self.static.product.load, "%")
+                record.headline["error of the rolling resistance"] = (UNKNOWN, "-")
         if scene.force:
             record.headline["driven points"] = (len(scene.force), "-")
         for name, response in responses.named.items():

@@ -197,13 +197,15 @@ def forces(
     scheme: str,
     comm: MPI.Comm,
     contact=None,
+    steady: bool = True,
 ) -> ContactForces:
     """Run the loop of the job's scene with another response, step or setup (settled), in memory.
 
-    `scheme`: see greens.recursion; `contact` replaces the scene's table. Raises ConvergenceError
-    if the road touches outside the patch. Collective on `comm`.
+    `scheme`: see greens.recursion; `contact` replaces the scene's table; `steady`: begun with steady rolling, else at rest.
+    Raises ConvergenceError if the road touches outside the patch, or nothing rolls steadily. Collective on `comm`.
     """
-    setup = rolling_steadily(contact or job.scene.contact, setup, response, step)
+    if steady:
+        setup = rolling_steadily(contact or job.scene.contact, setup, response, step)
     comm = loop_communicator(response.resolved(step), comm)
     rolled = blocks(job, setup, response, step, steps, scheme, comm, contact)
     both = [(block.total_force, block.axle_force) for block in rolled]

@@ -27,11 +27,11 @@ from tireroad.greens.tire_sound import (
     transfer,
 )
 from tireroad.modal.corner import BODY, SEEN
-from tireroad.runs.files.store import dataset, put, read_fields, write_fields
+from tireroad.runs.files.store import attribute, dataset, put, read_fields, write_fields
 from tireroad.runs.scene.tables.sound import SQUEEZED, SoundTable
 from tireroad.runs.stages.footprint_air import LeavingAir
 from tireroad.runs.stages.spectra import Spectra
-from tireroad.runs.stages.stage import Computed, Record, Result
+from tireroad.runs.stages.stage import UNKNOWN, Computed, Record, Result
 from tireroad.runs.stages.vibration import HANN, POWER, decibels
 from tireroad.runs.stages.whole_tire import Lines, WholeTire
 
@@ -237,6 +237,7 @@ class SoundPressure:
     window; its A-weighted third octaves `intensity_level` (i, b) dB re 1 pW/m2, NaN of inward ones, and the
     pressure-intensity index `intensity_index` (i, b) dB, pressure level less that of the intensity's magnitude;
     `total_intensity` (i,): the A-weighted level of all lines; `directivity` (b, elevations, azimuths) dB re 20 uPa at 7.5 m; `signal` (k, n) Pa at `rate` Hz;
+    `unknown_error`: what of the vibration's error is unknown, and why, empty if nothing is;
     `solved` (g,) Hz and `weight` (g, k, s) Pa s/m3: pressure per volume velocity at each node of
     the outer face; `share` (k, b, r): of the pressure's square, from each of `REGIONS`; `shares`
     (k, b, e): from each element, with `outline` (e, 4, 2) deg and -: angle around the axle from the
@@ -269,6 +270,7 @@ class SoundPressure:
     directivity: np.ndarray = dataset("dB re 20 uPa at 7.5 m", "directivity/level")
     signal: np.ndarray = dataset("Pa", "signal/pressure")
     rate: float
+    unknown_error: str = attribute(default="")
     solved: np.ndarray = dataset("Hz", "transfer/frequency")
     weight: np.ndarray = dataset("Pa s/m3", "transfer/weight")
     share: np.ndarray = dataset("-", "contribution/region")
@@ -333,7 +335,8 @@ class SoundStage(WholeTire[SoundPressure]):
             parts = _sound(heard, vibration, self._errors, over_time, lines.duration)
             normal = _normal_velocity(tire, shape, lines.amplitude, lines.frequency)
             efficiency = vibration.efficiency(normal)
-        pressure = SoundPressure(efficiency=efficiency, **parts)
+        unknown = self.spectra.product.unknown_error if self.spectra else UNKNOWN
+        pressure = SoundPressure(efficiency=efficiency, unknown_error=unknown, **parts)
         _describe(record, pressure)
         return pressure
 
@@ -664,14 +667,15 @@ def _regions(tire: SoundingTire) -> np.ndarray:
 
 
 def _told(record: Record, name: str, value: float, error: float, unit: str) -> None:
-    """A level and its error in the headline; what is NaN says "unknown"."""
-    for what, number, of in ((name, value, unit), (f"error of the {name}", error, "dB")):
-        known = np.isfinite(number)
-        record.headline[what] = (float(number), of) if known else ("unknown", "-")
+    """A level and its error in the headline."""
+    record.tell(name, value, unit)
+    record.tell(f"error of the {name}", error, "dB")
 
 
 def _describe(record: Record, sound: SoundPressure) -> None:
     """Levels at the microphones with their errors, the CPX level, and the sound power."""
+    if sound.unknown_error:
+        record.headline["error of the vibration"] = (sound.unknown_error, "-")
     for k, name in enumerate(sound.names):
         for kind, total, error, unit in (
             ("sound pressure level", sound.total, sound.total_error, "dB"),

@@ -35,7 +35,7 @@ from tireroad.runs.stages import corner
 from tireroad.runs.stages.accuracy import Accuracy, all_limits
 from tireroad.runs.stages.contact_file import ContactHistory
 from tireroad.runs.stages.rolling import first_step, run_in
-from tireroad.runs.stages.stage import Computed, Record, Result
+from tireroad.runs.stages.stage import UNKNOWN, Computed, Record, Result
 from tireroad.runs.stages.stretches import Stretches
 
 # name in `third_octave/`: name in `density/`, reference of the level, its unit, unit of the
@@ -217,6 +217,7 @@ def extremes(record: Record, history: ContactHistory, start: int, up_to: float) 
         for axis, name in ((2, "vertical"), (0, along)):
             for how, found in (("least", low.min(axis=0)), ("largest", low.max(axis=0))):
                 record.headline[f"{how} {name} {what} force"] = (float(found[axis]), "N")
+                record.headline["error of the least and largest forces"] = (UNKNOWN, "-")
 
 
 def _warn_of_window(record: Record, force: np.ndarray, what: str) -> None:

@@ -14,6 +14,7 @@ from functools import cached_property, reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
+import numpy as np
 from mpi4py import MPI
 
 from tireroad.fem.collective import collect
@@ -38,6 +39,8 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 MUMPS = "MUMPS through PETSc, ICNTL(14) = 100 %"
 
+UNKNOWN = "unknown"  # what a figure or an error is that was not estimated
+
 Figures = dict[str, tuple[Any, str]]
 P = TypeVar("P")
 
@@ -51,6 +54,11 @@ class Record:
     warnings: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     cost: Timing = field(default_factory=Timing)
+
+    def tell(self, name: str, value: float, unit: str) -> None:
+        """Add a figure to the headline, NaN as unknown."""
+        known = np.isfinite(value)
+        self.headline[name] = (float(value), unit) if known else (UNKNOWN, "-")
 
     def line(self) -> str:
         """The headline figures in one line."""

@@ -343,13 +343,13 @@ def _estimate(record: Record, state: StaticState, loader: LoadStepper) -> Static
         loader.equilibrium.solve(loader.equilibrium.road_height)
     error = load_error(loader, state.rolling)
     if isinstance(error, str):
-        console.say(f"  error of the load not estimated: {error}")
+        console.say(f"  error of the load unknown: {error}")
         return state
     whole = error.bulk is not None
     what = "estimated error of the load" + ("" if whole else " by the footprint's elements")
     record.indicators[what] = (100 * error.relative, "%")
     to = f"ever smaller elements: {error.load:.5g} N" if error.signed else "of unknown sign"
-    rest = f"{100 * error.bulk:.2g} %" if whole else f"not estimated: {UNKNOWN}"
+    rest = f"{100 * error.bulk:.2g} %" if whole else f"unknown: {UNKNOWN}"
     console.say(
         f"  {what} at this height of the road: {100 * error.relative:.2g} % ({to}); of "
         f"the footprint's elements {100 * error.footprint:.2g} %, of the rest {rest}; {error.unknowns} unknowns with finer elements there"

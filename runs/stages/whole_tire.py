@@ -22,7 +22,7 @@ from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import opened
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.results.wave import FADE
-from tireroad.runs.stages.contact_file import ContactHistory
+from tireroad.runs.stages.contact_file import INITIAL, ContactHistory
 from tireroad.runs.stages.rolling import histories, of_given_forces, recursive
 from tireroad.runs.stages.setup import components, probes
 from tireroad.runs.stages.spectra import Spectra
@@ -75,7 +75,7 @@ class PatchForces:
         """Modal forces (m,) N kg^-1/2 of the state in which the loop begins: they have always been there."""
         if self.setup is None:
             return np.zeros(self.seen.shape[1])
-        names = "initial_normal_force", "initial_horizontal_force"
+        names = INITIAL, "initial_horizontal_force"
         with h5py.File(self.job.path("contact")) as file:
             if names[0] not in file:
                 return np.zeros(self.seen.shape[1])

@@ -9,11 +9,12 @@ import json
 import pkgutil
 import tempfile
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 
@@ -58,12 +59,18 @@ def modules(package: str) -> dict[str, ModuleType]:
     return {name: loaded[name] for name in sorted(loaded) if hasattr(loaded[name], "ABOUT")}
 
 
-def run_all(package: str, names: list[str], out: Path | None, large: bool = False) -> None:
+def run_all(
+    package: str,
+    names: list[str],
+    out: Path | None,
+    large: bool = False,
+    only: Sequence[str] = (),
+) -> None:
     """Run the named modules of a package (all by default), show their tables; save them after each.
 
-    `large`: run only modules with a full-size version, in that version. Raises InputError before
-    anything runs if `out` cannot be written, ConvergenceError at the end if something could not be
-    measured.
+    `large`: run only modules with a full-size version, in that version; `only`: the cases with all words of one of these, of
+    modules whose run() takes `only`. Raises InputError before anything runs if `out` cannot be written or a module
+    has no cases, ConvergenceError at the end if something could not be measured.
     """
     known = modules(package)
     if large:
@@ -71,8 +78,12 @@ def run_all(package: str, names: list[str], out: Path | None, large: bool = Fals
     for name in names:
         if name not in known:
             raise InputError(f"{name!r} is none of: {', '.join(known)}")
+        if only and "only" not in _parameters(known[name]):
+            raise InputError(f"{name} has no cases to choose from: --only is not for it")
+    if only and not names:
+        raise InputError("--only chooses from the cases of a benchmark: name it")
     measurements = {
-        name: (known[name].ABOUT, partial(_measured, known[name], out, large))
+        name: (known[name].ABOUT, partial(_measured, known[name], out, large, only))
         for name in names or known
     }
     _all_measured(measurements, out)
@@ -140,13 +151,21 @@ def _left(results: dict[str, list[Table]], out: Path | None) -> str:
     return f"kept are {finished}; name those that remain, with another --out"
 
 
-def _measured(module: ModuleType, out: Path | None, large: bool) -> list[Table]:
+def _measured(
+    module: ModuleType, out: Path | None, large: bool, only: Sequence[str]
+) -> list[Table]:
     """The tables of a module; one that can resume gets a folder beside `out` for its results so far."""
     if large:
         return module.run_large()
-    if out is not None and "kept" in inspect.signature(module.run).parameters:
-        return module.run(kept=out.with_suffix(".kept"))
-    return module.run()
+    given: dict[str, Any] = {"only": only} if only else {}
+    if out is not None and "kept" in _parameters(module):
+        given["kept"] = out.with_suffix(".kept")
+    return module.run(**given)
+
+
+def _parameters(module: ModuleType) -> Mapping[str, inspect.Parameter]:
+    """The parameters of a module's run()."""
+    return inspect.signature(module.run).parameters
 
 
 def show(table: Table) -> None:

@@ -42,7 +42,10 @@ def wheel(results: Results, section: Section, time: NDArray) -> None:
         hub = "the held axle" if moved is None else "the hub"
         for axis, name in enumerate(_AXES):
             section.facts.append(
-                (f"greatest moment on {hub}, {name}", _most(moment[:, axis], "N m"))
+                (
+                    f"greatest moment on {hub}, {name}",
+                    f"{_most(moment[:, axis], 'N m')}, error unknown",
+                )
             )
     if moved is None:
         return

@@ -49,6 +49,8 @@ def sound(results: Results) -> Section:
     section.table = TextTable((*head, "error, dB"), list(zip(*columns, strict=True)))
     power = results.array(FILE, "total/power")
     section.facts.append(("road, to the sound", _road(results)))
+    if unknown := results.attribute(FILE, "unknown_error"):
+        section.facts.append(("error of the vibration", str(unknown)))
     section.facts += _probes(results)
     section.facts.append(
         ("sound power", f"{power[0]:.1f} dB, {power[1]:.1f} dB(A) re 1 pW, error unknown")
@@ -96,7 +98,7 @@ def _probes(results: Results) -> list[tuple[str, str]]:
     return [
         (
             f"A-weighted sound intensity level at {name}",
-            f"{value:.1f} dB(A) re 1 pW/m², pressure-intensity index to {most:.1f} dB"
+            f"{value:.1f} dB(A) re 1 pW/m², error unknown, pressure-intensity index to {most:.1f} dB"
             if np.isfinite(value)
             else "inward",
         )

@@ -31,6 +31,7 @@ from tireroad.tests.bench.parts.rolling_cases import (
     Case,
     Driven,
     by_wheel,
+    chosen,
     driven,
     recorded,
     sets,
@@ -73,10 +74,11 @@ class Outcome:
         return self.ended and self.true <= TARGET
 
 
-def run(kept: Path | None = None) -> list[Table]:
-    """Run all cases, except those whose results are in the folder `kept`. On one process."""
+def run(kept: Path | None = None, only: Sequence[str] = ()) -> list[Table]:
+    """Run all cases, or those that `only` names, except those whose results are in the folder `kept`. On one process."""
+    cases = chosen(CASES, only)
     with tempfile.TemporaryDirectory() as folder:
-        return tables(Path(folder), CASES, GRID, kept or Path(folder) / "kept")
+        return tables(Path(folder), cases, GRID, kept or Path(folder) / "kept")
 
 
 def tables(folder: Path, cases: Iterable[Case], grid: Mapping, kept: Path) -> list[Table]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -26,26 +26,29 @@ from tireroad.tests.bench.parts.rolling_cases import (
     CASES,
     DURATION,
     FINE,
+    RADIAL,
     TIRES,
     Case,
     Driven,
     Recorded,
     by_wheel,
+    chosen,
     driven,
     recorded,
     sets,
     told_settings,
 )
 
-ABOUT = "estimated over true error of mean, deviation and third octaves: 3 tires, 4 roads, 2 speeds"
+ABOUT = "estimated over true error of mean, deviation, history and third octaves: 3 tires, 4 roads, 2 or 3 speeds"
 RUN = {"segments": 18, "arc": 8, "order": 3, "modes": 100, "pitch": 0.008, "step": 2e-4}
 
 
-def run(kept: Path | None = None) -> list[Table]:
-    """Run all cases, except those whose results are in the folder `kept`. On one process."""
+def run(kept: Path | None = None, only: Sequence[str] = ()) -> list[Table]:
+    """Run all cases, or those that `only` names, except those whose results are in the folder `kept`. On one process."""
+    cases = chosen(dict.fromkeys((*CASES, *RADIAL)), only)
     with tempfile.TemporaryDirectory() as folder:
         where = Path(folder)
-        return tables(where, CASES, RUN, FINE, DURATION, kept or where / "kept")
+        return tables(where, cases, RUN, FINE, DURATION, kept or where / "kept")
 
 
 def tables(
@@ -102,8 +105,8 @@ class _Where:
 
     @property
     def _cache(self) -> Cache:
-        """The cache of stages shared by roads and settings."""
-        return Cache(self.folder / "cache")
+        """The cache of stages shared by roads, settings and residuals."""
+        return Cache(self.folder.parent / "cache")
 
 
 _MESH = ("segments", "arc", "order", "footprint", "modes")
@@ -132,7 +135,7 @@ def _judged(where: _Where) -> Iterator[Effectivity]:
 def _compared(
     case: str, force: str, cause: str, own: Driven, pair: tuple[Recorded, Recorded], bar: Bars
 ) -> Iterator[Effectivity]:
-    """Every figure of the vertical force, after the run-in."""
+    """Every figure of a force in x, y and z, after the run-in."""
     spectra, accuracy = (own.done.done[stage].product for stage in ("spectra", "accuracy"))
     one, other = (
         measured(
@@ -140,20 +143,21 @@ def _compared(
             run.step,
             spectra.limit.frequency,
             accuracy.up_to,
+            accuracy.centre,
         )
         for run in pair
     )
     true, load = bars(one, other, 1.0), abs(one.mean[2])
-    figures = [
-        ("mean", true.mean[2], bar.mean[2], SMALL["mean"] * load),
-        ("deviation", true.deviation[2], bar.deviation[2], SMALL["deviation"] * one.deviation[2]),
-        ("history", 100 * true.history[2], 100 * bar.history[2], SMALL["history"]),
-    ]
-    for k, centre in enumerate(one.centre):
-        same = np.flatnonzero(np.isclose(accuracy.centre, centre))
-        level = bar.level[same[0], 2] if len(same) else np.nan
-        if np.isfinite(level) and np.isfinite(true.level[k, 2]):
-            figures.append((f"{centre:.4g} Hz", true.level[k, 2], level, SMALL["level"]))
-    for figure, far, estimated, small in figures:
-        numbers = float(far), float(estimated), float(small)
-        yield Effectivity(case, force, cause, figure, *numbers)
+    for axis, direction in enumerate("xyz"):
+        small = SMALL["deviation"] * one.deviation[axis]
+        figures = [
+            ("mean", true.mean[axis], bar.mean[axis], SMALL["mean"] * load),
+            ("deviation", true.deviation[axis], bar.deviation[axis], small),
+            ("history", 100 * true.history[axis], 100 * bar.history[axis], SMALL["history"]),
+        ]
+        for k, centre in enumerate(accuracy.centre):
+            far, level = true.level[k, axis], bar.level[k, axis]
+            if np.isfinite([one.level[k, axis], far, level]).all():
+                figures.append((f"{centre:.4g} Hz", far, level, SMALL["level"]))
+        for figure, *numbers in figures:
+            yield Effectivity(case, f"{force} {direction}", cause, figure, *map(float, numbers))

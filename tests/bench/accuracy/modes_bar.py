@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from mpi4py import MPI
 
 from tireroad.contact.results.error_bars import bars
@@ -15,7 +14,7 @@ from tireroad.runs.files.cache import Cache
 from tireroad.runs.stages.accuracy import ReferenceRun, companions, figures, model_limit
 from tireroad.runs.stages.rolling import ContactForces, first_step, recursive
 from tireroad.runs.validation.tables import Table
-from tireroad.tests.bench.parts.effectivity import RANGE, SMALL, Effectivity
+from tireroad.tests.bench.parts.effectivity import JUDGED, SMALL, Effectivity, by_kind
 from tireroad.tests.bench.parts.rolling_cases import Case, Driven, driven, sets
 
 ABOUT = "estimated over true error by truncated modes: 2 tires, 2 residuals, 4 roads, friction"
@@ -107,35 +106,5 @@ def _given(own: Driven) -> tuple[ReferenceRun, float, float]:
 
 
 def _table(title: str, found: list[Effectivity]) -> Table:
-    kinds = dict.fromkeys((one.force[-1] == "z", one.kind) for one in found)
-    rows = []
-    for vertical, kind in [*sorted(kinds, reverse=True), (None, "all")]:
-        some = [
-            one
-            for one in found
-            if vertical in (None, one.force[-1] == "z") and kind in ("all", one.kind)
-        ]
-        counted = [one for one in some if one.true > one.small]
-        ratio = [one.estimated / one.true for one in counted] or [np.nan]
-        under = sum(one.estimated < RANGE[0] * one.true for one in counted)
-        direction = {True: "z", False: "x, y", None: "x, y, z"}[vertical]
-        good = 100 * float(np.mean([one.good for one in some]))
-        middle = [float(q) for q in np.quantile(ratio, [0.5, 0.1, 0.9])]
-        rows.append([direction, kind, len(some), good, 100 * under / len(some), *middle])
-    return Table(
-        title,
-        [
-            ("direction", ""),
-            ("figure", ""),
-            ("figures", "-"),
-            (f"within {RANGE[0]:g} to {RANGE[1]:g}", "%"),
-            (f"below {RANGE[0]:g}", "%"),
-            ("median", "-"),
-            ("a tenth below", "-"),
-            ("a tenth above", "-"),
-        ],
-        rows,
-        [
-            f"{MODES} modes against {2 * MODES}; contact and axle force on {', '.join(ROADS)}, friction 1."
-        ],
-    )
+    told = f"{MODES} modes against {2 * MODES}; contact and axle force on {', '.join(ROADS)}, friction 1."
+    return Table(title, [("force", ""), ("figure", ""), *JUDGED], by_kind(found), [told])

@@ -22,7 +22,10 @@ FORCES = {"contact_force": "total_force", "axle_force": "axle_force"}
 
 @dataclass(frozen=True)
 class Effectivity:
-    """A figure of a case with true and estimated error (N, % or dB), by one `cause` or all."""
+    """A figure of a case with true and estimated error (N, % or dB), by one `cause` or all.
+
+    `force`: its name, and its direction x, y or z.
+    """
 
     case: str
     force: str
@@ -38,6 +41,11 @@ class Effectivity:
         return self.figure if self.figure in SMALL else "third octaves"
 
     @property
+    def vertical(self) -> bool:
+        """Whether it is of a vertical force."""
+        return self.force.endswith("z")
+
+    @property
     def good(self) -> bool:
         """Whether the estimate is within `RANGE`, or both errors are negligible."""
         if max(self.true, self.estimated) <= self.small:
@@ -45,32 +53,49 @@ class Effectivity:
         return RANGE[0] * self.true <= self.estimated <= RANGE[1] * self.true
 
 
-def _judgement(some: list[Effectivity]) -> list[float]:
-    """Number, share of good ones (%), median and 10 % quantiles of estimated over true error."""
-    ratio = [one.estimated / one.true for one in some if one.true > one.small] or [float("nan")]
+def judgement(some: Sequence[Effectivity]) -> list[float]:
+    """Values under `JUDGED` of some figures."""
+    counted = [one for one in some if one.true > one.small]
+    ratio = [one.estimated / one.true for one in counted] or [float("nan")]
     good = 100 * float(np.mean([float(one.good) for one in some] or [np.nan]))
-    return [len(some), good, *map(float, np.quantile(ratio, [0.5, 0.1, 0.9]))]
+    under = 100 * sum(one.estimated < RANGE[0] * one.true for one in counted) / max(len(some), 1)
+    return [len(some), good, under, *map(float, np.quantile(ratio, [0.5, 0.1, 0.9]))]
 
 
-_JUDGED = [
+JUDGED = [
     ("figures", "-"),
     (f"within {RANGE[0]:g} to {RANGE[1]:g}", "%"),
+    (f"below {RANGE[0]:g}", "%"),
     ("median", "-"),
     ("a tenth below", "-"),
     ("a tenth above", "-"),
 ]
+"""Columns of a judgement: of estimated over true error."""
+
+
+def by_kind(some: Sequence[Effectivity]) -> list[list]:
+    """Rows (force, figure, *judgement): of each force along and across the road, and vertical, and of all its figures."""
+    rows: list[list] = []
+    for force in FORCES:
+        own = [one for one in some if one.force.startswith(force)]
+        name = force.replace("_", " ")
+        for vertical in (True, False):
+            part = [one for one in own if one.vertical is vertical]
+            for kind in dict.fromkeys(one.kind for one in part):
+                which = f"{name} {'z' if vertical else 'x, y'}"
+                rows.append([which, kind, *judgement([one for one in part if one.kind == kind])])
+        if own:
+            rows.append([name, "all", *judgement(own)])
+    return [*rows, ["both", "all", *judgement(some)]]
 
 
 def shares(found: list[Effectivity], note: str, failed: Sequence[str] = ()) -> Table:
     """All causes together; `note`: what was compared, `failed`: cases left out, with the reason."""
     some = [one for one in found if one.cause == ALL]
-    kinds = ("mean", "deviation", "history", "third octaves")
-    parts = {kind: [one for one in some if one.kind == kind] for kind in kinds}
-    rows = [[kind, *_judgement(part)] for kind, part in parts.items() if part]
     return Table(
         "Error bars: estimated over true error",
-        [("figure", ""), *_JUDGED],
-        [*rows, ["all", *_judgement(some)]],
+        [("force", ""), ("figure", ""), *JUDGED],
+        by_kind(some),
         [
             f"{len({one.case for one in found})} cases; target: {ASKED:g} % within. {note} Where both are below {SMALL['mean']:g} of the load, {SMALL['deviation']:g} of the "
             f"deviation, {SMALL['history']:g} % of the history or {SMALL['level']:g} dB a figure counts as good.",
@@ -81,16 +106,14 @@ def shares(found: list[Effectivity], note: str, failed: Sequence[str] = ()) -> T
 
 def by_cause(found: list[Effectivity]) -> Table:
     """Each cause separately."""
-    rows = []
-    for cause in dict.fromkeys(one.cause for one in found if one.cause != ALL):
-        for force in FORCES:
-            for kind in dict.fromkeys(one.kind for one in found):
-                where = (cause, force, kind)
-                some = [one for one in found if (one.cause, one.force, one.kind) == where]
-                if some:
-                    rows.append([cause, force.replace("_", " "), kind, *_judgement(some)])
+    causes = dict.fromkeys(one.cause for one in found if one.cause != ALL)
+    rows = [
+        [cause, *row]
+        for cause in causes
+        for row in by_kind([one for one in found if one.cause == cause])
+    ]
     return Table(
-        "By cause", [("cause", ""), ("force", ""), ("figure", ""), *_JUDGED], rows, [_PAIRS]
+        "By cause", [("cause", ""), ("force", ""), ("figure", ""), *JUDGED], rows, [_PAIRS]
     )
 
 

@@ -1,12 +1,12 @@
-"""The cases for estimated errors and searches: 3 tires, 4 roads, 2 speeds, and their reference runs,
-whose forces are stored for benchmarks that resume, or share them."""
+"""The cases for estimated errors and searches: 3 tires, 4 roads, 2 speeds, of the radial tire more, and their reference
+runs, whose forces are stored for benchmarks that resume, or share them."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
@@ -16,6 +16,7 @@ import h5py
 import numpy as np
 from mpi4py import MPI
 
+from tireroad.fem.errors import InputError
 from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.files.disk import replacing
 from tireroad.runs.pipeline import Finished, run_scene
@@ -65,6 +66,9 @@ load = 4000.0
 error_estimate = false
 """
 _ATTACHED = {"residual": "attachment"}
+# The mesh and the points of quickstart.toml.
+_QUICK = {"segments": 16, "arc": 10, "order": 2, "pitch": 0.010}
+_QUICK_FINE = {"segments": 24, "arc": 16, "order": 2, "footprint": 0.15, "pitch": 0.005} | _ATTACHED
 TIRES = {
     "soft": Tire(text=_SOFT),
     "belted": Tire(text=_SOFT + _BELT, run=_ATTACHED, fine=_ATTACHED),
@@ -75,6 +79,8 @@ TIRES = {
         run={"segments": 16, "arc": 14, "order": 2} | _ATTACHED,
         fine={"segments": 26, "arc": 24, "order": 2, "footprint": 0.1, "pitch": 0.004} | _ATTACHED,
     ),
+    "quick": Tire(text=_RADIAL, run=_QUICK | _ATTACHED, fine=_QUICK_FINE),
+    "quick-static": Tire(text=_RADIAL, run=_QUICK | {"residual": "static"}, fine=_QUICK_FINE),
 }
 # The cleat is reached after the run-in, which no figure includes. At both speeds a wave of the sine
 # takes longer than 10 ms, the period of the highest frequency of interest in searches.
@@ -126,6 +132,11 @@ class Case:
         return f"{self.tire}, {self.road}, {self.speed:g} rad/s"
 
     @property
+    def words(self) -> tuple[str, str, str]:
+        """What names it among others: tire, road and speed."""
+        return self.tire, self.road, f"{self.speed:g}"
+
+    @property
     def wheel(self) -> str:
         """Name of what all roads share: tire and speed."""
         return f"{self.tire}-{self.speed:g}"
@@ -147,7 +158,26 @@ class Case:
         return load(folder / "given.toml", sets)
 
 
-CASES = tuple(Case(*one) for one in product(TIRES, ROADS, SPEEDS))
+CASES = tuple(Case(*one) for one in product(("soft", "belted", "radial"), ROADS, SPEEDS))
+RADIAL = tuple(
+    Case(*one) for one in product(("radial", "quick", "quick-static"), ROADS, (30.0, 60.0, 90.0))
+)
+
+
+def chosen(cases: Iterable[Case], only: Sequence[str]) -> list[Case]:
+    """The cases that have all words of one of `only`, as in "radial texture 30"; all for none. InputError if none has."""
+    cases = list(cases)
+    some = [
+        case
+        for case in cases
+        if not only or any(set(words.split()) <= set(case.words) for words in only)
+    ]
+    if not some:
+        every = sorted({word for case in cases for word in case.words})
+        raise InputError(
+            f"--only: no case has all words of one of them; words are {', '.join(every)}"
+        )
+    return some
 
 
 def by_wheel(cases: Iterable[Case]) -> list[Case]:

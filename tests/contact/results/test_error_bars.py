@@ -7,6 +7,7 @@ from tireroad.contact.results.error_bars import (
     Bars,
     Measured,
     bars,
+    estimated,
     measured,
     random_share,
     similar,
@@ -146,8 +147,53 @@ def test_a_short_record_tells_of_bands_by_the_lines_next_to_them(count):
     run, companion = (measured(force, step, 320.0, bands=bands) for force in (own, other))
     assert (run.centre == bands).all() and np.isnan(run.level[0]).all() == (count == 64)
     true = 20 * np.log10(1 + 0.05 * (bands / 400.0) ** 3)
-    found = bars(run, companion, 1 / (2**1.5 - 1)).level[:, 2]
+    found = estimated(run, companion, 1 / (2**1.5 - 1)).level[:, 2]
     alone = np.isnan(run.level[:, 2])
     assert (found[alone] / true[alone] < 1.0).all() and (found[alone] / true[alone] > 0.3).all()
     assert found[~alone] == pytest.approx(true[~alone], rel=0.25)
     assert np.isfinite(similar(run, companion, np.sqrt(0.5)).level).all()
+
+
+@pytest.mark.parametrize("longer", [1, 4])
+def test_independent_errors_are_seldom_understated(longer):
+    """The difference of one figure is below half of the error in three cases of ten; its size by the lines is not."""
+    step, count, random = 1e-3, 1024, np.random.default_rng(7)
+    under: dict[str, list[float]] = {"one": [], "size": []}
+    ratio = []
+    for _ in range(60):
+        exact, own, other = (random.standard_normal((longer * count, 3)) for _ in range(3))
+        exact += 20.0
+        true, run = (measured(force, step, 400.0) for force in (exact, exact + 0.05 * own))
+        short, companion = (
+            measured(force[:count], step, 400.0, bands=true.centre)
+            for force in (exact + 0.05 * own, exact + 0.05 * other)
+        )
+        wanted = bars(run, true)
+        share = random_share(1.0, 1.0)  # of two errors of one size
+        for name, found in (
+            ("one", bars(short, companion, share)),
+            ("size", estimated(short, companion, share, longer)),
+        ):
+            for kind in ("mean", "deviation", "level"):
+                off, told = getattr(wanted, kind), getattr(found, kind)
+                some = np.isfinite(off) & np.isfinite(told)
+                under[name] += list((told < 0.5 * off)[some])
+                ratio += list((told / off)[some]) if name == "size" else []
+    assert np.mean(under["size"]) < 0.12
+    assert longer > 1 or np.mean(under["one"]) > 0.2
+    assert 0.7 < np.median(ratio) < 2.0
+
+
+def test_a_systematic_error_is_told_whole():
+    """The gain of a response: with its phase in every line."""
+    step, count = 1e-3, 1024
+    force = 20.0 + np.random.default_rng(8).standard_normal((count, 3))
+    run, companion = (
+        measured(20.0 + a + b * (force - 20.0), step, 400.0) for a, b in ((0.0, 1.0), (0.3, 1.1))
+    )
+    known = bars(run, companion, 0.5)
+    for longer in (None, 1.0):
+        found = estimated(run, companion, 0.5, longer)
+        assert found.mean == pytest.approx(known.mean, rel=0.02)
+        assert found.deviation == pytest.approx(known.deviation, rel=0.02)
+        assert found.level == pytest.approx(known.level, rel=0.1)

@@ -195,7 +195,7 @@ def test_error_bars_are_compared_with_a_finer_run(tmp_path) -> None:
     cases = [Case("soft", "texture", 40.0)]
     given = cases, coarse, fine, 0.05, tmp_path / "kept"
     shares, causes, every = error_bars.tables(tmp_path / "runs", *given)
-    assert {row[0] for row in shares.rows} >= {"mean", "deviation", "all"}
+    assert {row[1] for row in shares.rows} >= {"mean", "deviation", "all"}
     assert {row[0] for row in causes.rows} == {"step", "points", "modes", "mesh"}
     assert all(row[4] >= 0 and row[5] >= 0 for row in every.rows)
     check_page([shares, causes, every], 0)

@@ -10,6 +10,7 @@ from tireroad.runs.process.mpi import ending
 from tireroad.runs.process.signals import STOPPED, Stopped
 from tireroad.runs.validation import tables
 from tireroad.runs.validation.tables import Table
+from tireroad.tests.bench.parts import rolling_cases
 
 
 def test_a_stop_says_what_is_kept(tmp_path, monkeypatch) -> None:
@@ -43,3 +44,32 @@ def test_a_name_that_cannot_be_written_is_refused_before_the_work(
     monkeypatch.setattr(tables, "modules", lambda package: {"it": module})
     with pytest.raises(InputError, match="--out"):
         tables.run_all("tireroad.tests.bench", [], tmp_path / name)
+
+
+def test_cases_are_chosen_by_all_words_of_one_of_several() -> None:
+    found = rolling_cases.chosen(rolling_cases.RADIAL, ["radial texture 30", "quick-static cleat"])
+    assert [str(case) for case in found] == [
+        "radial, texture, 30 rad/s",
+        *(f"quick-static, cleat, {speed} rad/s" for speed in (30, 60, 90)),
+    ]
+    assert rolling_cases.chosen(rolling_cases.CASES, []) == list(rolling_cases.CASES)
+    with pytest.raises(InputError, match="words are 30, .*texture"):
+        rolling_cases.chosen(rolling_cases.CASES, ["radial gravel"])
+
+
+def test_only_a_benchmark_of_cases_can_choose(tmp_path, monkeypatch) -> None:
+    asked = []
+
+    def of_cases(kept=None, only=()):
+        asked.append((kept, only))
+        return [Table("t", [], [])]
+
+    whole = type("M", (), {"ABOUT": "it", "run": staticmethod(lambda: [Table("t", [], [])])})
+    some = type("M", (), {"ABOUT": "it", "run": staticmethod(of_cases)})
+    monkeypatch.setattr(tables, "modules", lambda package: {"whole": whole, "some": some})
+    tables.run_all("tireroad.tests.bench", ["some"], tmp_path / "out.json", only=["a b"])
+    assert asked == [(tmp_path / "out.kept", ["a b"])]
+    with pytest.raises(InputError, match="whole has no cases"):
+        tables.run_all("tireroad.tests.bench", ["whole"], None, only=["a"])
+    with pytest.raises(InputError, match="name it"):
+        tables.run_all("tireroad.tests.bench", [], None, only=["a"])

@@ -3,14 +3,16 @@
 import json
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
 from tireroad.runs.report import live
 from tireroad.runs.report.compare import BandMarks, marks_told
-from tireroad.runs.report.page import _standing
+from tireroad.runs.report.page import _levels, _partly, _standing
 from tireroad.runs.report.read import about
 from tireroad.runs.report.sections.spectra import _caption, _in_numbers
+from tireroad.runs.stages.stage import Record
 
 CENTRE, NOTHING = np.array([100.0, 125.0]), np.full((2, 3), np.nan)
 LEVEL, KNOWN, FEW = np.full((2, 3), 40.0), np.full((2, 3), 0.3), np.zeros(2, bool)
@@ -65,3 +67,45 @@ class Held:
 def test_the_load_says_so(error, told):
     facts = dict(_standing(Held(), lambda stage, name: error))
     assert told in facts["load at rest"], json.dumps(facts)
+
+
+class Partly:
+    """A folder whose error bars lack those of the points, or of nothing; its levels are 0.3 dB off."""
+
+    def __init__(self, folder: Path, *absent: str) -> None:
+        self._file = folder / "accuracy.h5"
+        with h5py.File(self._file, "w") as file:
+            file.attrs.update({f"absent_{cause}": "the reason" for cause in absent})
+
+    def file(self, name: str) -> h5py.File:
+        return h5py.File(self._file)
+
+    def attribute(self, file: str, name: str) -> float:
+        return 400.0
+
+    def optional(self, file: str, name: str) -> np.ndarray:
+        return KNOWN if name.endswith("_error") else LEVEL
+
+
+@pytest.mark.parametrize(
+    ("absent", "told"),
+    [
+        ((), ""),
+        (("points",), ", without that by the points"),
+        (("points", "mesh"), ", without that by the mesh and the points"),
+    ],
+)
+def test_an_error_without_one_of_its_causes_says_so(tmp_path, absent, told):
+    """It stood as that of all causes, with the reason somewhere below."""
+    folder = Partly(tmp_path, *absent)
+    assert _partly(folder) == told
+    total = 40.0 + 10 * np.log10(2)
+    (_, text), *_ = _levels(folder, lambda stage, name: total if "A-" not in name else None)
+    assert text == f"{total:.1f} dB re 1 N, error ± 0.3{told}"
+
+
+def test_a_figure_that_is_not_known_is_told_as_unknown():
+    record = Record()
+    record.tell("error of the mean", np.nan, "N")
+    record.tell("another", 2.0, "N")
+    assert record.line() == "error of the mean unknown, another 2 N"

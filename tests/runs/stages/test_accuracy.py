@@ -13,11 +13,12 @@ from tires import soft_torus
 from tireroad.contact.results.error_bars import CAUSES, bars, measured
 from tireroad.contact.results.spectra import wide_enough
 from tireroad.contact.tread.kernel import KernelTread
-from tireroad.fem.errors import InputError
+from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.runs.files.disk import Refused
 from tireroad.runs.pipeline import run_scene
 from tireroad.runs.process import console
 from tireroad.runs.scene.load import load
+from tireroad.runs.stages import accuracy, contact, rolling
 from tireroad.runs.stages.accuracy import (
     ReferenceRun,
     _dealt,
@@ -112,7 +113,7 @@ def test_a_companion_is_the_run_it_stands_for(
     other, _ = run(f"{cause}-{friction}", "contact", f"contact.friction={friction}", *sets)
     told = companions(cause, given)
     assert len(told) == (2 if cause == "mesh" else 1)
-    forces, beside, part, _ = told[0]
+    forces, beside, part, *_ = told[0]
     assert forces.step == 2e-4 and (beside is None) == (cause == "step")
     # Elements of order 2 make 3; the footprint is a few points wide, so that finer ones tell, whose errors have
     # nothing to do with the run's.
@@ -224,13 +225,14 @@ def test_bars_are_in_the_summary_and_beside_the_bands(whole):
 
 
 @pytest.mark.long
-def test_bands_have_error_bars_that_companions_are_too_short_for(run):
+def test_bands_have_error_bars_that_companions_are_too_short_for(run, monkeypatch):
+    monkeypatch.setattr(accuracy, "_PERIODS", (2, 4))
     folder, done = run("longer", "spectra", "time.duration=0.2", "road.run_in=0.01")
-    accuracy = done.done["accuracy"].product
+    found = done.done["accuracy"].product
     with h5py.File(folder / "spectra.h5") as file:
         assert np.isfinite(file["third_octave/level_error"][:]).all()
         centre = file["third_octave/centre"][:]
-    assert accuracy.window < 0.1 and len(centre) > len(wide_enough(1 / accuracy.window, 200.0))
+    assert found.window < 0.1 and len(centre) > len(wide_enough(1 / found.window, 200.0))
 
 
 @pytest.mark.long
@@ -244,6 +246,29 @@ def test_a_full_disk_is_no_lack_of_a_companion(run, whole, monkeypatch):
     shutil.copytree(whole[0], whole[0].with_name("full"))
     with pytest.raises(Refused, match="the disk is full"):
         run("full", "accuracy", "accuracy.up_to=300")
+
+
+@pytest.mark.long
+def test_companions_of_a_run_that_begins_at_rest_begin_so(run, monkeypatch):
+    """Each looked for the steady rolling that the run had not found, and failed."""
+
+    def nothing(*given):
+        raise ConvergenceError("nothing rolls steadily")
+
+    for stage in (contact, rolling, accuracy):
+        monkeypatch.setattr(stage, "rolling_steadily", nothing)
+    _, done = run("rest", "accuracy", "rotation.free_rolling=")
+    found = done.done["accuracy"].product
+    assert not done.done["contact"].product.steady and not found.absent
+    assert set(found.by_cause["contact_force"]) == set(CAUSES)
+
+
+@pytest.mark.parametrize("up_to", [100.0, 400.0])
+def test_records_of_companions_have_as_many_lines_whatever_the_band(up_to):
+    least, most = accuracy.records(1e-5, up_to)
+    assert least * 1e-5 * up_to == pytest.approx(16, rel=1e-3)
+    assert most == pytest.approx(2 * least, abs=1)
+    assert accuracy.records(1e-3, up_to)[0] >= 64  # steps, where they are long
 
 
 @pytest.mark.long

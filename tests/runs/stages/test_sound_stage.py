@@ -118,6 +118,7 @@ def test_what_is_not_estimated_is_unknown_everywhere(results: tireroad.RunResult
     assert (results["sound/third_octave/element_error"] > 0).all()
     stage = json.loads((results.directory / "summary.json").read_text())["stages"]["sound"]
     told = {name: entry["value"] for name, entry in stage["headline"].items() if "error" in name}
+    assert told.pop("error of the vibration") == "unknown: accuracy.estimate is false"
     assert len(told) == 9 and set(told.values()) == {"unknown"}
     page = write_report(results.directory).read_text()
     assert "error unknown" in page and not re.search(r"± 0\.0(?!\d)", page)
