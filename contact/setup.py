@@ -15,7 +15,7 @@ from tireroad.contact.patch import LEAST_REACH, Patch, make_patch
 from tireroad.contact.roads.cell_mean import CellMean
 from tireroad.contact.roads.kinds.shapes import Flat
 from tireroad.contact.roads.under_tire import NOTHING, PreparedRoad, RoadUnderTire
-from tireroad.contact.tread.between_nodes import before_equilibrium
+from tireroad.contact.tread.between_nodes import before_equilibrium, in_elements
 from tireroad.contact.tread.brush import shape_slip
 from tireroad.contact.tread.laws.elastic import FREQUENCY
 from tireroad.contact.tread.memory import softened, steadily
@@ -225,9 +225,11 @@ class ContactSetup:
             return replace(self, patch=replace(patch, pull=pull)), 0.0
         if self.pattern is not None:
             patch = replace(patch, gap=patch.gap + self.begun)
-        p = len(patch.index)
-        flexibility = (response.static() + response.residual)[:p, :p]
-        resolved, past, at_rest = resolved_tread(spec, patch, self.surface), None, 1.0
+        p, at_rest, past = len(patch.index), 1.0, None
+        whole = response.static() + response.residual
+        flexibility, resolved = whole[:p, :p], resolved_tread(spec, patch, self.surface)
+        if resolved is not None:
+            resolved = in_elements(resolved, whole[: len(resolved), : len(resolved)])
         normal = None if resolved is None else resolved[:p, :p]
         if spec.law.creep is not None:
             # The nodes' part has in the static state no other moduli than its elements.

@@ -12,7 +12,8 @@ so that the elements lack
 
 which is not negative on any mesh (as computed, beyond 4 % of the largest C: at the rim of a patch, where C^-1 is cut off), and all of
 it within a few nodes. A tread law that is the tire's own outer rubber (not
-`in_series` with it) counts for that alone: C between the points, and the compliance of the nodes less N.
+`in_series` with it) counts for that alone: C between the points, and the compliance of the nodes less N, as far as they have it
+(`in_elements`).
 
 C is that of a raster of cells several times as close as the nodes, on which their shape functions are what they are between the
 points too; C^-1 falls off within a few cells.
@@ -170,6 +171,24 @@ def _inverse_symbol(
     value, vector = np.linalg.eigh(symbol)
     value = np.maximum(value, _STIFFEST * value.max())
     return (vector / value[..., None, :]) @ vector.conj().swapaxes(-1, -2)
+
+
+def in_elements(known: Array, nodes: Array) -> Array:
+    """What the compliance A (k, k) m/N of `nodes` has of `known` N (k, k) m/N: no more than either, in all directions,
+
+        N^(1/2) min(L, 1) N^(1/2),   N^(-1/2) A N^(-1/2) = V L V^T,
+
+    so that nodes without it give way still, and a tread may be stiffer at once than N is.
+    """
+    seen = np.flatnonzero(known.diagonal() > 0.0)
+    some = np.ix_(seen, seen)
+    root = linalg.cholesky(known[some], lower=True)
+    half = linalg.solve_triangular(root, (nodes[some] + nodes[some].T) / 2, lower=True)
+    share, vectors = linalg.eigh(linalg.solve_triangular(root, half.T, lower=True))
+    sides = root @ vectors
+    out = np.zeros_like(known)
+    out[some] = (sides * np.clip(share, 0.0, 1.0)) @ sides.T
+    return out
 
 
 def without(nodes: Array, known: Array | None) -> Array:

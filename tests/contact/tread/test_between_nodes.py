@@ -12,6 +12,7 @@ from tireroad.contact.tread.between_nodes import (
     OuterRubber,
     Raster,
     before_equilibrium,
+    in_elements,
     on_nodes,
     over_rectangles,
 )
@@ -79,6 +80,21 @@ def test_what_nodes_have_is_the_least_energy_of_their_displacements():
     assert found == pytest.approx(right, abs=0.01 * np.abs(right).max())
     lacking = np.linalg.eigvalsh(whole - weights @ known @ weights.T)
     assert middle.size and lacking[0] > -0.02 * np.linalg.eigvalsh(whole)[-1]
+
+
+def test_nodes_lose_of_a_tread_no_more_than_they_have() -> None:
+    """Between N and A in all directions: neither A nor N less it gives back; N itself where nodes have more."""
+    rng = np.random.default_rng(2)
+    known, nodes = (one @ one.T for one in rng.standard_normal((2, 12, 12)))
+    known[-2:] = known[:, -2:] = 0.0  # nodes of which the raster shows an edge alone
+    found = in_elements(known, nodes)
+    seen, size = slice(0, 10), np.linalg.norm(known, 2)
+    for whole in (known, nodes):
+        assert np.linalg.eigvalsh((whole - found)[seen, seen])[0] > -1e-9 * size
+    assert not found[-2:].any()
+    assert found[seen, seen] == pytest.approx(in_elements(known[seen, seen], nodes[seen, seen]))
+    more = known + nodes
+    assert in_elements(known, more) == pytest.approx(known, abs=1e-9 * size)
 
 
 def hats(apart: float) -> Callable:
