@@ -22,8 +22,7 @@ from scipy import sparse
 from scipy.optimize import brentq
 
 from tireroad.contact.patch import Patch
-from tireroad.contact.solver.anderson import Mixed
-from tireroad.contact.solver.conditions import ContactSolver
+from tireroad.contact.solver.conditions import ContactSolver, Mixed
 from tireroad.contact.tread.kernel import GridPlaces
 from tireroad.fem.errors import ConvergenceError, UnsuitedSettings
 

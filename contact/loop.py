@@ -18,8 +18,7 @@ from scipy import sparse
 
 from tireroad.contact.patch import Patch
 from tireroad.contact.solver.active_set import COMPILED
-from tireroad.contact.solver.anderson import Mixed
-from tireroad.contact.solver.conditions import Array, ContactSolver, Mask
+from tireroad.contact.solver.conditions import Array, ContactSolver, Mask, Mixed
 from tireroad.contact.solver.grid_newton import GridNewton
 from tireroad.contact.solver.projected_cg import ProjectedCG
 from tireroad.contact.solver.stick_slip import BrushFriction, CompressedRows

@@ -1,4 +1,4 @@
-"""The interface of the contact solvers, and their checks of compliance and solution."""
+"""The interface of the contact solvers, their checks of compliance and solution, and what speeds up their fixed points."""
 
 from typing import Any, Protocol
 
@@ -13,6 +13,7 @@ Index = NDArray[np.intp]
 
 # Largest complementarity residual of a solution, as a share of the scale.
 TOLERANCE = 1e-9
+MIXED = 5  # places that Anderson's acceleration combines
 
 
 class ContactSolver(Protocol):
@@ -87,3 +88,30 @@ def check_residual(name: str, residual: float) -> None:
             f"contact ({name}): complementarity residual {residual:.2g} of the largest gap, above "
             f"{TOLERANCE:g}; add tread compliance or a residual flexibility, or take another solver"
         )
+
+
+class Mixed:
+    """Anderson's acceleration of places p that are sought where their rest d(p) = 0: the last few are combined so that
+    their rests, weighted, cancel as well as they can."""
+
+    def __init__(self) -> None:
+        self._place: list[Array] = []
+        self._rest: list[Array] = []
+        self._weighted: list[Array] = []
+
+    def next(self, place: Array, rest: Array, weight: Array) -> Array:
+        """The next place, from one and its rest; `weight`: what the rest is judged by."""
+        self._place.append(place)
+        self._rest.append(rest)
+        self._weighted.append((weight * rest).sum(axis=0))
+        for held in (self._place, self._rest, self._weighted):
+            del held[:-MIXED]
+        ahead: Array = place + rest
+        if len(self._place) == 1:
+            return ahead
+        last = self._weighted[-1]
+        apart = np.stack([last - one for one in self._weighted[:-1]], axis=1)
+        share, *_ = np.linalg.lstsq(apart, last, rcond=1e-6)
+        for one, p, d in zip(share, self._place[:-1], self._rest[:-1], strict=True):
+            ahead = ahead - one * (place + rest - p - d)
+        return ahead

@@ -174,7 +174,7 @@ def _inverse_symbol(
 
 
 def in_elements(known: Array, nodes: Array) -> Array:
-    """What the compliance A (k, k) m/N of `nodes` has of `known` N (k, k) m/N: no more than either, in all directions,
+    """The part of `known` N (k, k) m/N that the compliance A (k, k) m/N of `nodes` has: no more than either, in all directions,
 
         N^(1/2) min(L, 1) N^(1/2),   N^(-1/2) A N^(-1/2) = V L V^T,
 
