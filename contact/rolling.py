@@ -23,7 +23,9 @@ PASSAGES = 100  # lengths of the footprint, within which a tire is to roll stead
 FEWEST_STEPS = 8  # of a length
 STEADY = 1e-4  # of the load: changes of the forces from one length to the next
 MOST_SLIP = (-0.2, 0.2)
-SECANTS = 8  # steps to the slip without drag
+# Share of the footprint's mean displacement across the road that is left out; without all of it forces turn the footprint before
+# they shift it, and a step may have several solutions.
+WITHOUT = 0.75
 FIRST_SLIP = 2e-3  # of a wheel that is to slip; doubled with each step
 FINE = 1e-6  # tolerance of stick and slip, so that the slip is not that of its residual
 
@@ -122,13 +124,14 @@ def rolling_steadily(
     """The setup (settled) with the state in which its tire rolls steadily, and with the slip of free rolling if it is free.
 
     The contact problem on a smooth road, in steps of a point each and then in the loop's own of `step` s, of a tire that
-    follows its forces at once (`response` at 0 Hz). Freely rolling, the slip along the road is set from step to step so that
+    follows its forces at once (`response` at 0 Hz). Freely rolling, the slip along the road is set from stretch to stretch so that
     nothing has to drive the wheel: the road's forces have no moment M_y about the axle,
 
-        s+ = s_0 - D / (K l),   s_0 = s - (D - D before) / (K way),   D = -M_y / R,
+        s+ = s_0 - D / (K l),   s_0 = s' - (D - D before) / (K way),   D = -M_y / R,
 
-    D the force along the road with their moment, R the height of the axle, K the tire's stiffness along the road, `way` that
-    of a step and l the length of the footprint: s_0 is the slip at which D would not have changed. Of a tire that loses nothing it is the force along the
+    D the force along the road with their moment, the mean of a stretch, R the height of the axle, K the tire's stiffness along the road, `way` that
+    of a stretch, s' the slip between the middles of two, and l the length of the footprint: s_0 is the slip at which D would not have changed. A
+    stretch is a number of passages of a point, whose entry and exit move D. Of a tire that loses nothing D is the force along the
     road; what the losses of rolling move ahead of the axle, the road's drag makes up for. What
     `setup.slip` has along the road comes on top, afterwards. Steady: from one length of the footprint to the next forces
     change by less than 1e-4 of the load. The setup itself where bristles do not roll: without friction, at standstill,
@@ -154,16 +157,18 @@ def rolling_steadily(
         rolled.until_steady()
     if (way := setup.rolled.speed * step) < pitch:
         rolled = _Rolled(spec, setup, flexibility, shifted, length, way, rolled)
-        rolled.held(found.slip)
-        drag = rolled.until_steady()
         if setup.free and not given[0]:
-            rolled.rid_of(drag)
+            rolled.freely(given[1])
+        else:
+            rolled.held(found.slip)
+        rolled.until_steady()
+        if setup.free and not given[0]:
             found = setup.with_slip(rolled.slip)
-    contact, memory = rolled.loop.contact, rolled.loop.memory
+    contact = rolled.loop.contact
     forces = contact.vertical.copy(), contact.horizontal.T.copy()
-    state = contact.state() | {"lagging": np.zeros(2, int)}  # counted from the loop's first step on
-    state |= memory.state() if memory else {}
-    return replace(found, steady=SteadyRolling(state, contact.change.copy(), *forces, rolled.way))
+    return replace(
+        found, steady=SteadyRolling(rolled.state(), contact.change.copy(), *forces, rolled.way)
+    )
 
 
 class _Rolled:
@@ -183,18 +188,25 @@ class _Rolled:
         nodes are `shifted` (3p,) m to by what always acts inside the tire."""
         patch, p = setup.patch, len(setup.patch.index)
         step = way / setup.rolled.speed
-        self.loop = make_loop(spec, setup.smooth(step), StaticTire(flexibility), step, FINE)
-        self._load, self._step, self._length = float(patch.force.sum()), way, length
+        self._load, self._step = float(patch.force.sum()), way
+        self._count = _in_a_stretch(way, _pitch(patch), length)
+        self._stretches = math.ceil(max(length / way, FEWEST_STEPS) / self._count)
         share = patch.force / self._load
         nodes = share if patch.weights is None else patch.weights.T @ share
         stiffness = 1.0 / float(nodes @ flexibility[p : 2 * p, p : 2 * p] @ nodes)
-        # N of force along the road for a step, and for the length of the footprint, at a slip of 1.
-        self._more, self._whole = stiffness * way, stiffness * length
+        # The footprint's mean displacement across the road means nothing while it does not change, but takes many lengths to
+        # settle (the relaxation length: cornering over lateral stiffness): the tire has only a part of it.
+        self._left_out: Array = WITHOUT * (nodes @ flexibility[2 * p :])
+        held = flexibility.copy()
+        held[2 * p :] -= self._left_out
+        self.loop = make_loop(spec, setup.smooth(step), StaticTire(held), step, FINE)
+        # N of force along the road for a stretch, and for the length of the footprint, at a slip of 1.
+        self._more, self._whole = stiffness * way * self._count, stiffness * length
         self._road, self._free = RoadMet.level(patch), np.zeros(3 * p)
         self._patch, self._shifted, self._flexibility = patch, shifted, flexibility
         self._shape = replace(setup, slip=(0.0, 0.0)).slips
         self._across: float | None = None
-        self._before: float | None = None
+        self._before: tuple[float, float] | None = None  # drag and slip of the last stretch
         self._slip, self.way = (0.0, 0.0), 0.0
         if before is not None:
             self._slip, self.way = before._slip, before.way
@@ -227,41 +239,46 @@ class _Rolled:
         self._slip = along, across
         self.loop.contact.creep(self._shape + (along, across))
 
-    def until_steady(self) -> float:
-        """The drag, N, of a length of the footprint whose mean forces are those of the one before."""
-        steps, last = max(math.ceil(self._length / self._step), FEWEST_STEPS), None
+    def until_steady(self) -> None:
+        """Roll until the mean forces of a length of the footprint are those of the one before."""
+        last = None
         for _ in range(PASSAGES):
-            mean = np.mean([self._roll() for _ in range(steps)], axis=0)
+            mean = np.mean([self._stretch() for _ in range(self._stretches)], axis=0)
             if last is not None:
                 drag = abs(mean[2]) if self._across is not None else 0.0
                 if max(drag, *np.abs(mean - last)) <= STEADY * self._load:
-                    return float(mean[2])
+                    return
             last = mean
         wanted = (
             "no slip at which the road does not drag the tire"
             if self._across is not None
             else "no steady rolling"
         )
-        raise self._unsteady(wanted, mean)
-
-    def rid_of(self, drag: float) -> None:
-        """Find the slip along the road without the `drag` (N) of the one now held, from one steady state to the next by secants."""
-        change = -drag / self._whole
-        for _ in range(SECANTS):
-            if abs(drag) <= STEADY * self._load:
-                return
-            self.held((self.slip + change, self._slip[1]))
-            before, drag = drag, self.until_steady()
-            change *= drag / (before - drag)
-        raise self._unsteady(
-            "no slip at which the road does not drag the tire", np.array([0.0, 0.0, drag])
-        )
-
-    def _unsteady(self, wanted: str, mean: Array) -> ConvergenceError:
-        return ConvergenceError(
+        raise ConvergenceError(
             f"contact: {wanted} was found within {self.way:.3g} m of a smooth road (last {mean[2]:.3g} N of drag and "
             f"{mean[1]:.3g} N across it): raise contact.friction, or take rotation.free_rolling = false"
         )
+
+    def _stretch(self) -> Array:
+        """The mean of `_roll` over a stretch, after which the slip of a tire that rolls freely is set anew."""
+        mean: Array = np.mean([self._roll() for _ in range(self._count)], axis=0)
+        if self._across is not None:
+            drag, n = float(mean[2]), self._count
+            before, slip = self._before or (drag, self.slip)
+            between = ((n - 1) * slip + (n + 1) * self.slip) / (2 * n)
+            unchanged = between - (drag - before) / self._more
+            self._before = drag, self.slip
+            self._creep(float(np.clip(unchanged - drag / self._whole, *MOST_SLIP)), self._across)
+        return mean
+
+    def state(self) -> dict[str, Array]:
+        """The state of a loop of the whole tire that begins so."""
+        contact, memory = self.loop.contact, self.loop.memory
+        state = contact.state() | {
+            "lagging": np.zeros(2, int)
+        }  # counted from the loop's first step on
+        moved = state["moved"] + [0.0, self._left_out @ contact.change]
+        return state | {"moved": moved} | (memory.state() if memory else {})
 
     def _roll(self) -> Array:
         """A step; the road's forces along and across it, and the drag of their moment, (3,) N."""
@@ -270,13 +287,8 @@ class _Rolled:
         contact.commit(contact.solve(self._road, tread, self._free))
         if memory:
             memory.advance(contact.at_points)
-        drag, self.way = self._drag(), self.way + self._step
-        if self._across is not None:
-            before = drag if self._before is None else self._before
-            unchanged = self.slip - (drag - before) / self._more
-            self._before = drag
-            self._creep(float(np.clip(unchanged - drag / self._whole, *MOST_SLIP)), self._across)
-        return np.array([*contact.resultant[:2], drag])
+        self.way += self._step
+        return np.array([*contact.resultant[:2], self._drag()])
 
     def _drag(self) -> float:
         """Force along the road, N, whose moment about the axle is that of the road's forces, where the points have moved to."""
@@ -289,6 +301,15 @@ class _Rolled:
         places = patch.points + moved
         moment = float(places[:, 2] @ force[:, 0] - places[:, 0] @ force[:, 2])
         return moment * self._load / float(places[:, 2] @ patch.force)
+
+
+def _in_a_stretch(way: float, pitch: float, length: float) -> int:
+    """Number of steps of a `way` m, at most a quarter of the footprint's `length` unless a point's `pitch` is more, that come
+    nearest to a number of pitches."""
+    least = max(round(pitch / way), 1)
+    counts = np.arange(least, max(int(length / 4 / way), least) + 1)
+    passages = counts * way / pitch
+    return int(counts[np.argmin(np.abs(passages - np.maximum(np.round(passages), 1)))])
 
 
 def _pitch(patch: Patch) -> float:
