@@ -320,15 +320,22 @@ class InflatedRing:
         parts = [(k, self._inside(self._of_kind(wave, s))) for k, s in self._kinds.items()]
 
         def at(frequency: float) -> sparse.csc_matrix:
-            return whole + sum((kind.modulus(frequency) - 1) * part for kind, part in parts)
+            moduli = [kind.modulus(abs(frequency)) for kind, _ in parts]
+            found = moduli if frequency >= 0 else np.conj(moduli)
+            return whole + sum((k - 1) * part for k, (_, part) in zip(found, parts, strict=True))
 
         return at
 
     def _carried(self, wave: int) -> sparse.csr_matrix:
         """M C_n of a wave that rests in space while the tire turns through it."""
-        along = 2j * wave
-        turn = [[wave**2 + 1, along, 0], [-along, wave**2 + 1, 0], [0, 0, wave**2]]
-        return self.mass @ sparse.kron(sparse.eye(len(self.section.nodes)), np.array(turn))
+        return self._inertia(wave, 0.0, 1.0)
+
+    def _inertia(self, wave: int, rate: float, speed: float) -> sparse.csr_matrix:
+        """-M (i rate + speed (i n + J))^2 of a wave of n that oscillates in space at a rate while the tire turns at a speed
+        through it, rad/s; J turns the directions r and theta with the tire."""
+        turns = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+        along = 1j * (rate + speed * wave) * np.eye(3) + speed * turns
+        return self.mass @ sparse.kron(sparse.eye(len(self.section.nodes)), -along @ along)
 
     def standing(self, wave: int) -> tuple[float, float]:
         """The lowest speed (rad/s) at which a wave stands on the road, and y (m) where it is largest.
@@ -356,21 +363,26 @@ class InflatedRing:
         frequency: np.ndarray,
         angles: np.ndarray,
         waves: int = 80,
+        speed: float = 0.0,
     ) -> np.ndarray:
-        """Radial motion over a radial force spread on a patch (f, a), m/N, standing, at angles from it.
+        """Radial motion over a radial force spread on a patch (f, a), m/N, at angles from it; the tire stands, or turns at a
+        `speed` W (rad/s) towards larger angles while force and reader rest in space.
 
         The patch has `weights` (n,) across (`patch`) and a `half_angle` (rad) around. By direct solution for every
         wave number up to `waves`, with complex moduli at every `frequency` (Hz):
 
-            H = sum_n cos(n angle) sinc(n half_angle)^2 w . (K_n*(omega) - omega^2 M)^-1 w / 2 pi.
+            H = sum_n e^(i n angle) sinc(n half_angle)^2 w . (K_n*(omega + n W) + M (i omega + W (i n + J))^2)^-1 w / 2 pi
+
+        over positive and negative n, which are alike standing. Tension is that of the ring's own speed.
         """
-        load, mass = self._radial(weights), self._inside(self.mass)
-        out = np.zeros((len(frequency), len(angles)), complex)
-        for wave in range(waves + 1):
-            stiffness, share = self._dynamic_stiffness(wave), patch_share(wave, half_angle)
+        load, out = self._radial(weights), np.zeros((len(frequency), len(angles)), complex)
+        for wave in range(-waves if speed else 0, waves + 1):
+            stiffness, share = self._dynamic_stiffness(wave), patch_share(abs(wave), half_angle)
+            around = np.exp(1j * wave * angles) / 2 if speed and wave else np.cos(wave * angles)
             for row, f in zip(out, frequency, strict=True):
-                answer = load @ splu(stiffness(f) - (2 * np.pi * f) ** 2 * mass).solve(load)
-                row += share * answer * np.cos(wave * angles)
+                inertia = self._inside(self._inertia(wave, 2 * np.pi * f, speed))
+                dynamic = stiffness(f + wave * speed / (2 * np.pi)) - inertia
+                row += share * around * (load @ splu(dynamic).solve(load))
         return out
 
     def flexibility(self, wave: int, weights: np.ndarray) -> float:

@@ -5,7 +5,7 @@ import pytest
 
 from tireroad.fem.sections.inflated import InflatedRing
 from tireroad.fem.sections.radial import radial
-from tireroad.tests.validation import mobility, slow_motions, waves_around
+from tireroad.tests.validation import mobility, rolling_mobility, slow_motions, waves_around
 
 FREQUENCY = np.array([20.0, 63.0, 100.0, 125.0])
 
@@ -47,6 +47,25 @@ def test_a_patch_is_the_mean_over_its_strip():
     places = ring.section.nodes[:, 1] + ring.displacement[:, 2]
     assert weights.sum() == pytest.approx(1.0)
     assert weights @ places == pytest.approx(0.02, abs=2e-4)
+
+
+@pytest.mark.long
+def test_rotating_modes_hear_waves_that_run_with_and_against_the_tire(monkeypatch):
+    """A quarter turn ahead and behind differ by 4 to 9 dB at 100 and 160 Hz; modes have it on elements of 15 degrees."""
+    small = {
+        "ALONG": 10,
+        "UP_TO": 300.0,
+        "FREQUENCY": np.array([100.0, 160.0]),
+        "ANGLES": np.radians([0.0, 90.0, -90.0]),
+    }
+    for name, value in small.items():
+        monkeypatch.setattr(rolling_mobility, name, value)
+    monkeypatch.setattr(mobility, "ALONG", 10)
+    monkeypatch.setattr(mobility, "AROUND", 24)
+    (table,) = rolling_mobility.run()
+    for _, _, ahead, behind, *off in table.rows:
+        assert abs(ahead - behind) > 3
+        assert np.abs(off).max() < 2
 
 
 @pytest.mark.slow

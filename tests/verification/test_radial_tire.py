@@ -75,7 +75,7 @@ def test_three_dimensional_elements_against_fourier_series(tmp_path):
 
 @pytest.mark.slow
 def test_losses_of_a_rolling_tire_take_off_at_its_critical_speed():
-    """At rest the load sinks as by the receptance at 0 Hz; moments are those of a rolling resistance of 0.5 to
+    """The load sinks as by the receptance at 0 Hz, standing and rolling; moments are those of a rolling resistance of 0.5 to
     1.2 % up to the speed symbol (H: 190 rad/s), beyond which they take off, and none without losses.
     """
 
@@ -88,6 +88,9 @@ def test_losses_of_a_rolling_tire_take_off_at_its_critical_speed():
     tire, deflection, _ = rolled(0.0)
     at_rest = tire.receptance(tire.patch(0.0, 0.06), 0.2, np.zeros(1), np.zeros(1), 60)
     assert deflection == pytest.approx(at_rest.real.item(), rel=1e-9)
+    tire, deflection, _ = rolled(60.0)
+    passed = tire.receptance(tire.patch(0.0, 0.06), 0.2, np.zeros(1), np.zeros(1), 60, 60.0)
+    assert deflection == pytest.approx(passed.real.item(), rel=1e-6)
     share = {speed: 4000 * rolled(speed)[2] / 0.305 for speed in (60.0, 150.0, 240.0)}
     assert 0.005 < share[60.0] < 0.012
     assert share[150.0] == pytest.approx(share[60.0], rel=0.1)
