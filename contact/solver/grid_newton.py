@@ -24,10 +24,10 @@ _RULES = _C.newton  # as for the steps of stick and slip
 GAP_TOLERANCE = 1e-5
 NEAR = 4.0  # spacings of nodes up to which a Newton step has the tire's compliance between them,
 MOST = 0.5  # unless what is left out is more than this share of it: then all of it
-# Where what is out of balance has grown from its least by more than this factor, the near parts of the compliance do not do: the
-# whole of it is taken in this step and those that follow.
-GROWN, WHOLLY = 10.0, 200
 PATIENT = 12  # Newton steps, before fewer points are to be found slipping where the residual does not fall
+# Where these are not enough, or what is out of balance has grown by more than this factor since the first one, the near parts of the
+# compliance do not do: the whole of it is taken in this step and those that follow.
+GROWN, WHOLLY = 10.0, 30
 READINGS = 12  # Newton steps in which the road is read, at most: on a steep flank a point may go to and fro
 _EDGE = 1  # rows and columns of points beyond those that touch, which the edge of a brush needs
 
@@ -245,7 +245,7 @@ class _Step:
     def settle(self, normal: bool = True, plane: bool = True) -> bool:
         """Newton steps until the forces `normal` to the road and in its `plane` are in balance, while the others stay. Whether
         40 were enough."""
-        before, least, best = np.inf, np.inf, self.force
+        before, least, most, best = np.inf, np.inf, np.inf, self.force
         for turn in range(TURNS):
             self.turns += 1
             self._evaluate()
@@ -253,9 +253,11 @@ class _Step:
                 if not self._beyond():
                     return True
                 continue  # with the points of a larger box
-            if self._rest > GROWN * least and not self._solver.wholly:
+            if not self._solver.wholly and (turn == PATIENT or self._rest > most):
                 self._solver.wholly, self.force = WHOLLY, best.copy()
                 continue
+            if turn == 0:
+                most = GROWN * self._rest
             if self._rest < least:
                 least, best = self._rest, self.force.copy()
             if turn >= PATIENT and self._off > max(_RULES.falls * before, self._limit):
