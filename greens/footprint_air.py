@@ -323,7 +323,8 @@ class _Laid:
         """Join the stops of lateral grooves, `count` of them side by side; they are open where they leave the footprint."""
         half, long = float(self.y[1] - self.y[0]) / 2, groove.stretch
         for one, two in zip(stops, stops[1:], strict=False):
-            if min(one.node, two.node) >= 0 and one.node != two.node:
+            within = not (one.own or two.own) and one.low == two.low  # one groove's two columns
+            if min(one.node, two.node) >= 0 and not within:
                 self._join(pipe, one.node, two.node, long * max(two.low - one.high, _SHORT), count)
             for stop, other, side in ((one, two, half), (two, one, -half)):
                 if stop.own and other.node < 0:
