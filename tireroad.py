@@ -27,6 +27,7 @@ _HOMES = {
     "radiate": "tireroad.greens.sound",
     "listen": "tireroad.runs.listen",
     "pass_by": "tireroad.runs.pass_by",
+    "loudness": "tireroad.runs.loudness",
     "PorousLayer": "tireroad.greens.absorbing_road",
     "Material": "tireroad.fem.tire.material",
     "compound": "tireroad.fem.tire.material",

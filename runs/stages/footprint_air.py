@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -12,7 +13,13 @@ from scipy import sparse
 from tireroad.contact.results.squeezed_air import FootprintCells, squeezed
 from tireroad.contact.setup import ContactSetup
 from tireroad.fem.static.state import StaticState
-from tireroad.greens.footprint_air import Groove, Outlets, on_elements, radiation_resistance
+from tireroad.greens.footprint_air import (
+    Groove,
+    LateralGroove,
+    Outlets,
+    on_elements,
+    radiation_resistance,
+)
 from tireroad.greens.tire_sound import SoundingTire, Transfer, road_axes
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.stages.stage import Job
@@ -22,12 +29,24 @@ Array = np.ndarray
 _ROWS = 512  # steps read at a time
 
 
-def grooves(scene: Scene) -> list[Groove]:
-    """The circumferential grooves of the scene's tread: of [pattern], or those of the section itself."""
-    if scene.pattern is None:
-        return [Groove(*groove) for groove in scene.tire.shape.grooves_around]
-    around = (g for g in scene.pattern.groove if g.direction == "circumferential")
-    return [Groove(g.position, g.width, g.depth) for g in around]
+def grooves(scene: Scene, circumference: float) -> tuple[list[Groove], list[LateralGroove]]:
+    """The grooves of the scene's tread of a rolling `circumference` (m): around the tire and lateral ones.
+
+    Those of [pattern]; where that has none around the tire, those of the section itself.
+    """
+    table = scene.pattern
+    every = table.groove if table else ()
+    around = [
+        Groove(g.position, g.width, g.depth) for g in every if g.direction == "circumferential"
+    ]
+    lateral = [
+        LateralGroove(
+            g.width, g.depth, circumference / table.pitches, g.span, math.tan(math.radians(g.angle))
+        )
+        for g in every
+        if table and g.direction == "lateral"
+    ]
+    return around or [Groove(*groove) for groove in scene.tire.shape.grooves_around], lateral
 
 
 @dataclass(frozen=True)
@@ -64,10 +83,15 @@ class LeavingAir:
             cells = FootprintCells.of(patch.places, file["static_force"][:])
             if not len(cells.cell):
                 return None
-            outlets = Outlets.of(cells.inside, cells.cell, *_grid(setup), grooves(job.scene))
+            pattern = setup.pattern
+            around = pattern.circumference if pattern else math.nan
+            known = grooves(job.scene, around)
+            outlets = Outlets.of(cells.inside, cells.cell, *_grid(setup), *known)
             step, speed = float(file.attrs["step"]), float(file.attrs["road_speed"])
             first = len(file["time"]) - round(lines.duration / step)
-            air = squeezed(cells, _gaps(file["gap"], first), outlets.sums, speed, step)
+            gaps = _blocks(file["gap"], first)
+            depths = _depths(setup, _blocks(file["time"], first)) if pattern else None
+            air = squeezed(cells, gaps, outlets.sums, speed, step, depths)
         numbers = np.rint(lines.frequency * lines.duration).astype(int)
         # What is known is the mean over a time before each instant.
         late = lines.frequency * air.over
@@ -75,11 +99,9 @@ class LeavingAir:
         shares = on_elements(tire, _face(state), outlets.places)
         ends = shares[:, len(outlets.edge) :]
         resistance = radiation_resistance(far, ends, shares, lines.frequency)
+        rate = np.stack([(part * true[:, None]).T for part in transformed(air.rate, step, numbers)])
         arguments = lines.frequency, air.height, far.air, resistance
-        amplitude, spectrum = (
-            outlets.leaving((part * true[:, None]).T, *arguments)
-            for part in transformed(air.rate, step, numbers)
-        )
+        amplitude, spectrum = outlets.leaving(rate, *arguments)
         return LeavingAir(outlets.places, shares, amplitude, spectrum, air.height)
 
     def on(self, tire: SoundingTire, state: StaticState) -> LeavingAir:
@@ -109,6 +131,15 @@ def _grid(setup: ContactSetup) -> tuple[Array, Array]:
     return x, y
 
 
-def _gaps(dataset: h5py.Dataset, first: int) -> Iterator[Array]:
+def _blocks(dataset: h5py.Dataset, first: int) -> Iterator[Array]:
     for start in range(first, len(dataset), _ROWS):
         yield dataset[start : start + _ROWS]
+
+
+def _depths(setup: ContactSetup, times: Iterator[Array]) -> Iterator[Array]:
+    """Depth (n, c) m of the pattern under the contact points at blocks of times (n,) s."""
+    assert setup.pattern is not None, "a tread with a pattern"
+    x, y = setup.patch.points[:, 0], setup.patch.points[:, 1]
+    for time in times:
+        along = x + setup.rolled.speed * time[:, None]
+        yield setup.pattern.depth(along, np.broadcast_to(y, along.shape))

@@ -28,7 +28,7 @@ from tireroad.runs.results.wave import LISTEN, joined, wave_file
 FILE = "sound.h5"
 _CHARTED = 4  # microphones in one chart of bars
 _LIMITS = "Sound of the tire's vibrations{air}: no lateral grooves, no car; the contact's own local flexibility is left out."
-_WITH_AIR = ", and of the air that tread and road squeeze out of the footprint, over its edge and through the grooves around the tire"
+_WITH_AIR = ", and of the air that tread and road squeeze out of the footprint, over its edge and through its grooves"
 _ALONE = " alone, without the air that tread and road squeeze out of the footprint, which is heard from 800 Hz on"
 
 

@@ -92,7 +92,7 @@ class SoundTable:
     )
     air: bool | None = flag(
         None,
-        "with the air that tread and texture squeeze out of the footprint, over its edge and through the grooves around the tire; false: "
+        "with the air that tread and texture squeeze out of the footprint, over its edge and through its grooves; false: "
         f"the vibrations alone; absent: true where the sound reaches {SQUEEZED:g} Hz, below which they are 10 dB louder. Of contact points on a "
         "grid only",
     )

@@ -38,6 +38,34 @@ def test_a_footprint_is_filled_between_its_first_and_last_points():
     assert cells.area == pytest.approx(2 * D * D)
 
 
+def test_lines_in_a_groove_are_filled_as_far_as_those_beside_it():
+    force = np.zeros((NX, NY))
+    force[2:9, 1] = force[4:11, 3] = 1.0
+    cells = FootprintCells.of(PLACES, force.ravel())
+    assert np.flatnonzero(cells.inside[:, 2]).tolist() == [4, 5, 6, 7, 8]
+    assert not cells.inside[:, [0, 4]].any()
+    none = FootprintCells.of(PLACES, np.zeros(NX * NY))
+    assert not none.inside.any() and not len(none.cell)
+
+
+def test_a_pattern_passes_and_gives_off_nothing_either():
+    """Grooves of 8 mm with steep flanks, which the cubic between steps would not follow: without their depth the rate is the slick's,
+    and so is the mean gap of the land."""
+    step = 5.6e-5
+    time = step * np.arange(1, 301)[:, None]
+    depth = 8e-3 * (np.mod(X + SPEED * time, 0.03) < 0.006)
+    gaps = texture(X + SPEED * time) + 0 * Y
+    cells = footprint()
+    ones = np.ones((1, len(cells.cell)))
+    slick = squeezed(cells, [gaps], ones, SPEED, step)
+    found = squeezed(cells, [gaps + depth], ones, SPEED, step, [depth])
+    told = squeezed(cells, [gaps + depth], ones, SPEED, step)
+    assert np.allclose(found.rate, slick.rate, rtol=0, atol=1e-9 * np.abs(told.rate).max())
+    assert np.abs(told.rate[20:]).max() > 100 * np.abs(found.rate[20:]).max()
+    assert found.height == pytest.approx(slick.height, rel=0.05)
+    assert told.height > 1.4 * slick.height
+
+
 @pytest.mark.parametrize("step", [D / SPEED / 4, 4.3e-5, 5.6e-5])
 def test_a_texture_that_passes_under_a_tread_gives_off_nothing(step):
     """Where a step is a whole part of the way between points to rounding; otherwise to the cubic between steps."""

@@ -19,6 +19,7 @@ import tireroad
 from tireroad.contact.results.spectra import a_weighting, amplitudes
 from tireroad.contact.results.squeezed_air import FootprintCells, squeezed
 from tireroad.contact.tread.kernel import GridPlaces
+from tireroad.greens.footprint_air import Groove, LateralGroove
 from tireroad.greens.outputs import Surface
 from tireroad.greens.tire_sound import directions
 from tireroad.runs.pipeline import run_scene
@@ -26,6 +27,7 @@ from tireroad.runs.report.levels import band_levels, is_drawn
 from tireroad.runs.report.page import write_report
 from tireroad.runs.results.export import export
 from tireroad.runs.scene.load import load
+from tireroad.runs.stages.footprint_air import grooves
 from tireroad.runs.stages.sound import SPACING, SoundStage, _total_error, intensity
 
 pytestmark = pytest.mark.slow
@@ -326,6 +328,30 @@ def test_air_of_the_footprint_is_heard_beside_the_vibration(tmp_path: Path) -> N
     loud = np.abs(rest[0]) > 0.1 * np.abs(rest[0]).max()
     assert loud.sum() > 5
     assert np.abs(rest)[:, loud] == pytest.approx((near * np.abs(flow))[:, loud], rel=0.25)
+
+
+def test_the_air_of_a_pattern_leaves_by_its_grooves(tmp_path: Path) -> None:
+    """The air of a run with a pattern is heard, from gaps without the depth of its grooves; the network has those of the pattern."""
+    around = {"direction": "circumferential", "width": 0.008, "depth": 0.006}
+    lateral = {"width": 0.006, "depth": 0.006}
+    tables = "[{}]".format(", ".join(_inline(one) for one in (around, lateral)))
+    found = run(tmp_path / "open", "sound.air=true", f"pattern={{groove={tables}}}")
+    air = found["sound/third_octave/air_level"]
+    assert np.isfinite(air).all()
+    assert found.summary["sound"]["indicators"]["mean gap in the footprint"]["value"] < 0.006
+    job = SimpleNamespace(
+        scene=load(tmp_path / "open" / "scene.toml", [f"pattern={{groove={tables}}}"])
+    )
+    (one,), (other,) = grooves(job.scene, 2.0)
+    assert one == Groove(0.0, 0.008, 0.006)
+    assert other == LateralGroove(0.006, 0.006, 2.0 / 60, (-1.0, 1.0), 0.0)
+    # Those of the section stay where the pattern has lateral ones only.
+    only = load(tmp_path / "open" / "scene.toml", [f"pattern={{groove=[{_inline(lateral)}]}}"])
+    assert grooves(only, 2.0)[0] == [Groove(*g) for g in only.tire.shape.grooves_around]
+
+
+def _inline(table: dict[str, object]) -> str:
+    return "{" + ", ".join(f"{key} = {json.dumps(value)}" for key, value in table.items()) + "}"
 
 
 def _places(run: tireroad.RunResults) -> GridPlaces:
