@@ -110,7 +110,7 @@ def _softening(
     readings: Array,
     probes: sparse.csr_matrix,
 ) -> Array:
-    """What is softer (r, k) m/N of the static `response` beside a `few` of the modes than beside all of them.
+    """Flexibility (r, k) m/N that the static `response` gains beside a `few` of the modes instead of all of them.
 
     Nothing of a wheel that nothing holds: it has no static response.
     """
