@@ -563,6 +563,15 @@ class Companion(NamedTuple):
         more = longer if self.random else None
         return {name: estimated(run[name], off[name], self.share, more) for name in run}
 
+    def doubt(self, bars: Mapping[str, Bars]) -> str | None:
+        """Why `bars` by an order are a guess: the vertical forces of the two runs differ by more than they vary."""
+        if self.random or self.within < 1.0:
+            return None
+        far = max(float(bar.history[2]) for bar in bars.values()) / self.share
+        if not far > 1.0:
+            return None
+        return f"a guess, since the companion's vertical force differs by {far:.2g} times what it varies, where no order holds"
+
 
 def figures(
     forces: ContactForces,
@@ -730,6 +739,8 @@ class AccuracyStage(Computed[Accuracy]):
                 absent[cause] = str(told)
                 continue
             parts = [one.bars(own, since, limit, up_to, bands, longer=longer) for one in told]
+            doubts = (one.doubt(part) for one, part in zip(told, parts, strict=True))
+            record.notes += [f"error by the {cause}: {doubt}" for doubt in doubts if doubt]
             for name in exact:
                 bars_of[name][cause] = total(dict(enumerate(part[name] for part in parts)))
         product = Accuracy(
