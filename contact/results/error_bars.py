@@ -33,9 +33,9 @@ from tireroad.contact.results.spectra import FEWEST, deviation, low_part, third_
 from tireroad.greens.schemes import SCHEMES
 
 _NAMES = ("mean", "deviation", "level", "history")
-# Of an error of any phase, what counts in a level and in a deviation: 0.7 in the mean square where a band has one phase, less with
-# several. Understated by more than two are then a tenth of the levels and deviations (docs/verification/error-bars.md).
-_IN_LEVEL, _IN_DEVIATION = 0.5, 0.35
+# Of an error of any phase, what counts in a level: 0.7 in the mean square where a band has one phase, less with several.
+# Understated by more than two are then a tenth of the levels (docs/verification/error-bars.md).
+_IN_LEVEL = 0.5
 _PHASES = 4.0  # degrees of freedom of a third octave's error by a response: two phases
 
 # Lines next to the mean that its removal under a Hann window leaves as they are, and the square of that window in the mean.
@@ -179,12 +179,10 @@ def estimated(
         own = np.nan_to_num(10 ** (apart.level[k] / 20) - 1)
         stays = np.maximum(own**2 - size**2 / here, 0.0)
         level[k] = 20 * np.log10(1 + share * np.sqrt(stays + size**2 / whole))
-    power, differs = _squares(run, companion)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        varies = run.deviation * np.sqrt((power * differs).sum(axis=0) / 2) / power.sum(axis=0)
+    varies = np.nan_to_num(_in_deviation(run, companion))
     return Bars(
         share * _lasting(apart.mean, _beside_mean(run, companion), longer or 1.0),
-        share * _lasting(apart.deviation, np.nan_to_num(varies), longer or 1.0),
+        share * _lasting(apart.deviation, varies, longer or 1.0),
         level,
         share * apart.history,
     )
@@ -202,6 +200,13 @@ def _beside_mean(run: Measured, companion: Measured) -> np.ndarray:
     return np.sqrt(lines.mean(axis=0) / _HANN) if len(lines) else np.zeros(3)
 
 
+def _in_deviation(run: Measured, companion: Measured, within: float = 1.0) -> np.ndarray:
+    """Change (3,) N of a deviation, in the root mean square, by differences of any phase in the lines up to `within` of the band."""
+    power, differs = (part[: round(within * len(part))] for part in _squares(run, companion))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return run.deviation * np.sqrt((power * differs).sum(axis=0) / 2) / power.sum(axis=0)
+
+
 def _squares(run: Measured, companion: Measured) -> tuple[np.ndarray, np.ndarray]:
     """Squares (f, 3) of the run's lines and of the companion's differences to them, in the lines that both have."""
     count = min(len(run.lines), len(companion.lines))
@@ -215,9 +220,8 @@ def similar(run: Measured, companion: Measured, within: float) -> Bars:
     Relative differences e in the band of the companion, up to `within` times that of the run, are those of the run in its whole
     band. A third octave at f takes the geometric mean of e at `within` f and at f, of which one is smaller and one larger than
     the run's: with an order of 3 and `within` 0.7 their mean is 1.09 times that. Of an error with any phase in each line, a part
-    counts in a level or a deviation.
+    counts in a level, and in a deviation as in `estimated`.
     """
-    whole = _apart(run, companion, 0.0, within * run.spacing * (len(run.lines) - 1))
     level = np.full(run.level.shape, np.nan)
     for k, centre in enumerate(run.centre):
         here = _apart(run, companion, *run.around(centre))
@@ -225,7 +229,7 @@ def similar(run: Measured, companion: Measured, within: float) -> Bars:
         level[k] = _in_level(np.sqrt(here * there))
     return Bars(
         np.maximum(np.abs(companion.mean - run.mean), _beside_mean(run, companion)),
-        _IN_DEVIATION * whole * run.deviation,
+        _in_deviation(run, companion, within),
         level,
         _apart(run, companion, 0.0, within * run.up_to),
     )

@@ -22,6 +22,7 @@ from tireroad.runs.scene.tables.scene import Scene
 
 if TYPE_CHECKING:
     from tireroad.fem.sections.mesh2d import Ring
+    from tireroad.fem.tire.material import Material
     from tireroad.runs.scene.tables.tire import TireTable
 
 
@@ -45,10 +46,13 @@ def make_body(
     comm: MPI.Comm, tire: TireTable, section: Ring, temperature: float = REFERENCE
 ) -> Body:
     """The finite-element body, undeformed, at a temperature, degrees C. Collective."""
-    compounds = {
-        name: compound.at(temperature) for name, compound in tire.shape.in_layers(tire).items()
-    }
-    return Body(comm, section, compounds, cords=tire.shape.cords(tire))
+    return Body(comm, section, compounds(tire, temperature), cords=tire.shape.cords(tire))
+
+
+def compounds(tire: TireTable, temperature: float) -> dict[str, Material]:
+    """The compounds as they fill the regions of the tire's section, at a temperature, degrees C."""
+    layers = tire.shape.in_layers(tire)
+    return {name: compound.at(temperature) for name, compound in layers.items()}
 
 
 def damping_of(scene: Scene) -> Damping:

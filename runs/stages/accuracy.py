@@ -43,6 +43,7 @@ from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.sections.mesh2d import Ring, crown_layer
 from tireroad.fem.static.load_error import carried_over
 from tireroad.fem.static.state import StaticState
+from tireroad.fem.tire.material import CONSTANT, Spectrum, kinds
 from tireroad.greens.fewer_modes import of_fewer_modes
 from tireroad.greens.response import Response
 from tireroad.modal.rolling import RollingModes
@@ -53,10 +54,11 @@ from tireroad.runs.process import console
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.results.datasets import ABSENT
 from tireroad.runs.scene.estimate import estimate
+from tireroad.runs.scene.physics import compounds
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.stages.cavity import AirColumn
 from tireroad.runs.stages.contact_file import ContactHistory
-from tireroad.runs.stages.greens import GreensStage, Responses
+from tireroad.runs.stages.greens import GreensStage, Responses, as_read
 from tireroad.runs.stages.modes import Fields, ModesStage, Motions
 from tireroad.runs.stages.rolling import ContactForces, first_step, forces, recursive
 from tireroad.runs.stages.rotating import FullMatrices, RotatingStage
@@ -146,8 +148,7 @@ def backed(job: Job, static: StaticState, setup: ContactSetup, response: Respons
 def _outer(scene: Scene, ring: Ring) -> Influence:
     """Influence of the crown's compound, as warm as the tire: a half-space if it is the whole wall, else a layer."""
     tire, (region, thickness) = scene.tire, crown_layer(ring.section)
-    layers = tire.shape.in_layers(tire)
-    material = layers[ring.section.regions[region]].at(scene.temperature)
+    material = compounds(tire, scene.temperature)[ring.section.regions[region]]
     modulus = material.dynamic * material.law.youngs
     rubber = {"youngs_modulus": modulus, "poisson_ratio": material.law.poisson}
     law = (
@@ -464,30 +465,37 @@ def other_points(reference: ReferenceRun) -> ContactForces:
 
 
 def fewer_modes(reference: ReferenceRun) -> ContactForces:
-    """Modes up to `FEWER` of the highest, with what joins modes joining these. Collective.
+    """Modes up to `FEWER` of the highest, with what joins modes joining these, and what replaces those left out. Collective.
 
-    With attachment modes a response of the same kind (greens.fewer_modes): states that are made static lose their inertia, of
-    which attachment modes are there to keep it. Without, the states from there to the highest are static; states above
-    the highest mode are kept: they belong to the rotation shapes, without which the band below would shift. Either has the
-    static response of the run, so that it begins with the same steady rolling.
+    A response of the same kind (greens.fewer_modes). Of the states of a `full` problem, and of those chosen by greens.dynamic,
+    the ones from there to the highest are static instead; states above the highest mode are kept.
     """
-    attached = reference.attached
-    begun = reference.equilibrated if reference.base is reference.own else reference.rolled
-    if attached is not None and not attached.full:
-        comm, points = reference.comm or reference.job.comm, reference.probes
-        arguments = attached, attached.basis.shape, points.loads[points.counted], FEWER
-        residual = reference.job.scene.greens.residual
-        coarse = of_fewer_modes(reference.response, *arguments, residual, comm)
-        return reference.repeated(begun, coarse)
-    highest = reference.rolling.highest
-    joined = reference.rolling.basis.projection.shapes > 0
-    limits = FEWER * highest, highest if joined else np.inf
-    coarse = reference.response.keeping_where(
-        lambda s: (np.abs(s) <= limits[0]) | (np.abs(s) > limits[1])
-    )
-    if len(coarse.every) == len(reference.response.every):
-        raise InputError("all states lie far below the highest mode: none can be left out")
+    rolling, response = reference.attached or reference.rolling, reference.response
+    if rolling.full or reference.job.scene.greens.dynamic is not None:
+        limits = FEWER * rolling.highest, rolling.highest
+        coarse = response.keeping_where(
+            lambda s: (np.abs(s) <= limits[0]) | (np.abs(s) > limits[1])
+        )
+        if len(coarse.every) == len(response.every):
+            raise InputError("all states lie far below the highest mode: none can be left out")
+    else:
+        job, points = reference.job, reference.probes
+        seen = rolling if reference.attached else as_read(rolling, points)
+        arguments = seen, seen.basis.shape, points.loads[points.counted], FEWER
+        residual, spectra = job.scene.greens.residual, _spectra(job)
+        comm = reference.comm or job.comm
+        coarse = of_fewer_modes(response, *arguments, residual, spectra, comm)
+    force = reference.static.product.normal_force
+    begun = equilibrated(reference.job, reference.setup, coarse, force)
     return reference.repeated(begun, coarse)
+
+
+def _spectra(job: Job) -> list[Spectrum]:
+    """The spectra of the compounds' moduli that depend on frequency, in the order of the wall's kinds."""
+    filling = compounds(job.scene.tire, job.scene.temperature)
+    materials = [filling[name] for name in job.tire.section.section.regions]
+    found = kinds([(one.spectrum, one.loss_factor, one.dynamic) for one in materials])
+    return [kind.spectrum for kind in found if kind.spectrum != CONSTANT]
 
 
 def coarser_mesh(reference: ReferenceRun) -> ContactForces:
@@ -554,6 +562,15 @@ class Companion(NamedTuple):
             return {name: similar(run[name], off[name], self.within) for name in run}
         more = longer if self.random else None
         return {name: estimated(run[name], off[name], self.share, more) for name in run}
+
+    def doubt(self, bars: Mapping[str, Bars]) -> str | None:
+        """Why `bars` by an order are a guess: the vertical forces of the two runs differ by more than they vary."""
+        if self.random or self.within < 1.0:
+            return None
+        far = max(float(bar.history[2]) for bar in bars.values()) / self.share
+        if not far > 1.0:
+            return None
+        return f"a guess, since the companion's vertical force differs by {far:.2g} times what it varies, where no order holds"
 
 
 def figures(
@@ -722,6 +739,8 @@ class AccuracyStage(Computed[Accuracy]):
                 absent[cause] = str(told)
                 continue
             parts = [one.bars(own, since, limit, up_to, bands, longer=longer) for one in told]
+            doubts = (one.doubt(part) for one, part in zip(told, parts, strict=True))
+            record.notes += [f"error by the {cause}: {doubt}" for doubt in doubts if doubt]
             for name in exact:
                 bars_of[name][cause] = total(dict(enumerate(part[name] for part in parts)))
         product = Accuracy(

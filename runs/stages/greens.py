@@ -159,7 +159,7 @@ class GreensStage(Computed[Responses]):
             corner.check_blocked(record, rolling, loads, top)
         responses = self._apart(points.name, response)
         if made.attached is not None:
-            responses = replace(responses, attached=_as_read(made.attached, points))
+            responses = replace(responses, attached=as_read(made.attached, points))
         self._describe(record, responses)
         return responses
 
@@ -253,7 +253,7 @@ class GreensStage(Computed[Responses]):
         return replace(responses, attached=attached)
 
 
-def _as_read(rolling: RollingModes, points: Probes) -> RollingModes:
+def as_read(rolling: RollingModes, points: Probes) -> RollingModes:
     """The modes with what the counted probes read of them in place of their fields, which on fine meshes take gigabytes."""
     wanted = points.loads[points.counted]
     shape = wanted[:, : len(rolling.basis.shape)] @ rolling.basis.shape[: wanted.shape[1]]

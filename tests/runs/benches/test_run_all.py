@@ -46,6 +46,12 @@ def test_a_name_that_cannot_be_written_is_refused_before_the_work(
         tables.run_all("tireroad.tests.bench", [], tmp_path / name)
 
 
+def test_a_run_that_does_not_find_free_rolling_is_no_reference(tmp_path) -> None:
+    """It would begin at rest, as a wheel that is driven, beside others that roll freely."""
+    for case in rolling_cases.RADIAL[:2]:
+        assert case.scene(tmp_path, 0.1).rotation.free_rolling is True
+
+
 def test_cases_are_chosen_by_all_words_of_one_of_several() -> None:
     found = rolling_cases.chosen(rolling_cases.RADIAL, ["radial texture 30", "quick-static cleat"])
     assert [str(case) for case in found] == [

@@ -10,7 +10,7 @@ import pytest
 from mpi4py import MPI
 from tires import soft_torus
 
-from tireroad.contact.results.error_bars import CAUSES, bars, measured
+from tireroad.contact.results.error_bars import CAUSES, Bars, bars, measured
 from tireroad.contact.results.spectra import wide_enough
 from tireroad.contact.tread.kernel import KernelTread
 from tireroad.fem.errors import ConvergenceError, InputError
@@ -20,6 +20,7 @@ from tireroad.runs.process import console
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages import accuracy, contact, rolling
 from tireroad.runs.stages.accuracy import (
+    Companion,
     ReferenceRun,
     _dealt,
     backed,
@@ -153,6 +154,19 @@ def test_fewer_modes_have_attachment_modes_of_their_own(run):
     estimated = told.bars(own, 0.02, limit, limit)["contact_force"].history[2]
     both = (measured(one.total_force[200:], one.step, limit) for one in (history, exact))
     assert 0.5 < estimated / bars(*both, 1.0).history[2] < 2.0
+
+
+def test_an_order_is_doubted_where_runs_differ_by_more_than_they_vary():
+    """A seventh of the difference is told of elements of twice the size: 0.3 of the variation is twice all of it."""
+    nothing = np.zeros(3)
+
+    def bars_of(history: float) -> dict[str, Bars]:
+        return {"contact_force": Bars(nothing, nothing, np.zeros((0, 3)), np.full(3, history))}
+
+    mesh = Companion(ContactForces(np.zeros((0, 3)), None, 1e-4), None, 1 / 7)
+    assert "2.1 times" in (mesh.doubt(bars_of(0.3)) or "")
+    assert mesh.doubt(bars_of(0.1)) is None and mesh.doubt(bars_of(np.nan)) is None
+    assert mesh._replace(random=True).doubt(bars_of(0.3)) is None
 
 
 def test_companions_are_dealt_to_the_process_with_the_least_to_do():
