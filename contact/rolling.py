@@ -149,21 +149,17 @@ def rolling_steadily(
     shifted = np.zeros(3 * p) if response.offset is None else response.offset[: 3 * p]
     found, rolled = setup, _Rolled(spec, setup, flexibility, shifted, length, pitch)
     if setup.free:
-        rolled.freely(given[1])
-        rolled.until_steady()
-        found = setup.with_slip(rolled.slip)
+        found = setup.with_slip(rolled.freely(given[1]))
     if given[0] or not setup.free:
         rolled.held(found.slip)
         rolled.until_steady()
     if (way := setup.rolled.speed * step) < pitch:
         rolled = _Rolled(spec, setup, flexibility, shifted, length, way, rolled)
         if setup.free and not given[0]:
-            rolled.freely(given[1])
+            found = setup.with_slip(rolled.freely(given[1]))
         else:
             rolled.held(found.slip)
-        rolled.until_steady()
-        if setup.free and not given[0]:
-            found = setup.with_slip(rolled.slip)
+            rolled.until_steady()
     contact = rolled.loop.contact
     forces = contact.vertical.copy(), contact.horizontal.T.copy()
     return replace(
@@ -214,10 +210,12 @@ class _Rolled:
             if self.loop.memory and before.loop.memory:
                 self.loop.memory.set_state(before.loop.memory.state())
 
-    def freely(self, across: float) -> None:
-        """From now on the slip along the road lets the wheel roll freely, with a slip `across`."""
+    def freely(self, across: float) -> float:
+        """The slip along the road with which the wheel rolls freely and steadily, with a slip `across`."""
         self.held((self.slip, across))
         self._across = across
+        self.until_steady()
+        return self.slip
 
     def held(self, slip: tuple[float, float]) -> None:
         """From now on the wheel slips so, reached step by step: a sudden slip moves more than a step can solve."""
@@ -274,11 +272,10 @@ class _Rolled:
     def state(self) -> dict[str, Array]:
         """The state of a loop of the whole tire that begins so."""
         contact, memory = self.loop.contact, self.loop.memory
-        state = contact.state() | {
-            "lagging": np.zeros(2, int)
-        }  # counted from the loop's first step on
-        moved = state["moved"] + [0.0, self._left_out @ contact.change]
-        return state | {"moved": moved} | (memory.state() if memory else {})
+        state = contact.state() | (memory.state() if memory else {})
+        state["lagging"] = np.zeros(2, int)  # counted from the loop's first step on
+        state["moved"] = state["moved"] + [0.0, self._left_out @ contact.change]
+        return state
 
     def _roll(self) -> Array:
         """A step; the road's forces along and across it, and the drag of their moment, (3,) N."""

@@ -333,9 +333,16 @@ class InflatedRing:
     def _inertia(self, wave: int, rate: float, speed: float) -> sparse.csr_matrix:
         """-M (i rate + speed (i n + J))^2 of a wave of n that oscillates in space at a rate while the tire turns at a speed
         through it, rad/s; J turns the directions r and theta with the tire."""
+        met = rate + speed * wave
+        once, twice = self._turned
+        return met**2 * self.mass - 2j * met * speed * once - speed**2 * twice
+
+    @cached_property
+    def _turned(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
+        """M J and M J^2."""
         turns = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
-        along = 1j * (rate + speed * wave) * np.eye(3) + speed * turns
-        return self.mass @ sparse.kron(sparse.eye(len(self.section.nodes)), -along @ along)
+        everywhere = sparse.kron(sparse.eye(len(self.section.nodes)), turns, format="csr")
+        return self.mass @ everywhere, self.mass @ everywhere @ everywhere
 
     def standing(self, wave: int) -> tuple[float, float]:
         """The lowest speed (rad/s) at which a wave stands on the road, and y (m) where it is largest.
