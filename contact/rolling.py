@@ -274,7 +274,8 @@ class _Rolled:
         contact, memory = self.loop.contact, self.loop.memory
         state = contact.state() | (memory.state() if memory else {})
         state["lagging"] = np.zeros(2, int)  # counted from the loop's first step on
-        state["moved"] = state["moved"] + [0.0, self._left_out @ contact.change]
+        for name in ("moved", "tip"):
+            state[name] = state[name] + [0.0, self._left_out @ contact.change]
         return state
 
     def _roll(self) -> Array:

@@ -141,15 +141,23 @@ typedef struct {
     plane *compliance;
     int spring_kind;                      /* springs fixed at the points */
     double friction;                      /* negative: nothing slips */
-    double tolerance, way;
+    double tolerance;
     const double *stiffness, *slip;       /* (c,) N/m; (2, c) m a step */
     const double *own;                    /* (c,) m/N: the compliance's diagonal, mean of both directions */
-    const int *u_begin, *u_column, *ahead;  /* what lies one step upstream, and the next point ahead */
-    const double *u_value, *pitches;
+    const int *ahead;                     /* (c,) the next point ahead */
+    int lines, shift, every;              /* bristles move on by `shift` of their places every so many steps */
+    const int *line;                      /* (lines + 1,) first bristle of each, from the front */
+    const int *cell, *beside;             /* (b,) points in whose cell a bristle's place is, and nearest but one on its line */
+    const double *along, *entry;          /* (b,) its place before that point, in pitches; way from the cell's front, in steps */
+    const int *first; const double *weight;  /* (c + 1,), and of the bristles in each cell, side by side from */
+    const int *foremost;                  /* (c,) the foremost of them */
     const double *dragged;                /* (2, c) m: displacements in the plane under the static normal forces */
     double norm;
-    double *deflection, *moved;           /* (2, c) m of the bristles and their bases, one step ago */
-    uint8_t *touched;
+    double *tip;                          /* (2, b) m: where the base of each bristle lies undeflected */
+    int *stands;                          /* (b,) whether it stands on the road: FRESH, STANDS, STOOD */
+    int *waited;                          /* steps since bristles moved on */
+    double *deflection, *moved;           /* (2, c) m in the mean of each cell and of its base, at the end of the last step */
+    uint8_t *touched, *slid;              /* (c,) then */
     double *horizontal, *before;          /* (2, c) N of the last two steps */
     long turns, products, all_turns;      /* of the last step; of all steps */
     long lagged, streak;                  /* steps whose forces lag, and how many were the last ones */
@@ -158,9 +166,13 @@ typedef struct {
     struct brush_work *work;
 } brush;
 
+enum { FRESH, STANDS, STOOD };
+
 void brush_begin(brush *s);
 void brush_end(brush *s);
+void brush_travel(brush *s);
 void brush_offer(const brush *s, double *share, double *past);
+void brush_conclude(brush *s, const double *force, const double *tangential);
 double brush_limit(const brush *s, double first, double most);
 int brush_solve(brush *s, normal_contact *normal, const double *q, const uint8_t *guess, const double *at_rest,
                 const double *free, double *force);
@@ -1196,14 +1208,15 @@ int at_once_step(at_once *s, const double *right, double tolerance, double *step
 /* Turns in which the normal forces follow in a Newton step; after which stick and slip are solved in each. */
 enum { FOLLOWED = 8, FLAT = 30, MIXED = 4 };
 static const double ENOUGH = 0.1; /* of the tolerance: stick and slip within a turn */
+static const double LEAST = 1e-9; /* share of a cell on which bristles stand that bear */
+static const double HELD = 1e-6; /* of its bound that a point which sticks has left at least */
 static const double SHRUNK = 0.03, SMALL = 1e-6; /* of the first residual of a step, down to a share of the largest bound */
 
 struct brush_work {
     double *share, *past, *trial, *moved, *some, *found, *q, *mixed;
     double *spring, *inverse, *constant, *bound, *force, *ahead, *off;
     double *results[MIXED], *residuals[MIXED];
-    double *deflection, *base, *horizontal; /* of the bristles at the end of the step before */
-    uint8_t *touched;
+    double *horizontal; /* (2, c) N at the end of the step before */
     int *index, *every;
     int touches, *touch, reaches, *reach; /* the points that touch, and with those next ahead of them; ascending */
     uint8_t *lifted, *touching, *set;
@@ -1214,12 +1227,12 @@ void brush_begin(brush *s) {
     struct brush_work *w = s->work = room(1, sizeof *w);
     double **doubles[] = {&w->share, &w->past, &w->trial, &w->moved, &w->some, &w->found, &w->q,
                           &w->mixed, &w->spring, &w->inverse, &w->constant, &w->bound, &w->force,
-                          &w->ahead, &w->off, &w->deflection, &w->base, &w->horizontal};
-    for (int i = 0; i < 18; i++) *doubles[i] = DOUBLES(2 * c);
+                          &w->ahead, &w->off, &w->horizontal};
+    for (int i = 0; i < 16; i++) *doubles[i] = DOUBLES(2 * c);
     for (int i = 0; i < MIXED; i++) w->results[i] = DOUBLES(2 * c), w->residuals[i] = DOUBLES(2 * c);
     w->index = INTS(c), w->every = INTS(c), w->touch = INTS(c), w->reach = INTS(c);
     for (int i = 0; i < c; i++) w->every[i] = i;
-    w->lifted = room(c, 1), w->touching = room(c, 1), w->set = room(c, 1), w->touched = room(c, 1);
+    w->lifted = room(c, 1), w->touching = room(c, 1), w->set = room(c, 1);
 }
 
 void brush_end(brush *s) {
@@ -1227,7 +1240,7 @@ void brush_end(brush *s) {
     for (int i = 0; i < MIXED; i++) free(w->results[i]), free(w->residuals[i]);
     void *all[] = {w->share, w->past, w->trial, w->moved, w->some, w->found, w->q, w->mixed, w->spring, w->inverse,
                    w->constant, w->bound, w->force, w->ahead, w->off, w->index, w->every, w->touch, w->reach, w->lifted, w->touching, w->set,
-                   w->deflection, w->base, w->horizontal, w->touched, w};
+                   w->horizontal, w};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) free(all[i]);
 }
 
@@ -1237,30 +1250,87 @@ double brush_limit(const brush *s, double first, double most) {
     return fmin(s->tolerance * most, fmax(SHRUNK * first, SMALL * most));
 }
 
-/* share (c,) and past (2, c) of e = share u + past at the end of the step (contact.tread.brush). */
-void brush_offer(const brush *s, double *share, double *past) {
-    const int c = s->compliance->points;
-    for (int i = 0; i < c; i++) share[i] = 1.0, past[i] = past[c + i] = 0.0;
+/* The mean of the tips (2,) of a point's bristles that stand on the road; whether any do. */
+static int mean_tip(const brush *s, int point, int bristles, double *tip) {
+    double share = 0.0, x = 0.0, y = 0.0;
+    for (int k = s->first[point], b = s->foremost[point]; k < s->first[point + 1]; k++, b++) {
+        const double weight = s->stands[b] == STANDS ? s->weight[k] : 0.0;
+        share += weight, x += weight * s->tip[b], y += weight * s->tip[bristles + b];
+    }
+    const int any = share > LEAST;
+    tip[0] = any ? x / share : 0.0, tip[1] = any ? y / share : 0.0;
+    return any;
+}
+
+/* Before a step: tips follow what slid in the last one, bristles of points that touch now stand on the road, and all move on. */
+void brush_travel(brush *s) {
     if (s->spring_kind) return;
+    const int c = s->compliance->points, n = s->line[s->lines];
+    double *mean = s->work->some, *led = s->work->trial; /* (2, c) m: of the tips, NAN where none are; how far they slid */
     for (int i = 0; i < c; i++) {
-        double part = 0.0, x = 0.0, y = 0.0;
-        for (int k = s->u_begin[i]; k < s->u_begin[i + 1]; k++) {
-            const int j = s->u_column[k];
-            if (!s->touched[j]) continue;
-            part += s->u_value[k];
-            x += s->u_value[k] * (s->deflection[j] - s->moved[j]);
-            y += s->u_value[k] * (s->deflection[c + j] - s->moved[c + j]);
+        double tip[2];
+        if (!s->touched[i]) continue;
+        const int any = mean_tip(s, i, n, tip), slid = any && s->slid[i];
+        for (int k = i, d = 0; d < 2; d++, k += c) {
+            led[k] = slid ? s->moved[k] - s->deflection[k] - tip[d] : 0.0;
+            mean[k] = any ? tip[d] + led[k] : NAN;
         }
-        share[i] = part;
-        past[i] = x + part * s->slip[i], past[c + i] = y + part * s->slip[c + i];
-        const int next = s->ahead[i];
-        if (!(s->touched[i] && !s->touched[next] && s->pitches[i] <= 1.0 + 1e-9 && s->way > 0.0)) continue;
-        const double inside = fmin(2.0 * s->pitches[i], 1.0), travelled = fmin(0.5 / s->pitches[i], 1.0);
-        share[i] = 1.0;
-        for (int d = 0; d < 2 * c; d += c) { /* foremost: bristles enter half a pitch ahead of it */
-            const double edge = 0.5 * (s->moved[d + i] + s->moved[d + next]), own = s->deflection[d + i] - s->moved[d + i];
-            past[d + i] = (1.0 - inside) * own - inside * edge + travelled * s->slip[d + i];
+    }
+    for (int b = 0; b < n; b++) {
+        const int i = s->cell[b], next = s->ahead[i];
+        if (!s->touched[i]) {
+            if (s->stands[b] == STANDS && !s->touched[s->beside[b]]) s->stands[b] = STOOD;
+            continue;
         }
+        for (int d = 0; d < 2; d++) {
+            const double *u = s->moved + d * c, with = mean[d * c + i];
+            if (s->stands[b] == STANDS) s->tip[d * n + b] += led[d * c + i];
+            else s->tip[d * n + b] = isnan(with) ? u[i] + s->along[b] * (u[next] - u[i]) : with;
+        }
+        s->stands[b] = STANDS;
+    }
+    if (s->shift && ++*s->waited >= s->every) {
+        *s->waited = 0;
+        for (int l = 0; l < s->lines; l++) {
+            const int first = s->line[l], count = s->line[l + 1] - first, new = s->shift < count ? s->shift : count;
+            for (int d = 0; d < 2 * n; d += n)
+                memmove(s->tip + d + first + new, s->tip + d + first, (count - new) * sizeof(double));
+            memmove(s->stands + first + new, s->stands + first, (count - new) * sizeof(int));
+            for (int b = first; b < first + new; b++) s->stands[b] = FRESH;
+        }
+    }
+    for (int b = 0; b < n; b++) {
+        const int i = s->cell[b], next = s->ahead[i], stood = s->stands[b];
+        if (stood != STANDS && !s->touched[i]) continue;
+        for (int d = 0; d < 2; d++) {
+            const double *u = s->moved + d * c, with = mean[d * c + i], slip = s->slip[d * c + i];
+            double *tip = s->tip + d * n + b;
+            if (stood == FRESH || (stood == STOOD && isnan(with))) *tip = 0.5 * (u[i] + u[next]) - s->entry[b] * slip;
+            else *tip = (stood == STOOD ? with : *tip) - slip;
+        }
+        s->stands[b] = STANDS;
+    }
+}
+
+/* share (c,), 0 or 1, and past (2, c) of e = share u + past at the end of the step (contact.tread.brush), after `brush_travel`. */
+void brush_offer(const brush *s, double *share, double *past) {
+    const int c = s->compliance->points, n = s->line[s->lines];
+    for (int i = 0; i < c; i++) {
+        double tip[2] = {0.0, 0.0};
+        share[i] = s->spring_kind || mean_tip(s, i, n, tip);
+        past[i] = -tip[0], past[c + i] = -tip[1];
+    }
+}
+
+/* Which points touch, which of them slide, and the deflections, after a step with normal (c,) and tangential forces (2, c). */
+void brush_conclude(brush *s, const double *force, const double *tangential) {
+    const int c = s->compliance->points;
+    for (int i = 0; i < c; i++) {
+        const double x = tangential[i], y = tangential[c + i], t = hypot(x, y);
+        const double bound = s->friction < 0.0 ? INFINITY : s->friction * force[i];
+        s->touched[i] = force[i] > 0.0;
+        s->slid[i] = t == 0.0 || t >= (1.0 - HELD) * bound;
+        s->deflection[i] = -x / s->stiffness[i], s->deflection[c + i] = -y / s->stiffness[i];
     }
 }
 
@@ -1330,7 +1400,7 @@ static stick_slip sticking(brush *s, const double *force) {
     int a = 0;
     for (int k = 0; k < w->touches; k++) {
         const int i = w->touch[k];
-        if (!w->lifted[i] && w->share[i] > 1e-9) w->index[a++] = i;
+        if (!w->lifted[i] && w->share[i] > LEAST) w->index[a++] = i;
     }
     for (int k = 0; k < a; k++) {
         const int i = w->index[k];
@@ -1401,9 +1471,7 @@ static void finish(brush *s, const double *force, const double *free) {
                 s->moved[at] = w->moved[at] + w->some[d * w->reaches + a];
             }
     }
-    for (int d = 0; d < 2 * c; d += c)
-        for (int i = 0; i < c; i++) s->deflection[d + i] = -w->found[d + i] / s->stiffness[i];
-    for (int i = 0; i < c; i++) s->touched[i] = force[i] > 0.0;
+    brush_conclude(s, force, w->found);
 }
 
 /* w->q (c,) = gaps with the points of `to` lifted by the bristles' forces. */
@@ -1466,18 +1534,6 @@ static int lagging(brush *s, normal_contact *normal, const double *q, const doub
     return SOLVED;
 }
 
-/* The bristles at the end of the step before are kept; a step that is solved again begins from them. */
-static void retrace(brush *s) {
-    struct brush_work *w = s->work;
-    const size_t size = 2 * s->compliance->points * sizeof(double), flags = s->compliance->points;
-    if (s->again) {
-        memcpy(s->deflection, w->deflection, size), memcpy(s->moved, w->base, size), memcpy(s->touched, w->touched, flags);
-        return;
-    }
-    memcpy(w->deflection, s->deflection, size), memcpy(w->base, s->moved, size), memcpy(w->touched, s->touched, flags);
-    memcpy(w->horizontal, s->horizontal, size);
-}
-
 int brush_solve(brush *s, normal_contact *normal, const double *q, const uint8_t *guess, const double *at_rest,
                 const double *free, double *force) {
     struct brush_work *w = s->work;
@@ -1485,7 +1541,10 @@ int brush_solve(brush *s, normal_contact *normal, const double *q, const uint8_t
     const int c = compliance->points, unbounded = s->friction < 0.0, own = normal->all || normal->usual;
     int held = 0, failed;
     double before = INFINITY, first = INFINITY, caution = 1.0;
-    retrace(s);
+    if (!s->again) { /* a step that is solved again begins as it did before */
+        brush_travel(s);
+        memcpy(w->horizontal, s->horizontal, 2 * c * sizeof(double));
+    }
     brush_offer(s, w->share, w->past);
     memset(w->lifted, 0, c);
     for (int i = 0; i < 2 * c; i++) w->trial[i] = s->again ? s->horizontal[i] : 2.0 * s->horizontal[i] - s->before[i];

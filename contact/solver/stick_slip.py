@@ -10,7 +10,7 @@ from scipy import sparse
 from tireroad.contact.choices import DENSE_POINTS
 from tireroad.contact.solver.active_set import COMPILED, ActiveSet, UsualSet, array, guarded
 from tireroad.contact.solver.conditions import Array, ContactSolver, Mask, check_residual
-from tireroad.contact.tread.brush import Brush
+from tireroad.contact.tread.brush import Brush, upstream
 from tireroad.contact.tread.shear import Shear
 from tireroad.fem.errors import ConvergenceError
 
@@ -225,13 +225,15 @@ class BrushFriction:
         c = plane.weights.shape[0]
         self._horizontal, self._before = np.zeros((2, c)), np.zeros((2, c))
         self._touched = brush.touched
+        self._upstream = upstream(brush.x, brush.line, brush.way)
         law = brush.law
-        upstream = CompressedRows(brush.upstream)
+        rows = brush.rows
         self._slip = np.broadcast_to(brush.slip, (c, 2)).T.copy()
         doubles = {
             "stiffness": np.ascontiguousarray(np.broadcast_to(np.asarray(law.stiffness, float), c)),
             "slip": self._slip, "own": plane.own,
-            "pitches": brush.pitches, "deflection": brush.deflected, "moved": brush.moved,
+            "deflection": brush.deflected, "moved": brush.moved, "tip": brush.tip,
+            "along": rows.along, "entry": rows.entry, "weight": rows.weight,
             "horizontal": self._horizontal, "before": self._before,
         }  # fmt: skip
         self.shear, self.pressed, self.own, self._dragged = (
@@ -250,10 +252,13 @@ class BrushFriction:
         }
         self._held |= {
             "compliance": plane.compiled, "spring_kind": law.kind == "spring", "tolerance": tolerance,
-            "friction": -1.0 if law.friction is None else law.friction, "way": brush.way, "norm": plane.bound,
-            "u_begin": upstream.begin, "u_column": upstream.column, "u_value": upstream.value,
-            "ahead": COMPILED.ints(brush.ahead.astype(np.int32)), "touched": COMPILED.flags(self._touched),
+            "friction": -1.0 if law.friction is None else law.friction, "norm": plane.bound,
+            "lines": len(rows.line) - 1, "shift": rows.shift, "every": rows.every, "waited": COMPILED.ints(brush.waited),
+            "touched": COMPILED.flags(self._touched), "slid": COMPILED.flags(brush.slid),
         }  # fmt: skip
+        numbers = {"ahead": brush.ahead, "line": rows.line, "cell": rows.cell, "beside": rows.beside,
+                   "first": rows.first, "foremost": rows.foremost, "stands": brush.stands}  # fmt: skip
+        self._held |= {name: COMPILED.ints(values) for name, values in numbers.items()}
         self.compiled = _FFI.new("brush *", self._held)
         _C.brush_begin(self.compiled)
         self._freed = _FFI.gc(self.compiled, _C.brush_end)
@@ -281,12 +286,13 @@ class BrushFriction:
     def trial_displacement(self) -> tuple[Array, Array]:
         """share (c,) and past (2, c) m of a bristle's deflection share u + past at the end of the step (contact.tread.brush)."""
         share, past = np.empty(len(self._touched)), np.empty((2, len(self._touched)))
+        _C.brush_travel(self.compiled)
         _C.brush_offer(self.compiled, COMPILED.doubles(share), COMPILED.doubles(past))
         return share, past
 
     def carried(self, force: Array) -> Array:
         """Forces (3, c) N where a step has carried the road that they are of."""
-        return np.ascontiguousarray((self._brush.upstream @ force.T).T)
+        return np.ascontiguousarray((self._upstream @ force.T).T)
 
     def bound(self, force: Array) -> Array:
         """Largest horizontal forces (n,) N under normal forces (n,) N."""
@@ -315,8 +321,9 @@ class BrushFriction:
         if self.compiled.streak > _C.LAGS:
             raise self.unsolved()
         self._before[:], self._horizontal[:] = self._horizontal, force[1:]
-        self._brush.moved[:], self._touched[:] = moved, force[0] > 0.0
-        np.divide(force[1:], -self.stiffness, out=self._brush.deflected)
+        self._brush.moved[:] = moved
+        normal, plane = COMPILED.doubles(force[0]), COMPILED.doubles(force[1:])
+        _C.brush_conclude(self.compiled, normal, plane)
 
     def largest_unique(self, touching: Mask, normal: ContactSolver) -> float:
         """Largest friction coefficient with a unique solution, with these points touching."""

@@ -1,10 +1,12 @@
 """The time loop in plain NumPy: dense matrices, complex states, each step solved from the last one to rounding."""
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tireroad.contact.tread.brush import Brush
 from tireroad.greens.recursion import late_answers, weights
 from tireroad.greens.response import Response
 from tireroad.greens.schemes import SCHEMES
@@ -66,30 +68,88 @@ class Pressed:
 
 
 class Bristles:
-    """The brush of contact.tread.brush by its equations: rolling, of stiffness K (c,), slip (2, c) m a step."""
+    """The brush of contact.tread.brush by its equations: rolling, of stiffness K (c,), slip (2, c) m a step.
 
-    def __init__(
-        self, upstream: Array, ahead: Array, pitches: Array, slip: Array, stiffness: Array
-    ) -> None:
-        self.upstream, self.ahead, self.pitches = upstream, ahead, pitches
+    `members` of each point: its bristles and their weights; `cell`, `beside`, `along`, `entry` (b,) of each bristle's place, which is
+    taken by that of the place `from_` (b,) after a step, -1: by one that comes from beyond the line.
+    """
+
+    def __init__(self, brush: Brush, slip: Array, stiffness: Array) -> None:
+        rows, self.ahead = brush.rows, brush.ahead
+        assert rows.every == 1, "bristles move on in each step"
+        self.members = [
+            (np.arange(k := rows.foremost[i], k + b - a), rows.weight[a:b])
+            for i, (a, b) in enumerate(pairwise(rows.first))
+        ]
+        self.cell, self.beside, self.along, self.entry = (
+            rows.cell,
+            rows.beside,
+            rows.along,
+            rows.entry,
+        )
+        places = [np.arange(a, b) for a, b in pairwise(rows.line)]
+        self.from_ = np.concatenate(
+            [np.where(each - rows.shift >= each[0], each - rows.shift, -1) for each in places]
+        )
         self.slip, self.stiffness = slip, stiffness
         self.deflection = self.moved = np.zeros_like(slip)
-        self.touched = np.zeros(len(ahead), bool)
+        self.touched = self.slid = np.zeros(slip.shape[1], bool)
+        self.tip = np.zeros((2, len(rows.cell)))
+        self.stands = self.stood = np.zeros(len(rows.cell), bool)
+
+    def begin(self, touching: NDArray[np.bool_]) -> None:
+        """Stand where points touch, at rest."""
+        self.touched = touching
+        self.stands = self.stood = touching[self.cell]
+
+    def travel(self) -> None:
+        """Before a step."""
+        tip, stands, stood, u = self.tip.copy(), self.stands.copy(), self.stood.copy(), self.moved
+        slid, mean = np.zeros_like(u), [self._mean_tip(i) for i in range(len(self.members))]
+        for i in np.flatnonzero(self.slid & self.touched):
+            if mean[i] is not None:
+                slid[:, i] = u[:, i] - self.deflection[:, i] - mean[i]
+                mean[i] = mean[i] + slid[:, i]
+        for b, i in enumerate(self.cell):
+            if not self.touched[i]:
+                stands[b] &= self.touched[self.beside[b]]
+            elif stands[b]:
+                tip[:, b] += slid[:, i]
+            else:
+                own = u[:, i] + self.along[b] * (u[:, self.ahead[i]] - u[:, i])
+                tip[:, b], stands[b] = own if mean[i] is None else mean[i], True
+        stood |= stands
+        self.tip = np.where(self.from_ < 0, 0.0, tip[:, self.from_])
+        self.stands, self.stood = ((self.from_ >= 0) & each[self.from_] for each in (stands, stood))
+        for b, i in enumerate(self.cell):
+            if not self.stands[b] and not self.touched[i]:
+                continue
+            if not self.stands[b] and self.stood[b] and mean[i] is not None:
+                self.tip[:, b] = mean[i]
+            elif not self.stands[b]:
+                edge = 0.5 * (u[:, i] + u[:, self.ahead[i]])
+                self.tip[:, b] = edge + (1 - self.entry[b]) * self.slip[:, i]
+            self.tip[:, b] -= self.slip[:, i]
+            self.stands[b] = self.stood[b] = True
+
+    def _mean_tip(self, point: int) -> Array | None:
+        """The mean (2,) of the bristles that stand on a point's cell."""
+        index, weight = self.members[point]
+        weight = weight * self.stands[index]
+        return self.tip[:, index] @ weight / weight.sum() if weight.sum() > 1e-9 else None
 
     def offer(self) -> tuple[Array, Array]:
-        """share (c,) and past (2, c) of e = share u + past."""
-        share = self.upstream @ self.touched.astype(float)
-        past = (
-            self.upstream @ np.where(self.touched, self.deflection - self.moved, 0.0).T
-        ).T + share * self.slip
-        some = np.flatnonzero(self.touched & ~self.touched[self.ahead] & (self.pitches <= 1 + 1e-9))
-        inside = np.minimum(2 * self.pitches[some], 1.0)
-        edge = 0.5 * (self.moved[:, some] + self.moved[:, self.ahead[some]])
-        own = self.deflection[:, some] - self.moved[:, some]
-        share[some] = 1.0
-        travelled = np.minimum(0.5 / self.pitches[some], 1.0)
-        past[:, some] = (1 - inside) * own - inside * edge + travelled * self.slip[:, some]
-        return share, past
+        """share (c,) and past (2, c) of e = share u + past, in a step that begins."""
+        self.travel()
+        mean = [self._mean_tip(i) for i in range(len(self.members))]
+        share = np.array([each is not None for each in mean], float)
+        return share, -np.array([np.zeros(2) if each is None else each for each in mean]).T
+
+    def end(self, force: Array, t: Array, bound: Array, moved: Array) -> None:
+        """After a step with normal (c,) and horizontal forces (2, c), whose bases have `moved` (2, c)."""
+        self.moved, self.deflection, self.touched = moved, -t / self.stiffness, force > 0
+        size = np.hypot(*t)
+        self.slid = (size == 0) | (size >= (1 - 1e-6) * bound)
 
 
 class PlainLoop:
@@ -200,6 +260,6 @@ class PlainLoop:
             done, t = np.abs(new - t).max() <= 1e-12 * max(np.abs(new).max(), 1e-30), new
             if done:
                 break
-        self.bristles.moved = moved + (whole[c:, c:] @ t.ravel()).reshape(2, c)
-        self.bristles.deflection, self.bristles.touched = -t / self.bristles.stiffness, force > 0
+        moved = moved + (whole[c:, c:] @ t.ravel()).reshape(2, c)
+        self.bristles.end(force, t, self.friction * force, moved)
         return force, t

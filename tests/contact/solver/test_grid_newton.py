@@ -76,7 +76,7 @@ def test_a_loop_taken_up_again_has_the_same_bits() -> None:
     assert resumed.solutions == whole.solutions
     force = expected[-1]
     slides = np.hypot(*force[1:]) > 0.999 * FRICTION * force[0]
-    assert 10 < np.count_nonzero(slides & (force[0] > 0)) < np.count_nonzero(force[0]) - 10
+    assert 10 < np.count_nonzero(slides & (force[0] > 0)) < np.count_nonzero(force[0]) - 5
 
 
 def again_and_again(problem: ContactProblem, push: float, steps: int = 6) -> np.ndarray:

@@ -106,10 +106,8 @@ def test_forces_are_those_of_plain_numpy(
             shear = MatrixShear(patch.points[:, :2], patch.half_sizes, given)
         coupling = BrushFriction(brush, tire.same_step, weights, shear, tolerance=1e-12)
         slip = np.broadcast_to(brush.slip[:, None], (2, c))
-        plain = Bristles(
-            brush.upstream.toarray(), brush.ahead, brush.pitches, slip, np.full(c, 2e5)
-        )
-        plain.touched = patch.force > 0
+        plain = Bristles(brush, slip, np.full(c, 2e5))
+        plain.begin(patch.force > 0)
     rows = slice(0, c) if friction is None and not leans else slice(None)
     loop = PlainLoop(
         response, STEP, scheme, dense, tread[rows, rows], patch.force, patch.gap, plain, friction
