@@ -16,7 +16,13 @@ from tireroad.contact.tread.between_nodes import on_nodes, rastered
 from tireroad.contact.tread.kernel import KernelTread
 from tireroad.contact.tread.law import TreadLaw
 from tireroad.contact.tread.laws.elastic import FREQUENCY
-from tireroad.contact.tread.memory import TreadMemory, WholeGrid, softened
+from tireroad.contact.tread.memory import (
+    MOST_BEHIND,
+    TreadMemory,
+    WholeGrid,
+    rows_behind,
+    softened,
+)
 from tireroad.contact.tread.shear import KernelShear, MatrixShear, Shear
 from tireroad.fem.errors import InputError, UnsuitedSettings
 
@@ -99,22 +105,26 @@ def solver_name(spec: ContactSpec, patch: Patch) -> str:
     return "projected-cg" if many and patch.places is not None else "active-set"
 
 
-def past_tread(spec: ContactSpec, patch: Patch, in_plane: bool) -> WholeGrid:
-    """The tread that creeps between the points of a grid, normal to the road or `in_plane` too; InputError at nodes."""
+def past_tread(spec: ContactSpec, patch: Patch, speed: float, in_plane: bool) -> WholeGrid:
+    """The tread that creeps between the points of a grid and behind them at `speed` m/s, normal to the road or `in_plane` too; InputError at
+    nodes."""
     if patch.places is None:
         raise InputError(
             "contact.tread: a viscoelastic tread needs a grid of points: contact.points = { dx, dy }"
         )
-    farthest = _farthest(patch)
+    assert spec.law.creep is not None, "a tread that creeps"
+    farthest = (1 + MOST_BEHIND) * _farthest(patch)
+    influence = spec.law.influence(farthest)
     shear = spec.law.shear(farthest) if in_plane else None
-    return WholeGrid(patch.places, spec.law.influence(farthest), shear)
+    behind = rows_behind(spec.law.creep, patch, speed, influence)
+    return WholeGrid(patch.places, influence, shear, behind)
 
 
 def tread_memory(spec: ContactSpec, patch: Patch, speed: float, step: float) -> TreadMemory | None:
     """Memory of a viscoelastic tread rolling at `speed` m/s in steps of `step` s; else None."""
     if spec.law.creep is None:
         return None
-    tread = past_tread(spec, patch, spec.has_shear)
+    tread = past_tread(spec, patch, speed, spec.has_shear)
     assert patch.places is not None
     return TreadMemory(spec.law.creep, tread, patch.places.spacing[0], speed, step)
 

@@ -253,17 +253,14 @@ class ContactSetup:
         once times a factor, and the factor. `resolved` (p, p) m/N: what they have of it, at its instantaneous modulus."""
         creep, speed, patch = spec.law.creep, self.rolled.speed, self.patch
         assert creep is not None
-        tread = past_tread(spec, patch, in_plane=False)
+        tread = past_tread(spec, patch, speed, in_plane=False)
         # In the middle between a pressure that has just come and one that has long been there.
         middle = 1.0 + float(creep[0].sum()) * (1.0 if speed == 0 else 0.5)
 
         def past(force: np.ndarray) -> np.ndarray:
-            crept, field = (
-                steadily(creep, patch, speed, force) - middle * force,
-                np.zeros(tread.shape),
-            )
-            field.ravel()[tread.place] = crept
-            moved = tread(field.reshape(1, -1))[0]
+            field = steadily(creep, tread.places, speed, force)
+            field[tread.place] -= middle * force
+            crept, moved = field[tread.place], tread(field[None])[0]
             if resolved is not None and patch.weights is not None:
                 moved -= patch.at_points(resolved @ (patch.weights.T @ crept))
             return moved

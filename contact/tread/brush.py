@@ -186,7 +186,7 @@ def rows_of(x: Array, line: Array, way: float) -> Rows:
 def _line(
     x: Array, points: NDArray[np.intp], way: float, usual: float, apart: float
 ) -> tuple[tuple[Array, Array, Array, Array], NDArray[np.intp], NDArray[np.intp], list[Array]]:
-    """Of the bristles of a line, `apart` m: cell, beside, along and entry; its points from the front, the first bristle and the weights of each."""
+    """Bristles of a line, `apart` m, give their cell, beside, along and entry; its points from the front, the first bristle and the weights of each."""
     points = points[np.argsort(-x[points], kind="stable")]
     places = x[points]
     gaps = -np.diff(places) if len(points) > 1 else np.array([usual])

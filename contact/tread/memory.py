@@ -22,6 +22,8 @@ Rubber of a loss factor tan d over a band has a storage modulus that rises with 
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize, signal
@@ -37,6 +39,8 @@ Array = NDArray[np.float64]
 # Hz: relaxation of a constant loss factor. Between 40 and 2500 Hz loss and storage of 0.1 to 0.3 are within 7 and 2.5 % of the power law.
 RATES, BAND = (30.0, 300.0, 3000.0), (40.0, 2500.0)
 _FITTED = 60  # frequencies of the band
+# Of creep behind the points: times of the slowest one; share of a point's own displacement; lengths of the grid.
+LAGS, FELT, MOST_BEHIND = 4.0, 1e-3, 3
 
 
 def creep_of(share: Array, time: Array) -> tuple[Array, Array]:
@@ -104,36 +108,59 @@ def softened(creep: tuple[Array, Array], frequency: float) -> float:
     return float(1.0 / (1.0 / compliance).real)
 
 
-def steadily(creep: tuple[Array, Array], patch: Patch, speed: float, pressed: Array) -> Array:
-    """p + sum_k c_k q_k (c, ...) of a stationary pressure p (c, ...) while the tread rolls at `speed` m/s."""
+def steadily(creep: tuple[Array, Array], places: GridPlaces, speed: float, pressed: Array) -> Array:
+    """p + sum_k c_k q_k (nx ny, ...) of a stationary pressure p (c, ...) at the `places` of a grid while the tread rolls at `speed` m/s."""
     size, lag = creep
-    if speed == 0:
-        whole: Array = (1.0 + size.sum()) * pressed
-        return whole
-    assert patch.places is not None, "creep is for a grid of points"
-    shape, place = patch.places.shape, patch.places.place
+    shape = places.shape
     field = np.zeros((shape[0] * shape[1], *pressed.shape[1:]))
-    field[place] = pressed
+    field[places.place] = pressed
+    if speed == 0:
+        whole: Array = (1.0 + size.sum()) * field
+        return whole
     field = field.reshape(*shape, *pressed.shape[1:])
-    past, rates = field.copy(), weights(lag, patch.places.spacing[0] / speed)
+    past, rates = field.copy(), weights(lag, places.spacing[0] / speed)
     for c, e, old, new in zip(size, *rates, strict=True):
         # Material comes in at the front, the last row.
         past += c * signal.lfilter([new, old], [1.0, -e], field[::-1], axis=0)[::-1]
-    return past.reshape(-1, *pressed.shape[1:])[place]
+    return past.reshape(-1, *pressed.shape[1:])
+
+
+def rows_behind(
+    creep: tuple[Array, Array], patch: Patch, speed: float, influence: Influence
+) -> int:
+    """Rows of cells behind the grid of a patch that still creep and are felt where it touches: the tread's `influence` there is more
+    than 1e-3 of that of a point on itself, and the slowest creep has not ended; at most three times as many as the grid has."""
+    assert patch.places is not None, "creep is for a grid of points"
+    (nx, ny), (dx, dy) = patch.places.shape, patch.places.spacing
+    touching = patch.places.place[patch.force > 0] // ny
+    margin = int(touching.min(initial=nx - 1))
+    most = min(math.ceil(LAGS * speed * float(creep[1].max()) / dx), MOST_BEHIND * nx)
+    at = dx * np.concatenate([[0.0], margin + 1.0 + np.arange(most)])
+    felt = np.abs(influence(at, np.zeros(len(at)), *np.full((2, len(at)), 0.5) * [[dx], [dy]]))
+    return int(np.flatnonzero(felt > FELT * felt[0])[-1])
 
 
 class WholeGrid:
     """The tread between all cells of the grid of a patch, under whose c points it is read.
 
-    `influence` of the tread, and `shear` if it deforms in shear (contact.tread.shear). What has passed beyond the points presses, too.
+    `influence` of the tread, and `shear` if it deforms in shear (contact.tread.shear). What has passed beyond the points presses, too,
+    over the grid and as many rows `behind` it. `places` of the points on all of it.
     """
 
     def __init__(
-        self, places: GridPlaces, influence: Influence, shear: Influence | None = None
+        self,
+        places: GridPlaces,
+        influence: Influence,
+        shear: Influence | None = None,
+        behind: int = 0,
     ) -> None:
-        self.shape, self.place = places.shape, places.place
+        self.shape = places.shape[0] + behind, places.shape[1]
+        self.place = (
+            places.place + behind * places.shape[1]
+        )  # the first row is the last of the tread
+        self.places = GridPlaces(self.shape, places.spacing, self.place)
         self.parts = 1 if shear is None else 3
-        grid = GridPlaces(places.shape, places.spacing, np.arange(np.prod(places.shape)))
+        grid = GridPlaces(self.shape, places.spacing, np.arange(np.prod(self.shape)))
         tread = KernelTread(grid, influence)
         if shear is None:
             self._moved = lambda pressed: tread.apply(pressed[0])[None]

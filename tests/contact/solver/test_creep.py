@@ -16,15 +16,18 @@ from tireroad.contact.tread.memory import (
     WholeGrid,
     creep_of,
     relaxation_of,
+    rows_behind,
     softened,
     steadily,
 )
 from tireroad.fem.errors import InputError
 from tireroad.tests.validation.contact_closed_forms import (
     CREEP_SPEED,
+    CREEPAGES,
     DX,
     DY,
     PUBLISHED,
+    CreepingRoller,
     cylinder,
     influence,
     matrix,
@@ -35,15 +38,35 @@ from tireroad.tests.validation.contact_closed_forms import (
 
 @pytest.mark.parametrize(("time", "published"), PUBLISHED.items())
 def test_published_pressure_of_rolling_cylinders(time, published) -> None:
-    """Within 2 % (1.1 % at 0.009 s, a grid four times finer changes 0.02 %); most of it in front between the limits."""
+    """Within 0.02 % (1.1 % at 0.009 s where nothing creeps behind the grid); most of it in front between the limits."""
     patch, pressure = cylinder(), rolled_strip(time)
-    assert pressure.max() == pytest.approx(published, rel=0.012)
+    assert pressure.max() == pytest.approx(published, rel=2e-4)
     x = patch.points[:, 0]
     centre = float(x @ pressure / pressure.sum())
     if time in (0.009, 0.045):
         assert centre > 0.2e-3
     else:
-        assert abs(centre) < 0.02e-3
+        assert abs(centre) < 0.03e-3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("time", "published"), CREEPAGES.items())
+def test_published_creepage_of_rolling_cylinders(time, published) -> None:
+    """+0.9, +0.5, +1.1 and -1.6 %; where nothing creeps behind the grid +0.9, -7.5, -7.8 and -2.3 %. Carter, elastic: -0.1 %, CONTACT -0.8 %."""
+    assert CreepingRoller(time).creepage() == pytest.approx(published, rel=0.02)
+
+
+def test_creep_behind_the_grid_is_kept_as_far_as_it_is_felt() -> None:
+    """A half-space feels what passed as long as it creeps, at most three lengths of the grid; a layer some of its thicknesses."""
+    patch, dx = cylinder(), DX
+    patch = replace(patch, force=np.where(np.abs(patch.points[:, 0]) < 20 * dx, 1.0, 0.0))
+    creep = np.array([1.0]), np.array([0.009])
+    at = patch, CREEP_SPEED
+    assert rows_behind(creep, *at, influence) == round(4 * 0.009 * CREEP_SPEED / dx)
+    assert rows_behind((creep[0], np.array([2.0])), *at, influence) == 3 * len(patch.points)
+    assert rows_behind(creep, patch, 0.0, influence) == 0
+    # Felt over 40 cells, of which the grid has 30 behind those that touch.
+    assert rows_behind(creep, *at, lambda x, *_: np.exp(-x / (40.5 * dx) * np.log(1e3))) == 10
 
 
 @pytest.mark.long
@@ -51,7 +74,7 @@ def test_published_pressure_of_rolling_cylinders(time, published) -> None:
 def test_rolled_in_time_it_comes_to_the_steady_state(share) -> None:
     """Steps of a point, and of 0.3 of it, where material is read between the points."""
     patch, creep = cylinder(), (np.array([0.6, 0.4]), np.array([0.003, 0.01]))
-    past = steadily(creep, patch, CREEP_SPEED, np.eye(len(patch.points)))
+    past = steadily(creep, patch.places, CREEP_SPEED, np.eye(len(patch.points)))
     exact = pressed(ActiveSet(matrix(patch) @ past), patch.gap)
     step, tread = share * DX / CREEP_SPEED, WholeGrid(patch.places, influence)
     memory = TreadMemory(creep, tread, DX, CREEP_SPEED, step)
@@ -119,8 +142,11 @@ def test_a_sine_meets_modulus_and_losses_of_its_frequency() -> None:
 def test_at_rest_it_has_crept_as_it_rolls() -> None:
     """The state under a load by turns, beside the contact problem of the whole past at once."""
     patch, creep = cylinder(), (np.array([1.0]), np.array([0.009]))
-    past, stiff = steadily(creep, patch, CREEP_SPEED, np.eye(len(patch.points))), matrix(patch)
-    exact = rolled_strip(0.009) * DX * DY * 1e6
+    past, stiff = (
+        steadily(creep, patch.places, CREEP_SPEED, np.eye(len(patch.points))),
+        matrix(patch),
+    )
+    exact = pressed(ActiveSet(stiff @ past), patch.gap) * DX * DY * 1e6
     nodes = np.array([exact.sum()])
     on_nodes = replace(
         patch, index=np.zeros(1, int), weights=sparse.csr_matrix(np.ones((len(exact), 1)))
