@@ -22,7 +22,7 @@ from tireroad.runs.pipeline import run_scene
 from tireroad.runs.process import console
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.large import LEFT_OUT
-from tireroad.runs.stages.rolling import recursive
+from tireroad.runs.stages.rolling import Integration, driven_tire, recursive
 from tireroad.runs.stages.setup import probes
 from tireroad.runs.stages.training import TrainedMotion
 from tireroad.runs.validation.full_elements import (
@@ -127,17 +127,19 @@ CASES = (
 )
 
 
+def chosen(only: Sequence[str]) -> list[Case]:
+    """The cases whose names have all words of one of `only`, all of them without any."""
+    if not only:
+        return list(CASES)
+    words = {case: set(str(case).replace(",", "").split()) for case in CASES}
+    return [case for case in CASES if any(set(one.split()) <= words[case] for one in only)]
+
+
 def run(only: Sequence[str] = ()) -> list[Table]:
     """The table of the cases, or of those whose names have all words of one of `only`. Serial."""
-    chosen = [
-        case
-        for case in CASES
-        if not only
-        or any(set(one.split()) <= set(str(case).replace(",", "").split()) for one in only)
-    ]
     rows, costs, failed = [], [], []
     with tempfile.TemporaryDirectory() as folder:
-        for number, case in enumerate(chosen):
+        for number, case in enumerate(chosen(only)):
             console.say(f"{case}")
             try:
                 compared = beside(case, Path(folder) / str(number), Cache(Path(folder) / "cache"))
@@ -238,14 +240,20 @@ def beside(case: Case, folder: Path, cache: Cache) -> Beside:
     elements = Elements(run, job, probes(job, static, run.setup))
     nonlinear, *arguments = elements.nonlinear(STEP)
     exact = follow(trial, nonlinear, *arguments)
-    scheme = recursive(run.done["contact"].product.scheme)
+    scheme, steps = recursive(run.done["contact"].product.scheme), len(exact.values["axle force"])
 
-    def recursion(of: Response) -> Recursion:
-        return Recursion(response=of.resolved(STEP), step=STEP, scheme=scheme, comm=MPI.COMM_SELF)
+    def integrated(of: Response) -> Integration:
+        tire = Recursion(response=of.resolved(STEP), step=STEP, scheme=scheme, comm=MPI.COMM_SELF)
+        return Integration(tire, STEP, steps, scheme)
 
     trained: TrainedMotion = run.done["nonlinear"].product
     force = trained.stored.force(run.done["restoring"].product)
-    large = LargeTire(recursion(trained.response), force, response.residual.shape[1], scheme)
-    tires = elements.full(STEP)[0], recursion(response), large
+    straight, bent = integrated(response), integrated(trained.response)
+    large = LargeTire(bent.tire, force, response.residual.shape[1], scheme)
+    tires = (
+        elements.full(STEP)[0],
+        driven_tire(job, straight, setup.patch),  # with the readings of its hub
+        driven_tire(job, bent, setup.patch, large),
+    )
     others = {name: follow(trial, tire, STEP, 0.0) for name, tire in zip(NAMES, tires, strict=True)}
     return Beside(exact, others, nonlinear.turns / len(exact.values["contact force"]), stages)
