@@ -242,18 +242,18 @@ def beside(case: Case, folder: Path, cache: Cache) -> Beside:
     exact = follow(trial, nonlinear, *arguments)
     scheme, steps = recursive(run.done["contact"].product.scheme), len(exact.values["axle force"])
 
-    def integrated(of: Response) -> Integration:
-        tire = Recursion(response=of.resolved(STEP), step=STEP, scheme=scheme, comm=MPI.COMM_SELF)
-        return Integration(tire, STEP, steps, scheme)
+    def recursion(of: Response) -> Recursion:
+        return Recursion(response=of.resolved(STEP), step=STEP, scheme=scheme, comm=MPI.COMM_SELF)
 
     trained: TrainedMotion = run.done["nonlinear"].product
     force = trained.stored.force(run.done["restoring"].product)
-    straight, bent = integrated(response), integrated(trained.response)
-    large = LargeTire(bent.tire, force, response.residual.shape[1], scheme)
+    straight, bent = recursion(response), recursion(trained.response)
+    large = LargeTire(bent, force, response.residual.shape[1], scheme)
+    # With the readings of the hub.
     tires = (
         elements.full(STEP)[0],
-        driven_tire(job, straight, setup.patch),  # with the readings of its hub
-        driven_tire(job, bent, setup.patch, large),
+        driven_tire(job, Integration(straight, STEP, steps, scheme), setup.patch),
+        driven_tire(job, Integration(bent, STEP, steps, scheme), setup.patch, large),
     )
     others = {name: follow(trial, tire, STEP, 0.0) for name, tire in zip(NAMES, tires, strict=True)}
     return Beside(exact, others, nonlinear.turns / len(exact.values["contact force"]), stages)
