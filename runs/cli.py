@@ -344,10 +344,10 @@ def _validate(args: argparse.Namespace) -> None:
     scenes = [Path(name) for name in args.names if name.endswith(".toml")]
     if not scenes:
         _check_checkout("validation", args.command)
-        return run_all("tireroad.tests.validation", args.names, args.out, args.large)
-    if len(scenes) < len(args.names) or args.large:
+        return run_all("tireroad.tests.validation", args.names, args.out, args.large, args.only)
+    if len(scenes) < len(args.names) or args.large or args.only:
         raise InputError(
-            "validate takes names, or scenes of your own: one or the other, and no --large with them"
+            "validate takes names, or scenes of your own: one or the other, and neither --large nor --only with them"
         )
     return run_scenes(scenes, args.out)
 
@@ -396,6 +396,13 @@ UNTIL = argument(
     "--until", choices=STAGES, metavar="STAGE", help=f"last stage: {', '.join(STAGES)}"
 )
 TABLE = argument("--out", type=Path, metavar="FILE.json", help="results, with a page beside them")
+ONLY = argument(
+    "--only",
+    action="append",
+    default=[],
+    metavar="WORDS",
+    help="of one with cases those with all these words, as in 'radial texture 30'; may be given several times",
+)
 
 COMMANDS = {
     "run": Command(
@@ -545,13 +552,7 @@ COMMANDS = {
         (
             argument("names", nargs="*", metavar="NAME", help="all by default"),
             TABLE,
-            argument(
-                "--only",
-                action="append",
-                default=[],
-                metavar="WORDS",
-                help="of a benchmark of cases those with all these words, as in 'radial texture 30'; may be given several times",
-            ),
+            ONLY,
         ),
         alone=_bench,
     ),
@@ -585,6 +586,7 @@ COMMANDS = {
                 help="all by default, in a checkout; or a SCENE.toml of your own, which is run against full finite elements in time",
             ),
             TABLE,
+            ONLY,
             argument(
                 "--large", action="store_true", help="on meshes of full size: hours, not minutes"
             ),

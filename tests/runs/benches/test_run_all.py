@@ -1,6 +1,7 @@
 """Benchmarks and validations one after the other: where they are written, and what a stop leaves."""
 
 import json
+import math
 import os
 
 import pytest
@@ -8,9 +9,11 @@ import pytest
 from tireroad.fem.errors import InputError
 from tireroad.runs.process.mpi import ending
 from tireroad.runs.process.signals import STOPPED, Stopped
+from tireroad.runs.scene.load import load
 from tireroad.runs.validation import tables
 from tireroad.runs.validation.tables import Table
 from tireroad.tests.bench.parts import rolling_cases
+from tireroad.tests.validation import large_rolling
 
 
 def test_a_stop_says_what_is_kept(tmp_path, monkeypatch) -> None:
@@ -79,3 +82,18 @@ def test_only_a_benchmark_of_cases_can_choose(tmp_path, monkeypatch) -> None:
         tables.run_all("tireroad.tests.bench", ["whole"], None, only=["a"])
     with pytest.raises(InputError, match="name it"):
         tables.run_all("tireroad.tests.bench", [], None, only=["a"])
+
+
+def test_bars_and_holes_are_chosen_by_words_and_lie_before_the_points(tmp_path) -> None:
+    """A road begins before the foremost point: a bar under it would have a vertical edge there."""
+    (one,) = large_rolling.chosen(["bar 25 4000"])
+    assert str(one) == "bar 25 x 50 mm, 4000 N, friction 0"
+    assert large_rolling.chosen(["hole 2000"]) == []
+    assert large_rolling.chosen([]) == list(large_rolling.CASES)
+    for case in large_rolling.CASES:
+        path = tmp_path / "scene.toml"
+        path.write_text(case.scene())
+        scene = load(path)
+        foremost = math.sqrt(2 * large_rolling.RADIUS * (0.02 + 1.5 * abs(case.height) + 5e-3))
+        assert scene.road.surface.position > foremost
+        assert scene.road.surface.position - large_rolling.SPEED * scene.time.duration < foremost

@@ -1,0 +1,252 @@
+"""Rolling on to a bar and into a hole: the loop of a scene with large motions against nonlinear finite elements in time."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from tireroad.contact.results.spectra import in_band
+from tireroad.fem.errors import ConvergenceError
+from tireroad.greens.large_motion import LargeTire
+from tireroad.greens.recursion import Recursion
+from tireroad.greens.response import Response
+from tireroad.runs.files.cache import Cache
+from tireroad.runs.pipeline import run_scene
+from tireroad.runs.process import console
+from tireroad.runs.scene.load import load
+from tireroad.runs.stages.large import LEFT_OUT
+from tireroad.runs.stages.rolling import Integration, driven_tire, recursive
+from tireroad.runs.stages.setup import probes
+from tireroad.runs.stages.training import TrainedMotion
+from tireroad.runs.validation.full_elements import (
+    Conditions,
+    Elements,
+    FullHistory,
+    digits,
+    follow,
+    percent,
+)
+from tireroad.runs.validation.tables import Table
+
+# The full finite elements in time have the moduli of one frequency: exponent = 0.
+ABOUT = "a coarse passenger tire that rolls on to a bar and into a hole: linear and large motions against nonlinear elements"
+
+SCENE = """
+name = "validate"
+[tire]
+section = "radial"
+size = "205/60 R15"
+segments = 12
+elements_arc = 6
+[tire.cavity]
+gas = "none"
+[[tire.region]]
+exponent = 0.0
+[static]
+inflation = 2.2e5
+load = {load}
+error_estimate = false
+[modal]
+up_to = 400.0
+[damping]
+mass = 60.0
+[rotation]
+speed = 26.6
+[contact]
+points = {{ dx = 0.008, dy = 0.02 }}
+youngs_modulus = 1e7
+friction = {friction}
+[road]
+kind = "cleat"
+run_in = 0.0
+height = {height}
+length = {length}
+ramp = {ramp}
+position = {position}
+[time]
+duration = {duration}
+step = {step}
+[motion]
+kind = "large"
+[accuracy]
+estimate = false
+"""
+BAND = 400.0  # Hz
+RADIUS, SPEED = 0.313, 8.33  # m, m/s: of the tire, along the road
+BEFORE, ON = 0.005, 0.09  # m from the foremost point to the obstacle, and rolled on it
+STEP = 2e-4  # s
+NAMES = "elements, linear", "loop, linear", "loop, large"
+FORCES = ("contact force", "axle force")
+AXES = {"vertical": 2, "along the road": 0}
+
+
+@dataclass(frozen=True)
+class Case:
+    """An obstacle across the road (m; `height` negative: a hole), under a load N with a coefficient of `friction`."""
+
+    height: float
+    length: float
+    ramp: float
+    load: float = 4000.0
+    friction: float = 0.0
+
+    def __str__(self) -> str:
+        kind = "bar" if self.height > 0 else "hole"
+        return f"{kind} {1e3 * abs(self.height):g} x {1e3 * self.length:g} mm, {self.load:g} N, friction {self.friction:g}"
+
+    def scene(self) -> str:
+        """A scene that rolls until the obstacle is `ON` m inside the place where it is met."""
+        # A circle of the tire's radius, 20 mm deep; a road begins before its points, which reach by default as far as the circle is
+        # 5 mm and 1.5 heights above it, at most a tenth more.
+        met, first = (
+            np.sqrt(2 * RADIUS * (0.02 + gap))
+            for gap in (max(self.height, 0.0), 1.1 * (0.005 + 1.5 * abs(self.height)))
+        )
+        position = first + BEFORE
+        duration = (position + 0.5 * self.ramp - met + ON) / SPEED
+        return SCENE.format(
+            **vars(self), step=STEP, position=round(position, 4), duration=round(duration, 4)
+        )
+
+
+# Bars of 10 x 20 and 15 x 50 mm are left out: the elements' run takes all memory of a machine of 24 GB there, as the tire meets them.
+CASES = Case(0.025, 0.050, 0.025), Case(-0.030, 0.300, 0.020)
+
+
+def chosen(only: Sequence[str]) -> list[Case]:
+    """The cases whose names have all words of one of `only`, all of them without any."""
+    if not only:
+        return list(CASES)
+    words = {case: set(str(case).replace(",", "").split()) for case in CASES}
+    return [case for case in CASES if any(set(one.split()) <= words[case] for one in only)]
+
+
+def run(only: Sequence[str] = ()) -> list[Table]:
+    """The table of the cases, or of those whose names have all words of one of `only`. Serial."""
+    rows, costs, failed = [], [], []
+    with tempfile.TemporaryDirectory() as folder:
+        for number, case in enumerate(chosen(only)):
+            console.say(f"{case}")
+            try:
+                compared = beside(case, Path(folder) / str(number), Cache(Path(folder) / "cache"))
+            except ConvergenceError as error:
+                failed.append(f"{case}: {error}")
+                continue
+            rows += compared.rows(str(case))
+            costs.append([str(case), *compared.cost()])
+    columns = [
+        ("road, load, friction", ""),
+        ("force", ""),
+        ("direction", ""),
+        ("largest change", "N"),
+    ]
+    columns += [(f"{name}{of}", "%") for name in NAMES for of in ("", ", worst")]
+    notes = [
+        f"205/60 R15, 12 x 6 elements, 2.2 bar, no air, 30 km/h, 96 modes to {BAND:g} Hz, steps of 0.2 ms; the first {1e3 * ON:g} mm of way on "
+        f"the obstacle. Below {BAND:g} Hz, off nonlinear elements of the same points, contact and steps: rms of the difference over the rms of the change, "
+        "and largest difference over the largest change.",
+    ]
+    about = [("road, load, friction", ""), ("vectors", "-"), ("cells", "-"), ("left out", "%"), ("evaluations a step", "-"),
+             ("energy that does not add up, of the largest work", "%"), ("loop over the linear one", "-"), ("training", "s"),
+             ("iterations a step of the elements", "-")]  # fmt: skip
+    return [
+        Table("Rolling on to a bar and into a hole", columns, rows, notes, failed=failed),
+        Table("What that takes", about, costs, []),
+    ]
+
+
+@dataclass(frozen=True)
+class Beside:
+    """Histories over one obstacle by name, those of the nonlinear elements (`exact`), and the figures of the run's stages."""
+
+    exact: FullHistory
+    others: dict[str, FullHistory]
+    iterations: float
+    stages: dict[str, Any]
+
+    def rows(self, name: str) -> list[list]:
+        """What each tire is off in % below `BAND`, rms and worst, a row per force and direction."""
+        step, out = self.exact.step, []
+        for force in FORCES:
+            for direction, axis in AXES.items():
+                true, *others = (
+                    in_band(one.values[force] - one.values[force][0], step, BAND)[:, axis]
+                    for one in (self.exact, *self.others.values())
+                )
+                row: list = [name, force, direction, digits(float(abs(true).max()))]
+                for other in others:
+                    off = other - true
+                    row += [
+                        percent(float(np.linalg.norm(off) / np.linalg.norm(true))),
+                        percent(float(abs(off).max() / abs(true).max())),
+                    ]
+                out.append(row)
+        return out
+
+    def cost(self) -> list:
+        """What training and loop took, and how the energy closes."""
+
+        def value(stage: str, name: str) -> float:
+            entry = self.stages[stage]
+            return digits((entry["headline"] | entry["indicators"])[name]["value"])
+
+        moved = max(
+            abs(value("contact", name))
+            for name in ("work of contact on the tire", "energy lost in the material")
+        )
+        off = abs(value("contact", "energy that does not add up"))
+        linear, large = (self.others[name].seconds for name in NAMES[1:])
+        return [
+            value("nonlinear", "vectors"),
+            value("nonlinear", "cells of the mesh"),
+            value("contact", LEFT_OUT),
+            value("contact", "evaluations of the reduced force a step"),
+            percent(off / moved),
+            digits(large / linear),
+            digits(self.stages["nonlinear"]["seconds"]),
+            digits(self.iterations),
+        ]
+
+
+def beside(case: Case, folder: Path, cache: Cache) -> Beside:
+    """The case by all tires. Serial."""
+    folder.mkdir()
+    file = folder / "scene.toml"
+    file.write_text(case.scene())
+    given: dict[str, Any] = {"until": "contact", "fresh": False, "petsc_options": []}
+    with console.quiet():
+        run = run_scene(load(file), folder, MPI.COMM_SELF, cache=cache, **given)
+    stages = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["stages"]
+    job, static, response = run.job, run.static, run.greens.contact
+    contact = job.scene.contact
+    assert contact is not None, "a scene with contact"
+    setup, _ = run.setup.equilibrated(response, static.normal_force, contact)
+    begun = response if contact.has_friction else None
+    trial = Conditions(contact, setup, job.scene.time.duration, begun)
+    elements = Elements(run, job, probes(job, static, run.setup))
+    nonlinear, *arguments = elements.nonlinear(STEP)
+    exact = follow(trial, nonlinear, *arguments)
+    scheme, steps = recursive(run.done["contact"].product.scheme), len(exact.values["axle force"])
+
+    def recursion(of: Response) -> Recursion:
+        return Recursion(response=of.resolved(STEP), step=STEP, scheme=scheme, comm=MPI.COMM_SELF)
+
+    trained: TrainedMotion = run.done["nonlinear"].product
+    force = trained.stored.force(run.done["restoring"].product)
+    straight, bent = recursion(response), recursion(trained.response)
+    large = LargeTire(bent, force, response.residual.shape[1], scheme)
+    # With the readings of the hub.
+    tires = (
+        elements.full(STEP)[0],
+        driven_tire(job, Integration(straight, STEP, steps, scheme), setup.patch),
+        driven_tire(job, Integration(bent, STEP, steps, scheme), setup.patch, large),
+    )
+    others = {name: follow(trial, tire, STEP, 0.0) for name, tire in zip(NAMES, tires, strict=True)}
+    return Beside(exact, others, nonlinear.turns / len(exact.values["contact force"]), stages)
