@@ -5,20 +5,22 @@ towards -x. Its deflection e (base relative to tip) grows by the slip of its bas
 
     De/Dt = Du/Dt + v (-s_x, s_y),   t = -K_b e on the tire,   |t| <= mu f,
 
-s_x > 0 driving, s_y > 0 the wheel drifting towards +y. Points stay where they are, each with a cell from halfway to the
-point behind it to halfway to that ahead; bristles, some on each cell, pass through the cells of a line in steps of the road.
-Bristle b has a tip a_b, the displacement of its base at which it is undeflected, so that at the end of a step
+s_x > 0 driving, s_y > 0 the wheel drifting towards +y. Points stay where they are, each with a cell that reaches
+halfway to its neighbours on its line; bristles, several to a cell, pass through the cells in steps of the road. Bristle b has a
+tip a_b, the displacement of its base at which it is undeflected; a point has the mean of those that stand on its cell,
 
-    e = share u - sum_b w_b a_b,   share = sum_b w_b,   a_b <- a_b - v h (-s_x, s_y) in each step,
+    e = u - mean(a_b),   a_b <- a_b - v h (-s_x, s_y) in each step,
 
-the sums over those of a cell that stand on the road, w_b the parts of the cell. What a point slides in a step moves the tips of
-its cell. A bristle comes to stand undeflected: where its point begins to touch with the displacement at its own place, interpolated to
-the point ahead; where it comes into a cell that touches with that of the cell's edge, the mean of both points. It stands
-until neither its point nor the other next to it touches: material that adheres to the road's asperities goes with them
-from point to point.
+and none of its own where none stand. What a point slides in a step moves the tips of its cell. A bristle comes to stand undeflected:
 
-Tips are kept, not interpolated from point to point: interpolated step by step, what adheres spread by sqrt(L p) over a footprint of
-the length L with points p apart, 4 cm in a passenger tire's with points of 1 cm, in steps as small as one likes.
+- on a cell whose point begins to touch, with the displacement at its own place, between those of the point and the next one ahead;
+- where it comes into a cell that touches, with the displacement of the cell's front, the mean of both points.
+
+It stands until neither its point nor the other next to it touches. One that stood before, or that begins to stand where others do,
+takes their mean: what adheres to an asperity of the road goes with it from point to point.
+
+Tips are kept. Interpolated from point to point in each step, what adheres would spread by sqrt(L p) over a footprint of
+the length L with points p apart: 4 cm in a passenger tire's with points of 1 cm, in steps as small as one likes.
 
 The force of a rolling, sticking body has errors of 2.7, 1.6 and 0.6 % with 6, 12 and 24 points
 along its contact (Kalker's C11); with bristles entering at a point it had 18, 8 and 4 %.
@@ -28,6 +30,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,8 +84,8 @@ class Brush:
     """The bristles of c points: tips and, in the mean of each cell, deflections e (c, 2) m.
 
     `x` (c,) m and `line` (c,) int: points of one line follow each other in the rolling direction. The
-    kernel of a step (contact.solver.stick_slip) reads and advances the state in these arrays: `tip` (2, b) m and `stands` (b,) of
-    the bristles in their `rows`, `deflected` and `moved` (2, c) m, `touched`, `slid` (c,) at the end of the last step, `waited` (1,)
+    kernel of a step (contact.solver.stick_slip) reads and advances the state in these arrays: `tip` (2, b) m and `stands` (b,), 0 not yet,
+    1 stands, 2 stood, of the bristles in their `rows`, `deflected` and `moved` (2, c) m, `touched`, `slid` (c,) at the end of the last step, `waited` (1,)
     steps since they moved on; by the next point `ahead` (c,), `slip` (2,) or (c, 2) m a step.
     """
 
@@ -158,66 +161,69 @@ def rows_of(x: Array, line: Array, way: float) -> Rows:
     every = max(math.floor(usual / (MOST * way)), 1) if way else 1
     apart = way * every / shift if shift else usual / FEWEST
     lines = [_line(x, np.flatnonzero(line == each), way, usual, apart) for each in np.unique(line)]
-    cell, beside, along, entry = (
-        np.concatenate(part) for part in zip(*(one[0] for one in lines), strict=True)
-    )
-    counts, foremost = np.zeros(len(x), np.int32), np.zeros(len(x), np.int32)
-    of_point: list[Array] = [np.zeros(0)] * len(x)
-    begin = np.concatenate([[0], np.cumsum([len(one[0][0]) for one in lines])])
-    for at, (_, points, first, weights) in zip(begin[:-1].tolist(), lines, strict=True):
-        foremost[points] = at + first
-        counts[points] = [len(each) for each in weights]
-        for i, each in zip(points.tolist(), weights, strict=True):
-            of_point[i] = each
-    first = np.concatenate([[0], np.cumsum(counts)])
-    numbers = (part.astype(np.int32) for part in (begin, cell, beside))
+    begin = np.cumsum([0, *(len(each.cell) for each in lines)])
+    foremost, of_point = np.zeros(len(x), np.int32), [np.zeros(0)] * len(x)
+    for at, each in zip(begin.tolist(), lines, strict=False):
+        foremost[each.points] = at + each.first
+        for i, weights in zip(each.points.tolist(), each.weights, strict=True):
+            of_point[i] = weights
     return Rows(
-        shift,
-        every,
-        *numbers,
-        along,
-        entry,
-        foremost,
-        first.astype(np.int32),
-        np.concatenate(of_point),
+        shift=shift,
+        every=every,
+        line=begin.astype(np.int32),
+        cell=np.concatenate([each.cell for each in lines]).astype(np.int32),
+        beside=np.concatenate([each.beside for each in lines]).astype(np.int32),
+        along=np.concatenate([each.along for each in lines]),
+        entry=np.concatenate([each.entry for each in lines]),
+        foremost=foremost,
+        first=np.cumsum([0, *(len(weights) for weights in of_point)]).astype(np.int32),
+        weight=np.concatenate(of_point),
     )
 
 
-def _line(
-    x: Array, points: NDArray[np.intp], way: float, usual: float, apart: float
-) -> tuple[tuple[Array, Array, Array, Array], NDArray[np.intp], NDArray[np.intp], list[Array]]:
-    """Bristles of a line, `apart` m, give their cell, beside, along and entry; its points from the front, the first bristle and the weights of each."""
+class _Line(NamedTuple):
+    """The bristles of a line, as in `Rows`, and of its `points`, from the front, the `first` one and the weights."""
+
+    cell: NDArray[np.intp]
+    beside: NDArray[np.intp]
+    along: Array
+    entry: Array
+    points: NDArray[np.intp]
+    first: NDArray[np.intp]
+    weights: list[Array]
+
+
+def _line(x: Array, points: NDArray[np.intp], way: float, usual: float, apart: float) -> _Line:
+    """Bristles of a line, `apart` m."""
     points = points[np.argsort(-x[points], kind="stable")]
-    places = x[points]
+    if not apart:
+        none = np.zeros(0)
+        return _Line(points[:0], points[:0], none, none, points, 0 * points, [none] * len(points))
+    places, number = x[points], np.arange(len(points))
     gaps = -np.diff(places) if len(points) > 1 else np.array([usual])
-    fronts = places + 0.5 * np.concatenate([gaps[:1], gaps])[: len(points)]
-    backs = places - 0.5 * np.concatenate([gaps, gaps[-1:]])[-len(points) :]
-    count = math.ceil((fronts[0] - backs[-1]) / apart * (1 - 1e-12)) if apart else 0
+    fronts = places + 0.5 * np.append(gaps[0], gaps)[: len(points)]
+    backs = places - 0.5 * np.append(gaps, gaps[-1])[-len(points) :]
+    count = math.ceil((fronts[0] - backs[-1]) / apart * (1 - 1e-12))
     at = fronts[0] - apart * (np.arange(count) + 0.5)
     cell = np.minimum(np.searchsorted(-backs, -at, side="right"), len(points) - 1)
-    before = at > places[cell]
-    beside = np.clip(cell + np.where(before, -1, 1), 0, len(points) - 1)
-    ahead = np.concatenate([[np.inf], gaps])[cell]
-    along, entry = (at - places[cell]) / ahead, (fronts[cell] - at) / (way or np.inf)
-    if not count:
-        none = np.zeros(0)
-        return (points[:0], points[:0], none, none), points, 0 * points, [none] * len(points)
-    first, end = (
-        np.searchsorted(cell, np.arange(len(points))),
-        np.searchsorted(cell, np.arange(len(points)), side="right"),
-    )
+    beside = np.clip(cell + np.where(at > places[cell], -1, 1), 0, len(points) - 1)
+    along = (at - places[cell]) / np.append(np.inf, gaps)[cell]
+    entry = (fronts[cell] - at) / (way or np.inf)
+    first, end = (np.searchsorted(cell, number, side=side) for side in ("left", "right"))
     none = first == end  # in a cell shorter than bristles are apart
     first[none] = np.abs(np.subtract.outer(places[none], at)).argmin(axis=1)
     end[none] = first[none] + 1
-    weights = []
-    for i, (a, b) in enumerate(zip(first.tolist(), end.tolist(), strict=True)):
-        here, part = at[a:b], np.full(b - a, 1.0 / (b - a))
-        off, mean = here - here.mean(), float(here.mean())
-        spread = float(part @ off**2)
-        if spread > 0:
-            part = np.maximum(part * (1.0 + (places[i] - mean) / spread * off), 0.0)
-        weights.append(part / part.sum())
-    return (points[cell], points[beside], along, entry), points, first, weights
+    weights = [_weights(at[a:b] - place) for a, b, place in zip(first, end, places, strict=True)]
+    return _Line(points[cell], points[beside], along, entry, points, first, weights)
+
+
+def _weights(off: Array) -> Array:
+    """Weights (n,) of bristles `off` m ahead of a point, of which it has the mean: alike, but for as much as their mean place is off it."""
+    mean = float(off.mean())
+    spread = float(((off - mean) ** 2).mean())
+    part = np.maximum(1.0 - mean / spread * (off - mean), 0.0) if spread > 0 else np.ones(len(off))
+    whole: Array = part / part.sum()
+    return whole
 
 
 def next_ahead(x: Array, line: Array) -> tuple[NDArray[np.intp], Array]:
