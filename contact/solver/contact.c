@@ -171,7 +171,7 @@ enum { FRESH, STANDS, STOOD };
 void brush_begin(brush *s);
 void brush_end(brush *s);
 void brush_travel(brush *s);
-void brush_offer(const brush *s, double *share, double *past);
+void brush_offer(const brush *s, uint8_t *bears, double *past);
 void brush_conclude(brush *s, const double *force, const double *tangential);
 double brush_limit(const brush *s, double first, double most);
 int brush_solve(brush *s, normal_contact *normal, const double *q, const uint8_t *guess, const double *at_rest,
@@ -1213,32 +1213,32 @@ static const double HELD = 1e-6; /* of its bound that a point which sticks has l
 static const double SHRUNK = 0.03, SMALL = 1e-6; /* of the first residual of a step, down to a share of the largest bound */
 
 struct brush_work {
-    double *share, *past, *trial, *moved, *some, *found, *q, *mixed;
+    double *past, *trial, *moved, *some, *found, *q, *mixed;
     double *spring, *inverse, *constant, *bound, *force, *ahead, *off;
     double *results[MIXED], *residuals[MIXED];
     double *horizontal; /* (2, c) N at the end of the step before */
     int *index, *every;
     int touches, *touch, reaches, *reach; /* the points that touch, and with those next ahead of them; ascending */
-    uint8_t *lifted, *touching, *set;
+    uint8_t *bears, *lifted, *touching, *set;
 };
 
 void brush_begin(brush *s) {
     const int c = s->compliance->points;
     struct brush_work *w = s->work = room(1, sizeof *w);
-    double **doubles[] = {&w->share, &w->past, &w->trial, &w->moved, &w->some, &w->found, &w->q,
+    double **doubles[] = {&w->past, &w->trial, &w->moved, &w->some, &w->found, &w->q,
                           &w->mixed, &w->spring, &w->inverse, &w->constant, &w->bound, &w->force,
                           &w->ahead, &w->off, &w->horizontal};
-    for (int i = 0; i < 16; i++) *doubles[i] = DOUBLES(2 * c);
+    for (int i = 0; i < 15; i++) *doubles[i] = DOUBLES(2 * c);
     for (int i = 0; i < MIXED; i++) w->results[i] = DOUBLES(2 * c), w->residuals[i] = DOUBLES(2 * c);
     w->index = INTS(c), w->every = INTS(c), w->touch = INTS(c), w->reach = INTS(c);
     for (int i = 0; i < c; i++) w->every[i] = i;
-    w->lifted = room(c, 1), w->touching = room(c, 1), w->set = room(c, 1);
+    w->bears = room(c, 1), w->lifted = room(c, 1), w->touching = room(c, 1), w->set = room(c, 1);
 }
 
 void brush_end(brush *s) {
     struct brush_work *w = s->work;
     for (int i = 0; i < MIXED; i++) free(w->results[i]), free(w->residuals[i]);
-    void *all[] = {w->share, w->past, w->trial, w->moved, w->some, w->found, w->q, w->mixed, w->spring, w->inverse,
+    void *all[] = {w->bears, w->past, w->trial, w->moved, w->some, w->found, w->q, w->mixed, w->spring, w->inverse,
                    w->constant, w->bound, w->force, w->ahead, w->off, w->index, w->every, w->touch, w->reach, w->lifted, w->touching, w->set,
                    w->horizontal, w};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) free(all[i]);
@@ -1312,12 +1312,13 @@ void brush_travel(brush *s) {
     }
 }
 
-/* share (c,), 0 or 1, and past (2, c) of e = share u + past at the end of the step (contact.tread.brush), after `brush_travel`. */
-void brush_offer(const brush *s, double *share, double *past) {
+/* Which points have bristles that bear (c,), and past (2, c) of their e = u + past at the end of the step (contact.tread.brush), after
+   `brush_travel`. */
+void brush_offer(const brush *s, uint8_t *bears, double *past) {
     const int c = s->compliance->points, n = s->line[s->lines];
     for (int i = 0; i < c; i++) {
         double tip[2] = {0.0, 0.0};
-        share[i] = s->spring_kind || mean_tip(s, i, n, tip);
+        bears[i] = s->spring_kind || mean_tip(s, i, n, tip);
         past[i] = -tip[0], past[c + i] = -tip[1];
     }
 }
@@ -1400,14 +1401,14 @@ static stick_slip sticking(brush *s, const double *force) {
     int a = 0;
     for (int k = 0; k < w->touches; k++) {
         const int i = w->touch[k];
-        if (!w->lifted[i] && w->share[i] > LEAST) w->index[a++] = i;
+        if (!w->lifted[i] && w->bears[i]) w->index[a++] = i;
     }
     for (int k = 0; k < a; k++) {
         const int i = w->index[k];
-        w->spring[k] = 1.0 / (s->stiffness[i] * w->share[i]);
+        w->spring[k] = 1.0 / s->stiffness[i];
         w->inverse[k] = 1.0 / (s->own[i] + w->spring[k]);
         w->bound[k] = s->friction < 0.0 ? INFINITY : s->friction * force[i];
-        for (int d = 0; d < 2; d++) w->constant[d * a + k] = w->moved[d * c + i] + w->past[d * c + i] / w->share[i];
+        for (int d = 0; d < 2; d++) w->constant[d * a + k] = w->moved[d * c + i] + w->past[d * c + i];
     }
     stick_slip problem = {s->compliance, a, w->index, w->spring, w->inverse, w->constant, w->bound, w->force, s->compliance->near, 1.0};
     problem.norm = s->norm + (a ? largest(a, w->spring) : 0.0);
@@ -1545,7 +1546,7 @@ int brush_solve(brush *s, normal_contact *normal, const double *q, const uint8_t
         brush_travel(s);
         memcpy(w->horizontal, s->horizontal, 2 * c * sizeof(double));
     }
-    brush_offer(s, w->share, w->past);
+    brush_offer(s, w->bears, w->past);
     memset(w->lifted, 0, c);
     for (int i = 0; i < 2 * c; i++) w->trial[i] = s->again ? s->horizontal[i] : 2.0 * s->horizontal[i] - s->before[i];
     for (s->turns = 1; s->turns <= TURNS; s->turns++) {

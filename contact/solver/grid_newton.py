@@ -124,10 +124,6 @@ class GridNewton:
         road was read, as a share of deflections (mean squares). `again`: the last step once more, from its forces. ConvergenceError
         after 40 steps in a row that had to be split.
         """
-        if again:
-            self.friction.retrace()
-        else:
-            self.friction.keep()
         step = _Step(self, gap, free, read, road, tolerance, again)
         lags = not step.settle()
         if lags and (self.friction.unbounded or not step.split()):
@@ -221,10 +217,8 @@ class _Step:
         self._solver, self._brush = solver, solver.friction
         self._open, self._free, self._read = gap, free, read
         self._tolerance = tolerance
-        share, past = self._brush.trial_displacement()
-        self._bears = share > 1e-9
-        share = np.where(self._bears, share, 1.0)
-        self._past, self._spring = past / share, 1.0 / (self._brush.stiffness * share)
+        self._bears, self._past = self._brush.begin(again)
+        self._spring = 1.0 / self._brush.stiffness
         self._beside = self._brush.own + self._spring
         last = solver.force
         if again:

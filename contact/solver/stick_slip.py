@@ -10,7 +10,7 @@ from scipy import sparse
 from tireroad.contact.choices import DENSE_POINTS
 from tireroad.contact.solver.active_set import COMPILED, ActiveSet, UsualSet, array, guarded
 from tireroad.contact.solver.conditions import Array, ContactSolver, Mask, check_residual
-from tireroad.contact.tread.brush import Brush, upstream
+from tireroad.contact.tread.brush import Brush
 from tireroad.contact.tread.shear import Shear
 from tireroad.fem.errors import ConvergenceError
 
@@ -192,7 +192,7 @@ class BrushFriction:
     solution, `turns` its number of iterations.
 
     Normal: f >= 0, g = A_zz (f - f_static) + A_zh t + q >= 0, f . g = 0. Tangential, at the
-    touching points: t = -K_b (share u + past) limited to |t| <= mu f, u = u_free + A_hz (f -
+    touching points: t = -K_b (u + past) limited to |t| <= mu f, u = u_free + A_hz (f -
     f_static) + A_hh t. With a tread that shears (contact.tread.shear), A includes its part; its
     rubber is then in series with the bristles or, with K_b infinite, alone.
 
@@ -224,8 +224,8 @@ class BrushFriction:
         plane.precondition(float(np.mean(1.0 / np.asarray(brush.law.stiffness))))
         c = plane.weights.shape[0]
         self._horizontal, self._before = np.zeros((2, c)), np.zeros((2, c))
+        self._kept = self._before.copy(), self._horizontal.copy()  # before the last step
         self._touched = brush.touched
-        self._upstream = upstream(brush.x, brush.line, brush.way)
         law = brush.law
         rows = brush.rows
         self._slip = np.broadcast_to(brush.slip, (c, 2)).T.copy()
@@ -283,16 +283,21 @@ class BrushFriction:
         """Number of steps so far in which normal and horizontal forces each took the other's of the step before."""
         return int(self.compiled.lagged)
 
-    def trial_displacement(self) -> tuple[Array, Array]:
-        """share (c,) and past (2, c) m of a bristle's deflection share u + past at the end of the step (contact.tread.brush)."""
-        share, past = np.empty(len(self._touched)), np.empty((2, len(self._touched)))
-        _C.brush_travel(self.compiled)
-        _C.brush_offer(self.compiled, COMPILED.doubles(share), COMPILED.doubles(past))
-        return share, past
+    def begin(self, again: bool) -> tuple[Mask, Array]:
+        """Begin a step, before which bristles move on, or the last one once more, from the forces before it: the points (c,) whose
+        bristles bear, and past (2, c) m of their deflections u + past at its end (contact.tread.brush)."""
+        if again:
+            self._before[:], self._horizontal[:] = self._kept
+        else:
+            self._kept = self._before.copy(), self._horizontal.copy()
+            _C.brush_travel(self.compiled)
+        bears, past = np.empty(len(self._touched), bool), np.empty((2, len(self._touched)))
+        _C.brush_offer(self.compiled, COMPILED.flags(bears), COMPILED.doubles(past))
+        return bears, past
 
     def carried(self, force: Array) -> Array:
         """Forces (3, c) N where a step has carried the road that they are of."""
-        return np.ascontiguousarray((self._upstream @ force.T).T)
+        return np.ascontiguousarray((self._brush.upstream @ force.T).T)
 
     def bound(self, force: Array) -> Array:
         """Largest horizontal forces (n,) N under normal forces (n,) N."""
@@ -303,15 +308,6 @@ class BrushFriction:
     def limit(self, first: float, most: float) -> float:
         """Residual (N) that a step may leave, of its `first` one (N) and the `most` (N) that a point may bear."""
         return float(_C.brush_limit(self.compiled, first, most))
-
-    def keep(self) -> None:
-        """Keep the bristles as they are before a step, for `retrace`."""
-        self._kept = self._brush.state(), self._before.copy(), self._horizontal.copy()
-
-    def retrace(self) -> None:
-        """Take the bristles back to before the last step, to solve it again."""
-        state, self._before[:], self._horizontal[:] = self._kept
-        self._brush.set_state(state)
 
     def advance(self, force: Array, moved: Array, lags: bool) -> None:
         """End the step with forces (3, c) N, z, x, y, and bases of bristles `moved` (2, c) m; whether normal and horizontal forces

@@ -30,6 +30,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -92,7 +93,7 @@ class Brush:
     def __init__(self, law: BrushLaw, x: Array, line: Array, speed: float, step: float) -> None:
         self.law = law
         self.way = speed * step
-        self.x, self.line = x, line
+        self._x, self._line = x, line
         ahead, _ = next_ahead(x, line)
         self.ahead = ahead.astype(np.int32)
         self.rows = rows_of(x, line, self.way)
@@ -103,6 +104,11 @@ class Brush:
         self.touched: Mask = np.zeros(len(x), dtype=bool)
         self.slid: Mask = np.zeros(len(x), dtype=bool)
         self.waited = np.zeros(1, np.int32)
+
+    @cached_property
+    def upstream(self) -> sparse.csr_matrix:
+        """Linear interpolation (c, c) at the places where what is at the points was a step before (`upstream`)."""
+        return upstream(self._x, self._line, self.way)
 
     @property
     def deflection(self) -> Array:

@@ -9,7 +9,7 @@ import json
 import pkgutil
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
@@ -23,6 +23,11 @@ from tireroad.runs.files.disk import write_text
 from tireroad.runs.process import console
 from tireroad.runs.process.signals import Stopped
 from tireroad.runs.version import PROGRAM, VERSION
+
+
+def asked(words: Iterable[str], only: Sequence[str]) -> bool:
+    """Whether a case of these words has all of one of `only`, as in "radial texture 30"; none asks for all."""
+    return not only or any(set(one.split()) <= set(words) for one in only)
 
 
 @dataclass

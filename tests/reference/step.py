@@ -138,12 +138,13 @@ class Bristles:
         weight = weight * self.stands[index]
         return self.tip[:, index] @ weight / weight.sum() if weight.sum() > 1e-9 else None
 
-    def offer(self) -> tuple[Array, Array]:
-        """share (c,) and past (2, c) of e = share u + past, in a step that begins."""
+    def offer(self) -> tuple[NDArray[np.bool_], Array]:
+        """Which points bear (c,), and past (2, c) of e = u + past, in a step that begins."""
         self.travel()
         mean = [self._mean_tip(i) for i in range(len(self.members))]
-        share = np.array([each is not None for each in mean], float)
-        return share, -np.array([np.zeros(2) if each is None else each for each in mean]).T
+        return np.array([each is not None for each in mean]), -np.array(
+            [np.zeros(2) if each is None else each for each in mean]
+        ).T
 
     def end(self, force: Array, t: Array, bound: Array, moved: Array) -> None:
         """After a step with normal (c,) and horizontal forces (2, c), whose bases have `moved` (2, c)."""
@@ -245,17 +246,17 @@ class PlainLoop:
             force = unilateral(zz, q + start, self.touching)
             self.touching = force > 0
             return force, np.zeros((2, c))
-        share, past = self.bristles.offer()
+        bears, past = self.bristles.offer()
         for _ in range(500):
             force = unilateral(zz, q + start + whole[:c, c:] @ t.ravel(), self.touching)
             self.touching = force > 0
             moved = free.reshape(2, c) + (whole[c:, :c] @ (force - self.at_rest)).reshape(2, c)
-            some = np.flatnonzero((force > 0) & (share > 1e-9))
+            some = np.flatnonzero((force > 0) & bears)
             both = np.concatenate([some, c + some])
-            spring = 1.0 / (self.bristles.stiffness * share)[some]
+            spring = 1.0 / self.bristles.stiffness[some]
             matrix = whole[c:, c:][np.ix_(both, both)] + np.diag(np.tile(spring, 2))
             new = np.zeros((2, c))
-            constant = moved[:, some] + past[:, some] / share[some]
+            constant = moved[:, some] + past[:, some]
             new[:, some] = sliding(matrix, constant, self.friction * force[some], t[:, some])
             done, t = np.abs(new - t).max() <= 1e-12 * max(np.abs(new).max(), 1e-30), new
             if done:

@@ -33,7 +33,7 @@ from tireroad.runs.validation.full_elements import (
     follow,
     percent,
 )
-from tireroad.runs.validation.tables import Table
+from tireroad.runs.validation.tables import Table, asked
 
 # The full finite elements in time have the moduli of one frequency: exponent = 0.
 ABOUT = "a coarse passenger tire that rolls on to a bar and into a hole: linear and large motions against nonlinear elements"
@@ -122,10 +122,7 @@ CASES = Case(0.025, 0.050, 0.025), Case(-0.030, 0.300, 0.020)
 
 def chosen(only: Sequence[str]) -> list[Case]:
     """The cases whose names have all words of one of `only`, all of them without any."""
-    if not only:
-        return list(CASES)
-    words = {case: set(str(case).replace(",", "").split()) for case in CASES}
-    return [case for case in CASES if any(set(one.split()) <= words[case] for one in only)]
+    return [case for case in CASES if asked(str(case).replace(",", "").split(), only)]
 
 
 def run(only: Sequence[str] = ()) -> list[Table]:

@@ -23,6 +23,7 @@ from tireroad.runs.pipeline import Finished, run_scene
 from tireroad.runs.process import console
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.tables.scene import AccuracyTable, Scene
+from tireroad.runs.validation.tables import asked
 from tireroad.tests.bench.parts.apart import apart
 
 
@@ -170,11 +171,7 @@ RADIAL = tuple(
 def chosen(cases: Iterable[Case], only: Sequence[str]) -> list[Case]:
     """The cases that have all words of one of `only`, as in "radial texture 30"; all for none. InputError if none has."""
     cases = list(cases)
-    some = [
-        case
-        for case in cases
-        if not only or any(set(words.split()) <= set(case.words) for words in only)
-    ]
+    some = [case for case in cases if asked(case.words, only)]
     if not some:
         every = sorted({word for case in cases for word in case.words})
         raise InputError(
