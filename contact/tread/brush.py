@@ -213,7 +213,11 @@ def _line(x: Array, points: NDArray[np.intp], way: float, usual: float, apart: f
     at = fronts[0] - apart * (np.arange(count) + 0.5)
     cell = np.minimum(np.searchsorted(-backs, -at, side="right"), len(points) - 1)
     beside = np.clip(cell + np.where(at > places[cell], -1, 1), 0, len(points) - 1)
-    along = (at - places[cell]) / np.append(np.inf, gaps)[cell]
+    along = np.zeros(count)
+    further = np.append(0.0, gaps)[
+        cell
+    ]  # of the foremost point none, and none to one at the same place
+    np.divide(at - places[cell], further, out=along, where=further > 0)
     entry = (fronts[cell] - at) / (way or np.inf)
     first, end = (np.searchsorted(cell, number, side=side) for side in ("left", "right"))
     none = first == end  # in a cell shorter than bristles are apart

@@ -60,7 +60,8 @@ def planned(ladders: Ladders, trial: Trial, processes: int) -> Settings | None:
     if trial.found is None:
         return _after_failure(ladders, trial, processes)
     over, now = trial.found.over(scene.accuracy), trial.settings
-    costs, rates = _Costs(scene, trial), orders(now.order, trial.scheme)
+    rates = orders(now.order, trial.scheme, scene.contact.has_friction)
+    costs = _Costs(scene, trial)
     begun = now.rungs
     while worst(over)[0] > AIM:
         choices = [

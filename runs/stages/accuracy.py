@@ -644,7 +644,9 @@ class Ahead(NamedTuple):
 def _share(cause: str, reference: ReferenceRun) -> float:
     points = reference.points_ratio if cause == "points" else 2.0
     size = {"step": 2.0, "points": points, "mesh": 2.0}[cause]
-    order = orders(reference.job.tire.section.order, reference.scheme)[cause]
+    job = reference.job
+    rubbing = job.scene.contact.has_friction
+    order = orders(job.tire.section.order, reference.scheme, rubbing)[cause]
     return (random_share if cause == "points" else share)(size, order)
 
 

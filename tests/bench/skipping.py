@@ -32,6 +32,7 @@ def run() -> list[Table]:
 def table(folder: Path, mesh: Mesh, keys: dict) -> Table:
     """Rows: what is skipped, seconds with and without it, the ratio, the change of the result."""
     console.say("  rolling, standing, flat, with friction ...")
+    keys = {"friction": 0.0} | keys
     rolling = rolled(folder / "rolling", mesh, **keys)
     again = rolled(folder / "rolling", mesh, "road.seed=1", **keys)
     standing = rolled(folder / "standing", mesh, **keys | {"speed": 0.0})
@@ -56,7 +57,7 @@ def table(folder: Path, mesh: Mesh, keys: dict) -> Table:
     columns = [("what is skipped", ""), ("measured", ""), ("with it", "s"), ("without it", "s"),
                ("with / without", "-"), ("largest difference", "")]  # fmt: skip
     notes = [
-        f"{mesh} elements, {keys['modes']} modes, {SPEED:g} rad/s, rough road, {keys['duration']:g} s in "
+        f"{mesh} elements, {keys['modes']} modes, {SPEED:g} rad/s, rough road without friction where not said, {keys['duration']:g} s in "
         f"steps of {keys['step']:g} s; both sides measured in one run.",
         "Largest difference: of the contact force in the last quarter of the time, or of the frequencies, where both sides "
         "compute the same thing; nothing where they do not.",
