@@ -200,6 +200,13 @@ class SteadyTire(LinearTire, Protocol):
     def start_steady(self, force: np.ndarray, sudden: np.ndarray | None = None) -> np.ndarray: ...
 
 
+class Turning(Protocol):
+    """A wheel that does not turn at a given rate (contact.free_wheel): its `slip` along the road by the rate that it has."""
+
+    @property
+    def slip(self) -> float: ...
+
+
 @runtime_checkable
 class IteratedTire(LinearTire, Protocol):
     """A tire whose response is known approximately (fem.nonlinear_transient).
@@ -672,12 +679,14 @@ class Loop:
     """The parts of a time loop that have a history, which a checkpoint must keep.
 
     `begun`: changes (k,) N of the forces and displacements (r,) m of the nodes at t = 0, from the static state; None: none.
+    `slips`: of the wheel at its given rate, (2,) or (c, 2), where the tire's own slip comes on top.
     """
 
     tire: LinearTire
     contact: ContactProblem
     memory: TreadMemory | None = None
     begun: tuple[Array, Array] | None = None
+    slips: Array | None = None
 
     def roll(
         self, drive: Drive, step: float, steps: int, *, done: int = 0, at_once: int = STEPS_AHEAD
@@ -718,6 +727,7 @@ class Loop:
                 solve, predict = partial(solve, again=True), partial(np.asarray, moved)
             free_all[k], change[k] = free, pushed
             tire.advance(pushed)
+            self._slip()
             if memory:
                 memory.advance(contact.at_points)
             force[k], horizontal[k], gap[k] = contact.vertical, contact.horizontal, solved.gap
@@ -732,6 +742,11 @@ class Loop:
             times, force, horizontal.transpose(0, 2, 1), gap, axle, residual, penetration, active.astype(int),
             change, free_all, np.array(readings) if readings else None, contact,
         )  # fmt: skip
+
+    def _slip(self) -> None:
+        """Let bristles slip as the wheel turns now."""
+        if (wheel := turning(self.tire)) is not None and self.slips is not None:
+            self.contact.creep(self.slips + np.array([wheel.slip, 0.0]))
 
     def begun_at(self, state: dict[str, np.ndarray], change: Array) -> Loop:
         """Begin in a `state` of the contact, with the tire at rest under the changes (k,) N of its forces.
@@ -753,6 +768,7 @@ class Loop:
         """Restore the state; results are bitwise those of an uninterrupted run on as many processes."""
         self.tire.restore(state)
         self.contact.set_state(state)
+        self._slip()
         if self.memory:
             self.memory.set_state(state)
 
@@ -780,6 +796,12 @@ def roll(
 def looking_ahead(tire: object) -> Ahead | None:
     """The tire's part that looks ahead, if it has one."""
     found: Ahead | None = getattr(tire, "ahead", None)
+    return found
+
+
+def turning(tire: object) -> Turning | None:
+    """The wheel of a tire, if its rate is not given."""
+    found: Turning | None = getattr(tire, "turning", None)
     return found
 
 
@@ -816,6 +838,7 @@ class DrivenTire:
         self.work = self.lead = 0.0
         if isinstance(tire, IteratedTire):
             self._iterated, self.settle = tire, self._settled
+        self.turning = turning(tire)
         tire.start(np.concatenate([np.zeros(self._count), history[0]]))
 
     def start_steady(self, force: np.ndarray, sudden: np.ndarray | None = None) -> np.ndarray:

@@ -50,7 +50,7 @@ def make_loop(
     solver = step_solver(spec, patch, felt[:p, :p], at_once)
     friction = _friction(spec, setup, felt, step, at_once, tolerance) if spec.has_friction else None
     problem = ContactProblem(patch, felt, solver, friction, of_nodes=tire.same_step)
-    loop = Loop(tire, problem, memory)
+    loop = Loop(tire, problem, memory, slips=setup.slips if friction else None)
     return loop.begun_at(setup.steady.state, setup.steady.change) if setup.steady else loop
 
 

@@ -211,6 +211,7 @@ DATASETS: Mapping[str, tuple[Dataset, ...]] = {
             ("driven_displacement", "nt, k, 3", "m", "displacement at the prescribed forces"),
             ("wheel/translation", "nt, 3", "m", "motion of a wheel that moves"),
             ("wheel/rotation", "nt, 3", "rad", "its rotation"),
+            ("wheel/spin", "nt", "rad/s", "change of a free wheel's rate of rotation"),
             ("body/height", "nt", "m", "motion of the body"),
             ("road/wavelength", "w", "m", "third octaves of wavelength along the road's middle"),
             ("road/texture_level", "w", "dB re 1 um", "texture level (ISO 13473-4)"),

@@ -56,6 +56,7 @@ from tireroad.runs.results.datasets import ABSENT
 from tireroad.runs.scene.estimate import estimate
 from tireroad.runs.scene.physics import compounds
 from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.stages import corner
 from tireroad.runs.stages.cavity import AirColumn
 from tireroad.runs.stages.contact_file import ContactHistory
 from tireroad.runs.stages.greens import GreensStage, Responses, as_read
@@ -167,7 +168,7 @@ class ReferenceRun:
     first `steps` of `step` s of its loop, integrated by `scheme`. `most`: touching points that a companion may
     have (contact.grid_patch.ratio). `comm`: the processes that repeat a loop together, by default those of the job.
     `attached`: the modes with their attachment modes, if any (runs.stages.greens.Responses). `steady`: whether its loop began
-    with steady rolling, as its companions then do.
+    with steady rolling, as its companions then do. `held`: whether a wheel that turns freely is held in it.
     """
 
     job: Job
@@ -183,6 +184,7 @@ class ReferenceRun:
     large: bool = False
     attached: RollingModes | None = None
     steady: bool = True
+    held: bool = False
 
     @property
     def points_ratio(self) -> float:
@@ -208,12 +210,13 @@ class ReferenceRun:
         return probes(self.job, self.static.product, self.setup)
 
     @cached_property
-    def on_coarser_mesh(self) -> tuple[ContactSetup, Response]:
-        """Setup and response of the tire with elements of twice the size. Collective on the job's processes."""
+    def on_coarser_mesh(self) -> tuple[ContactSetup, Response, RollingModes]:
+        """Setup, response and its states of the tire with elements of twice the size. Collective on the job's processes."""
         with console.quiet():
             job, done = coarser(self.job, self.static)
-        response, state = done["greens"].product.contact, done["static"].product
-        return equilibrated(job, done["setup"].product, response, state.normal_force), response
+        greens, state = done["greens"].product, done["static"].product
+        setup = equilibrated(job, done["setup"].product, greens.contact, state.normal_force)
+        return setup, greens.contact, greens.attached or done["rotating"].product
 
     @cached_property
     def longer(self) -> ContactForces:
@@ -262,9 +265,13 @@ class ReferenceRun:
         known = (name for name in names if name in self.__dict__)
         return self._keeping(*known, comm=MPI.COMM_SELF)
 
+    def holding(self) -> ReferenceRun:
+        """The same with a wheel whose rate is held, as a reference of its own."""
+        return self._keeping("equilibrated", "rolled", held=True)
+
     def same_loop(self, other: ReferenceRun) -> bool:
         """Whether both repeat as many steps of the same size by the same scheme, begun alike."""
-        names = ("step", "steps", "scheme", "steady")
+        names = ("step", "steps", "scheme", "steady", "held")
         return all(getattr(self, name) == getattr(other, name) for name in names)
 
     def keeping_what(self, other: ReferenceRun) -> ReferenceRun:
@@ -286,16 +293,19 @@ class ReferenceRun:
         response: Response,
         coarser: int | None = None,
         contact: TreadContact | None = None,
+        states: RollingModes | None = None,
     ) -> ContactForces:
         """Repeat the loop with another setup (settled), response or `contact`.
 
-        `coarser`: factor on the time step, by default that of `base`. Collective on `comm`.
+        `coarser`: factor on the time step, by default that of `base`; `states` of the response, by default the run's, for
+        a wheel that turns freely. Collective on `comm`.
         """
         times = coarser or (1 if self.base is self.own else 2)
         step, steps = times * self.step, self.steps // times
         comm = self.comm or self.job.comm
         given = self.job, setup, response, step, steps, self.scheme, comm, contact
-        return forces(*given, self.steady)
+        known = None if self.held else states or self.attached or self.rolling
+        return forces(*given, self.steady, known)
 
 
 def equilibrated(
@@ -500,7 +510,8 @@ def _spectra(job: Job) -> list[Spectrum]:
 
 def coarser_mesh(reference: ReferenceRun) -> ContactForces:
     """Elements of twice the size, from the static state on. Collective."""
-    return reference.repeated(*reference.on_coarser_mesh)
+    setup, response, states = reference.on_coarser_mesh
+    return reference.repeated(setup, response, states=states)
 
 
 def finer_wall(reference: ReferenceRun) -> tuple[ContactForces, ContactForces | None]:
@@ -598,6 +609,12 @@ def companions(cause: str, reference: ReferenceRun) -> list[Companion]:
     """
     with console.quiet():
         beside = reference.own if cause == "step" else reference.base
+        if cause == "modes" and corner.turns_freely(reference.job):
+            # Fewer modes read no moment on the hub that could turn the wheel: both hold it.
+            reference = reference.holding()
+            beside = reference.base or reference.repeated(
+                reference.equilibrated, reference.response, 1
+            )
         told = COMPANIONS[cause](reference)
         if cause == "modes":
             pairs = [Companion(told, beside, within=FEWER)]

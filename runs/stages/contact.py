@@ -13,6 +13,7 @@ from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
 from tireroad.contact.choices import MOST_TOUCHING, USABLE
+from tireroad.contact.free_wheel import FreeWheel, with_spin
 from tireroad.contact.loop import ContactProblem, DrivenTire, Loop
 from tireroad.contact.model import solver_name
 from tireroad.contact.patch import Patch
@@ -46,7 +47,7 @@ from tireroad.runs.process import console
 from tireroad.runs.process.mpi import on_root_beside
 from tireroad.runs.process.signals import Deferred, Stopped
 from tireroad.runs.scene.tables.scene import RoadTable, Scene
-from tireroad.runs.stages import contact_file
+from tireroad.runs.stages import contact_file, corner
 from tireroad.runs.stages import setup as stages_setup
 from tireroad.runs.stages.contact_file import (
     ContactFile,
@@ -62,6 +63,7 @@ from tireroad.runs.stages.rolling import (
     Planned,
     chosen_scheme,
     driven_tire,
+    free_wheel,
     integration,
     planned,
     reported,
@@ -139,6 +141,8 @@ def rubbing(record: Record, friction: float, scene: Scene, lagging: int) -> None
     """Record the coefficient of friction; warn where horizontal forces are those of a road without any, and of steps whose
     forces lag."""
     record.headline["friction"] = (friction, "-")
+    if friction and scene.rotation is not None and scene.rotation.speed:
+        record.headline["the wheel's rate of rotation"] = (scene.rotation.wheel, "-")
     if friction:
         record.indicators["steps in which normal and horizontal forces lag behind each other"] = (
             lagging,
@@ -249,7 +253,7 @@ class Works:
     """Work (J) of the contact's force changes and of the prescribed forces, if any.
 
     `lead`: additional work of the forces that the scheme applies during the steps; `begun`: energy (J) in the tire before;
-    `nonlinear`: energy (J) that large motions have stored in the nonlinear force.
+    `nonlinear`: energy (J) that large motions have stored in the nonlinear force; `turned`: work (J) of a free wheel's inertia on the tire.
     """
 
     contact: float
@@ -257,18 +261,25 @@ class Works:
     lead: float
     begun: float = 0.0
     nonlinear: float | None = None
+    turned: float | None = None
 
     @property
     def total(self) -> float:
         """Work of all forces as if they were linear over the step, less what the nonlinear force stores."""
-        return self.contact + (self.driven or 0.0) - (self.nonlinear or 0.0)
+        return self.contact + (self.driven or 0.0) + (self.turned or 0.0) - (self.nonlinear or 0.0)
 
 
-def works(contact: Work, driven: DrivenTire | None, large: LargeTire | None = None) -> Works:
+def works(
+    contact: Work,
+    driven: DrivenTire | None,
+    large: LargeTire | None = None,
+    wheel: FreeWheel | None = None,
+) -> Works:
     """The works of a completed loop."""
-    lead = contact.lead + (driven.lead if driven else 0.0) + (large.lead if large else 0.0)
+    lead = contact.lead + sum(part.lead for part in (driven, large, wheel) if part)
     own = driven.work if driven else None
-    return Works(contact.total, own, lead, contact.begun, large.stored if large else None)
+    stored, turned = large.stored if large else None, wheel.work if wheel else None
+    return Works(contact.total, own, lead, contact.begun, stored, turned)
 
 
 class Losses:
@@ -280,7 +291,8 @@ class Losses:
         if isinstance(tire, Recursion) and StateMotion.known(rolling, response):
             self._motion = StateMotion(rolling, response.slow(chosen.step), chosen.step)
             resolved = response.resolved(chosen.step)
-            left_out = resolved.residual[: resolved.residual.shape[1]]
+            self._forces = resolved.residual.shape[1]  # without the spin of a free wheel
+            left_out = resolved.residual[: self._forces]
             self._circulation = Circulation(left_out * (not response.pulse), chosen.scheme)
             self._modes = resolved.of_modes.stop
             rate = -resolved.eigenvalue[self._modes :].real
@@ -308,7 +320,7 @@ class Losses:
     def begin(self, kept: dict[str, np.ndarray]) -> None:
         """Begin at the forces and states that the tire has at t = 0, `kept` in its snapshot."""
         if self._motion is not None:
-            self._circulation.begin(self._tire.force)
+            self._circulation.begin(self._tire.force[: self._forces])
             state, push = (kept[name][self._modes :].real for name in ("state", "push"))
             self._relaxed.begin(state, push)
 
@@ -317,7 +329,7 @@ class Losses:
         if self._motion is None or not (samples := self._tire.samples()):
             return
         states, pushes, acting, block = map(list, zip(*samples, strict=True))
-        forces, tire = np.array(acting), self._tire
+        forces, tire = np.array(acting)[:, : self._forces], self._tire
         every, pushed = tire.everywhere(states), tire.everywhere(pushes)
         count = self._modes
         self._motion.add(every[:, :count], pushed[:, :count], tire.block_everywhere(block))
@@ -362,6 +374,8 @@ def describe_energy(
     record.indicators["work of contact on the tire"] = (work.contact, "J")
     if work.driven is not None:
         record.indicators["work of the prescribed forces"] = (work.driven, "J")
+    if work.turned is not None:
+        record.indicators["work of the free wheel's inertia on the tire"] = (work.turned, "J")
     energies = energies_in(rolling, response, state, step)
     if energies is None:
         console.say(f"  energy: contact and forces put {total:.4g} J into the tire")
@@ -614,12 +628,15 @@ class ContactStage(Stage[ContactHistory]):
         response = large.response if large else self.greens.product.contact
         if large:
             plan = replace(plan, response=response.resolved(plan.step))
+        elif corner.turns_freely(self.job):
+            plan = replace(plan, response=with_spin(response, self._states).resolved(plan.step))
         chosen = integration(self.job, plan, scheme.scheme)
         if keeps_history(chosen.scheme):
             setup = replace(setup, steady=None)  # its history begins at t = 0
         with record.timing("tread and solver"):
             moved = self._moved(large, chosen)
-            driven = driven_tire(self.job, chosen, setup.patch, moved)
+            wheel = free_wheel(self.job, chosen)
+            driven = driven_tire(self.job, chosen, setup.patch, moved or wheel)
             loop = self._loop(record, setup, driven or moved or chosen.tire, chosen.step)
         totals = Totals(setup.patch, setup.reach, scheme.limit, work=Work(scheme.scheme))
         losses = Losses(chosen, response, self._states)
@@ -665,7 +682,8 @@ class ContactStage(Stage[ContactHistory]):
         stages_setup.describe(record, setup)
         contact_file.describe(record, setup, self.job.scene.road)
         if not keeps_history(chosen.scheme):
-            work = works(totals.work, driven if self.job.scene.force else None, moved)
+            pushed = driven if self.job.scene.force else None
+            work = works(totals.work, pushed, moved, wheel)
             given = self._states, response, loop.tire.snapshot(), work
             state = self.static.product
             pressed = float(state.normal_force.sum()) * (state.deflection or 0.0)

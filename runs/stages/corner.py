@@ -22,6 +22,7 @@ UNITS = {
     "body/height": "m",
     "hub_moment": "N m",
 }
+SPIN = "wheel/spin"
 _PLACES = {
     "wheel/translation": slice(0, 3),
     "wheel/rotation": slice(3, 6),
@@ -48,10 +49,16 @@ def readings(job: Job) -> int:
     return HUB_MOMENTS if held else 0
 
 
+def turns_freely(job: Job) -> bool:
+    """Whether the wheel's rate of rotation is found in the loop."""
+    return job.scene.rotation is not None and job.scene.rotation.wheel == "free"
+
+
 def layout(job: Job) -> dict[str, tuple[tuple, str]]:
     """Shape per step and unit of each reading, by the names in contact.h5."""
     names = {0: (), HUB_MOMENTS: ("hub_moment",)}.get(readings(job), tuple(UNITS))
-    return {name: ((3,) if name != "body/height" else (), UNITS[name]) for name in names}
+    shapes = {name: ((3,) if name != "body/height" else (), UNITS[name]) for name in names}
+    return shapes | ({SPIN: ((), "rad/s")} if turns_freely(job) else {})
 
 
 def fill(file: h5py.File, corner: Corner | None) -> None:
@@ -79,13 +86,17 @@ def standing_moment(patch: Patch) -> np.ndarray:
 
 
 def parts(readings: np.ndarray, static: np.ndarray) -> dict[str, np.ndarray]:
-    """Datasets of contact.h5 (n, ...) from readings (n, 10), or (n, 3) of moments alone.
+    """Datasets of contact.h5 (n, ...) from readings (n, 10), or (n, 3) of moments alone; behind them the rate of a free wheel, if it is one.
 
     `static` (3,) N m: the static moment, which is added.
     """
-    out = {"hub_moment": readings[:, -HUB_MOMENTS:] + static}
-    if readings.shape[1] > HUB_MOMENTS:
-        out |= {name: readings[:, place] for name, place in _PLACES.items()}
+    turns = readings.shape[1] not in (HUB_MOMENTS, READINGS)
+    held, spin = np.split(readings, [readings.shape[1] - turns], axis=1)
+    out = {"hub_moment": held[:, -HUB_MOMENTS:] + static}
+    if turns:
+        out[SPIN] = spin[:, 0]
+    if held.shape[1] > HUB_MOMENTS:
+        out |= {name: held[:, place] for name, place in _PLACES.items()}
         out["body/height"] = out["body/height"][:, 0]
     return out
 

@@ -12,7 +12,8 @@ from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
 from tireroad.contact.choices import LEAST_STEPS, TURN
-from tireroad.contact.loop import Block, DrivenTire, LinearTire, PushedTire, equal_steps, steps_of
+from tireroad.contact.free_wheel import FreeWheel, with_spin
+from tireroad.contact.loop import Block, DrivenTire, PushedTire, equal_steps, steps_of
 from tireroad.contact.patch import Patch
 from tireroad.contact.results.chatter import LARGE, Chosen, choose, oscillation
 from tireroad.contact.rolling import bristles, make_loop, rolling_steadily
@@ -20,6 +21,7 @@ from tireroad.contact.setup import ContactSetup
 from tireroad.greens.recursion import Convolution, Recursion, loop_communicator
 from tireroad.greens.response import Response
 from tireroad.greens.schemes import keeps_history
+from tireroad.modal.rolling import RollingModes
 from tireroad.runs.process import console
 from tireroad.runs.scene.physics import run_in_time
 from tireroad.runs.scene.tables.contact import TimeTable
@@ -163,6 +165,15 @@ def shortest_excitation(scene: Scene, setup: ContactSetup) -> float:
     return min(passing, shortest_period(scene.force))
 
 
+def free_wheel(job: Job, chosen: Integration) -> FreeWheel | None:
+    """The tire of the integration, of a response with the spin, on its wheel that turns freely; None if its rate is held."""
+    if not corner.turns_freely(job):
+        return None
+    assert isinstance(chosen.tire, Recursion), "the scene's rules refuse a convolution"
+    inertia = job.scene.axle.wheel_inertia[1]
+    return FreeWheel(chosen.tire, inertia, job.speed, chosen.step, chosen.scheme)
+
+
 def driven_tire(
     job: Job, chosen: Integration, patch: Patch, tire: PushedTire | None = None
 ) -> DrivenTire | None:
@@ -198,16 +209,18 @@ def forces(
     comm: MPI.Comm,
     contact=None,
     steady: bool = True,
+    states: RollingModes | None = None,
 ) -> ContactForces:
     """Run the loop of the job's scene with another response, step or setup (settled), in memory.
 
-    `scheme`: see greens.recursion; `contact` replaces the scene's table; `steady`: begun with steady rolling, else at rest.
+    `scheme`: see greens.recursion; `contact` replaces the scene's table; `steady`: begun with steady rolling, else at rest; `states` of
+    the response, for a wheel that turns freely: held without.
     Raises ConvergenceError if the road touches outside the patch, or nothing rolls steadily. Collective on `comm`.
     """
     if steady:
         setup = rolling_steadily(contact or job.scene.contact, setup, response, step)
     comm = loop_communicator(response.resolved(step), comm)
-    rolled = blocks(job, setup, response, step, steps, scheme, comm, contact)
+    rolled = blocks(job, setup, response, step, steps, scheme, comm, contact, states)
     both = [(block.total_force, block.axle_force) for block in rolled]
     total, axle = map(np.concatenate, zip(*both, strict=True))
     return ContactForces(total, axle, step)
@@ -222,14 +235,18 @@ def blocks(
     scheme: str,
     comm: MPI.Comm,
     contact=None,
+    states: RollingModes | None = None,
 ) -> Iterator[Block]:
     """The blocks of a loop as in `forces`, of a setup that rolls steadily, on the processes `comm` that share it. Collective
     on these."""
-    resolved, spec = response.resolved(step), contact or job.scene.contact
+    spec, resolved = contact or job.scene.contact, response.resolved(step)
+    turns = states is not None and corner.turns_freely(job) and spec.has_friction
+    if turns:
+        resolved = with_spin(response, states).resolved(step)
     tire = Recursion(response=resolved, step=step, scheme=scheme, comm=comm, look_ahead=True)
-    driven = driven_tire(job, Integration(tire, step, steps, scheme), setup.patch)
-    chosen: LinearTire = driven or tire
-    loop = make_loop(spec, setup, chosen, step)
+    chosen = Integration(tire, step, steps, scheme)
+    driven = driven_tire(job, chosen, setup.patch, free_wheel(job, chosen) if turns else None)
+    loop = make_loop(spec, setup, driven or tire, step)
     with threadpool_limits(1, "blas"):
         for block in loop.roll(setup.drive, step, steps):
             setup.patch.check_edge(block.force, block.time, setup.reach)

@@ -174,7 +174,8 @@ class StretchesStage(Computed[Stretches]):
         scheme = recursive(history.scheme)
         parts: dict[str, list[Array]] = {}
         arguments = self.job, setup, response, history.step, count, scheme, comm
-        for block in blocks(*arguments):
+        states = self.greens.product.attached or self.rotating.product
+        for block in blocks(*arguments, states=states):
             told = {"contact_force": block.total_force, "axle_force": block.axle_force}
             told |= self._read(setup, block.reading)
             for name, values in told.items():

@@ -541,6 +541,12 @@ class RotationTable:
         "contact.slip adds, and is dragged by its rolling resistance; bristles then feel "
         "the local speeds of the static shape; absent: true with friction",
     )
+    wheel: str = choice(
+        "held",
+        ("held", "free"),
+        "rate of rotation in the time loop: held, or free: the wheel's inertia (axle.wheel_inertia, about y) follows the moment about "
+        "the axle beyond that in which the loop begins",
+    )
     slip_angle: float = number(
         0.0,
         "deg",
