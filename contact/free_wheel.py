@@ -36,13 +36,13 @@ def with_spin(response: Response, rolling: RollingModes) -> Response:
     q . f_w / w in kg m2 and kg m2/s, as its last outputs.
 
     `response` of the states of `rolling`, its last outputs the hub moments. What no state contains is not moved by these
-    loads. InputError where some states are not the modes' own, or the hub moments are not read.
+    loads. InputError where some states are not the modes' own, or the hub moments are not read. Not collective.
     """
     corner, states = rolling.basis.projection.corner, rolling.states
     if corner is None or response.moments is None or not own_states(response, rolling):
         raise InputError(
-            'rotation.wheel = "free" needs output.axle_force, and all states of the modes in the loop: no greens.dynamic, and '
-            'rotation.method = "projected"'
+            'rotation.wheel = "free" needs the hub moments, and all states of the modes in the loop: output.axle_force, no '
+            'greens.dynamic, and rotation.method = "projected"'
         )
     turning = rolling.turning
     _, rate, inertia = Basis.of(rolling).projection.moments(turning.speed, turning.inertia)

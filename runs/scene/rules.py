@@ -12,7 +12,6 @@ from tireroad.contact.roads.road import placed
 from tireroad.contact.roads.under_tire import Road, begun_at, is_level, moved_start, shown
 from tireroad.fem.errors import InputError
 from tireroad.greens.residuals import names, residual_of
-from tireroad.greens.schemes import keeps_history
 from tireroad.runs.scene.outputs import Output, check_steps
 from tireroad.runs.scene.road_cache import road_of
 from tireroad.runs.scene.schema import Source, Where
@@ -387,8 +386,6 @@ def _contact(contact: ContactTable, scene: Scene, raw: Raw, error: Where) -> Non
             ("rotation", "free_rolling"),
             "does not exist with contact.friction = 0: any slip is free",
         )
-    if rotation is not None and rotation.wheel == "free":
-        _free_wheel(contact, scene, error)
     for key, pulls in (
         ("free_rolling", contact.has_friction),
         ("slip_angle", contact.has_friction or has_friction),
@@ -399,24 +396,6 @@ def _contact(contact: ContactTable, scene: Scene, raw: Raw, error: Where) -> Non
                 "needs contact.friction or contact.brush_stiffness_per_area (N/m³), without which no road pulls on the "
                 "tire, and a wheel that turns",
             )
-
-
-def _free_wheel(contact: ContactTable, scene: Scene, error: Where) -> None:
-    """Raise an error where the loop cannot find how a free wheel turns."""
-    rotation, time = scene.rotation, scene.time
-    assert rotation is not None, "a wheel that turns"
-    for met, wanted in (
-        (contact.has_friction and contact.brush == "rolling", "contact.friction, or bristles that roll"),
-        (rotation.speed != 0, "a wheel that turns: rotation.speed"),
-        (rotation.method == "projected", 'rotation.method = "projected"'),
-        (scene.greens.dynamic is None, "all states in the loop: no greens.dynamic"),
-        (scene.motion.kind == "linear", 'motion.kind = "linear"'),
-        (time is None or not keeps_history(time.scheme), "another time.scheme than convolution"),
-        (scene.output.axle_force and scene.modes.on_axle_alone, "output.axle_force, of a tire that the road does not hold"),
-        (scene.axle.kind == "fixed" or "ry" in scene.axle.locked, "ry in axle.locked: its rate is then held by the axle only in the states"),
-    ):  # fmt: skip
-        if not met:
-            raise error(("rotation", "wheel"), f'= "free" needs {wanted}')
 
 
 def _time(time: TimeTable, scene: Scene, raw: Raw, error: Where) -> None:

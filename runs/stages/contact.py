@@ -141,8 +141,15 @@ def rubbing(record: Record, friction: float, scene: Scene, lagging: int) -> None
     """Record the coefficient of friction; warn where horizontal forces are those of a road without any, and of steps whose
     forces lag."""
     record.headline["friction"] = (friction, "-")
-    if friction and scene.rotation is not None and scene.rotation.speed:
-        record.headline["the wheel's rate of rotation"] = (scene.rotation.wheel, "-")
+    rotation, why = scene.rotation, corner.held_by(scene)
+    if friction and rotation is not None and rotation.speed:
+        free = rotation.wheel == "free" and not why
+        record.headline["the wheel's rate of rotation"] = ("free" if free else "held", "-")
+        if rotation.wheel == "free" and why:
+            record.warnings.append(
+                f"the wheel's rate of rotation is held, since a free one does not go with {why}: the force along a rough road lacks most of "
+                "what it has below 50 Hz, and its mean is not the rolling resistance"
+            )
     if friction:
         record.indicators["steps in which normal and horizontal forces lag behind each other"] = (
             lagging,

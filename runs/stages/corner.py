@@ -11,9 +11,11 @@ from tireroad.contact.patch import Patch
 from tireroad.fem.wheel import Axle
 from tireroad.greens.basis import Basis
 from tireroad.greens.outputs import disagreement
+from tireroad.greens.schemes import keeps_history
 from tireroad.modal.corner import ARRAYS, HUB_MOMENTS, READINGS, Corner
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
+from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.stages.stage import Job, Record
 
 UNITS = {
@@ -50,8 +52,26 @@ def readings(job: Job) -> int:
 
 
 def turns_freely(job: Job) -> bool:
-    """Whether the wheel's rate of rotation is found in the loop."""
-    return job.scene.rotation is not None and job.scene.rotation.wheel == "free"
+    """Whether the wheel's rate of rotation is found in the loop: asked for, on a road that rubs it, and possible."""
+    contact, rotation = job.scene.contact, job.scene.rotation
+    rolls = contact is not None and contact.has_friction and contact.brush == "rolling"
+    asked = rotation is not None and rotation.speed != 0 and rotation.wheel == "free"
+    return rolls and asked and held_by(job.scene) is None
+
+
+def held_by(scene: Scene) -> str | None:
+    """What keeps the loop from letting a wheel turn freely; None: nothing."""
+    rotation, axle = scene.rotation, scene.axle
+    reasons = {
+        'rotation.method = "full"': rotation is not None and rotation.method == "full",
+        "greens.dynamic, without some of the states": scene.greens.dynamic is not None,
+        f'motion.kind = "{scene.motion.kind}"': scene.motion.kind != "linear",
+        "a convolution": keeps_history(scene.time.scheme),
+        "the rim or the road that modal holds": not scene.modes.on_axle_alone,
+        "output.axle_force = false": not scene.output.axle_force,
+        "ry that is not in axle.locked": axle.kind != "fixed" and "ry" not in axle.locked,
+    }
+    return next((reason for reason, holds in reasons.items() if holds), None)
 
 
 def layout(job: Job) -> dict[str, tuple[tuple, str]]:

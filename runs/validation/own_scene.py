@@ -48,7 +48,7 @@ def against_elements(scene: Path, duration: float = LONGEST) -> list[Table]:
     """Error of a scene's modes and time step: its forces against full finite elements, direction by direction.
 
     The scene is run as it stands but for its first `duration` s of road (or what it has), on one process. Full finite
-    elements of the same mesh, in the same state, with the same points, tread, friction and damping take steps of the same
+    elements of the same mesh, in the same state, with the same points, tread, friction and damping, their wheel at a given rate, take steps of the same
     size and of half of it: the second are the reference, and what the first are off from it bounds its own error. Where
     moduli depend on frequency, its modes are run with those of the elements besides. The mesh's
     own error is not in it (`[accuracy] estimate`). InputError for a scene without contact, or that forces drive.
@@ -67,6 +67,7 @@ def against_elements(scene: Path, duration: float = LONGEST) -> list[Table]:
         f"time.duration={length!r}",
         "accuracy.estimate=false",
         "static.error_estimate=false",
+        *(["rotation.wheel=held"] if given.rotation else []),
     ]
     with tempfile.TemporaryDirectory(prefix="tireroad-validate-") as folder:
         began = time.process_time()

@@ -544,8 +544,8 @@ class RotationTable:
     wheel: str = choice(
         "held",
         ("held", "free"),
-        "rate of rotation in the time loop: held, or free: the wheel's inertia (axle.wheel_inertia, about y) follows the moment about "
-        "the axle beyond that in which the loop begins",
+        "rate of rotation in the time loop, with friction: held, or free: the wheel's inertia (axle.wheel_inertia, about y) follows the "
+        "moment about the axle beyond that in which the loop begins",
     )
     slip_angle: float = number(
         0.0,
