@@ -117,7 +117,12 @@ def foot(road: RoadTable) -> float | None:
 
 
 def within_run_in(road: RoadTable, place: float, share: float | None = None) -> str:
-    """A warning of an obstacle at x = `place` (m) that is met at a `share` of its height only."""
+    """A warning of an obstacle at x = `place` (m) that is met at a `share` of its height only, or with an edge that it has not."""
+    if road.run_in == 0.0:
+        return (
+            f"the {road.kind} begins at x = {shown(place)} m, under the tire at rest, where the road is level: what of it lies ahead of the "
+            "foremost contact point is met as a step; raise road.position"
+        )
     met = "less" if share is None else f"{100 * share:.2g} %"
     return (
         f"the {road.kind} at x = {shown(place)} m lies in the run-in, over which the road grows from flat: it is "

@@ -8,7 +8,7 @@ import pytest
 from tireroad.fem.errors import InputError
 from tireroad.runs.check import explain
 from tireroad.runs.scene.load import load
-from tireroad.runs.scene.rules import foot
+from tireroad.runs.scene.rules import foot, within_run_in
 
 SCENE = """
 [static]
@@ -99,6 +99,15 @@ def test_check_says_that_a_cleat_lies_in_the_run_in(
     scene.write_text(text.replace("speed = 50", "speed = 50\nrolling_radius = 0.3"))
     told = explain(load(scene, [f"road.{one}" for one in more]))
     assert ("warning: the cleat at x = 0.07 m lies in the run-in" in told) == said
+
+
+def test_without_a_run_in_a_cleat_under_the_tire_is_said_to_be_met_as_a_step(scene: Path) -> None:
+    """It was said to lie in a run-in of 0 m, to be shortened."""
+    text = SCENE.replace('"grid"', '"cleat"').replace('file = "road.npz"\n', "")
+    scene.write_text(text)
+    road = load(scene, ["road.run_in=0", "road.position=0.05"]).road
+    told = within_run_in(road, 0.05, 0.0)
+    assert "0.05 m" in told and "as a step" in told and "run_in" not in told
 
 
 def test_a_road_without_edges_has_no_foot(scene: Path) -> None:
