@@ -60,7 +60,7 @@ def turns_freely(job: Job) -> bool:
 
 
 def held_by(scene: Scene) -> str | None:
-    """What keeps the loop from letting a wheel turn freely; None: nothing."""
+    """The setting of a scene with which the loop cannot let a wheel turn freely; None: there is none."""
     rotation, axle = scene.rotation, scene.axle
     reasons = {
         'rotation.method = "full"': rotation is not None and rotation.method == "full",
