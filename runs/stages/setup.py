@@ -79,6 +79,7 @@ def loop_inputs(job: Job, setup: ContactSetup) -> dict:
         "files": [store.file_hash(file) for file in scene.road.surface.files],
         "speed": setup.rolled.speed,
         "slip": [rolls_freely(scene), scene.rotation.slip_angle] if scene.rotation else None,
+        "wheel": [scene.rotation.wheel, *scene.axle.wheel_inertia] if scene.rotation else None,
         "axle_force": scene.output.axle_force,
         "forces": [asdict(force) for force in scene.force],
         "time": {k: v for k, v in asdict(scene.time).items() if k != "checkpoint"},
