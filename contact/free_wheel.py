@@ -18,12 +18,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy import sparse
 
 from tireroad.contact.loop import PushedTire, SteadyTire, looking_ahead
 from tireroad.contact.results.energy import own_states
 from tireroad.fem.errors import InputError
 from tireroad.greens.basis import Basis
-from tireroad.greens.response import Response
+from tireroad.greens.response import Response, couple, reading
 from tireroad.greens.schemes import SCHEMES
 from tireroad.modal.corner import HUB_MOMENTS, MOMENTS
 from tireroad.modal.rolling import RollingModes
@@ -44,26 +45,26 @@ def with_spin(response: Response, rolling: RollingModes) -> Response:
             'rotation.wheel = "free" needs the hub moments, and all states of the modes in the loop: output.axle_force, no '
             'greens.dynamic, and rotation.method = "projected"'
         )
-    turning = rolling.turning
-    _, rate, inertia = Basis.of(rolling).projection.moments(turning.speed, turning.inertia)
-    push = np.stack([-inertia[_Y], rate[_Y]])
-    # The moments answer at once as they do to any other load (greens.response.reading), and by the tire's own inertia.
-    poles = -(inertia @ states.right) * states.eigenvalue - rate @ states.right
-    block = -(inertia @ states.block_right) @ states.block - rate @ states.block_right
-    into, into_block = states.left @ push.T, states.block_left @ push.T
-    direct = (poles @ into).real + block @ into_block
-    direct[:, 0] -= corner.own_mass[MOMENTS, MOMENTS][:, _Y]
+    basis, turning = Basis.of(rolling), rolling.turning
+    moments = basis.projection.moments(turning.speed, turning.inertia)
+    push = np.stack([-moments[2, _Y], moments[1, _Y]])
+    # The hub moments, and what does work with the loads, as they read these alone.
+    outputs = np.vstack([np.zeros((HUB_MOMENTS, push.shape[1])), push])
+    hub = sparse.eye(len(outputs), HUB_MOMENTS, format="csr")
+    wheel = couple(states, outputs, push, basis.carried)
+    wheel = reading(wheel, states, hub, moments.reshape(3 * HUB_MOMENTS, -1))
+    wheel.residual[:HUB_MOMENTS, 0] -= corner.own_mass[MOMENTS, MOMENTS][:, _Y]
     r, k = response.residual.shape
     residual = np.zeros((r + 2, k + 2))
-    residual[:r, :k], residual[r - HUB_MOMENTS : r, k:] = response.residual, direct
-    none = np.zeros((response.relaxing, 2))
+    residual[:r, :k], residual[r - HUB_MOMENTS :, k:] = response.residual, wheel.residual
+    none, own = np.zeros((response.relaxing, 2)), slice(HUB_MOMENTS, None)
     slope = response.slope
     return replace(
         response,
-        output=np.vstack([response.output, np.hstack([push @ states.right, none.T])]),
-        input=np.hstack([response.input, np.vstack([into, none])]),
-        block_output=np.vstack([response.block_output, push @ states.block_right]),
-        block_input=np.hstack([response.block_input, into_block]),
+        output=np.vstack([response.output, np.hstack([wheel.output[own], none.T])]),
+        input=np.hstack([response.input, np.vstack([wheel.input, none])]),
+        block_output=np.vstack([response.block_output, wheel.block_output[own]]),
+        block_input=np.hstack([response.block_input, wheel.block_input]),
         residual=residual,
         moments=np.append(response.moments, [False, False]),
         left_out=_beside(response.left_out),
@@ -102,7 +103,7 @@ class FreeWheel:
         )
         self.ahead, self.turning = looking_ahead(tire), self
         self._scheme = SCHEMES[scheme]
-        self.rate = self.work = self.lead = self._held = 0.0
+        self.work = self.lead = self._held = 0.0
         self._along, self._loads = np.zeros(2), np.zeros((2, 2))  # w', w after the last two steps
 
     @staticmethod
@@ -110,6 +111,11 @@ class FreeWheel:
         """Outputs with the rate in place of what does work with the wheel's loads."""
         seen[-2] = rate
         return seen[:-1]
+
+    @property
+    def rate(self) -> float:
+        """w, 1/s, at the end of the last step."""
+        return float(self._loads[-1, 1])
 
     @property
     def slip(self) -> float:
@@ -139,8 +145,7 @@ class FreeWheel:
     def advance(self, force: np.ndarray) -> None:
         """Set the forces (k,) N at the end of the step."""
         now = self._follows + float(self._turns @ force)
-        self.rate = self._known + self._half * now
-        path = np.vstack([self._loads, [now, self.rate]])
+        path = np.vstack([self._loads, [now, self._known + self._half * now]])
         self._tire.advance(np.concatenate([force, path[-1]]))
         along = self._free[-2:] + self._answer @ force + self._own[-2:] * now
         way, mean = along - self._along, 0.5 * (path[1] + path[2])
@@ -163,6 +168,5 @@ class FreeWheel:
         spin = state["spin"]
         self.work, self.lead, self._held = spin[:3].tolist()
         self._along, self._loads = spin[3:5].copy(), spin[5:].reshape(2, 2).copy()
-        self.rate = float(self._loads[-1, 1])
         acting = np.concatenate([state["push_force"], self._loads[-1]])
         self._tire.restore(state | {"push_force": acting})

@@ -679,7 +679,7 @@ class Loop:
     """The parts of a time loop that have a history, which a checkpoint must keep.
 
     `begun`: changes (k,) N of the forces and displacements (r,) m of the nodes at t = 0, from the static state; None: none.
-    `slips`: of the wheel at its given rate, (2,) or (c, 2), where the tire's own slip comes on top.
+    `slips`: (2,) or (c, 2) at a given rate, to which that of a wheel that turns freely is added; None: its rate is held.
     """
 
     tire: LinearTire

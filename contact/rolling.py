@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 
-from tireroad.contact.loop import ContactProblem, LinearTire, Loop, RoadMet
+from tireroad.contact.loop import ContactProblem, LinearTire, Loop, RoadMet, turning
 from tireroad.contact.model import ContactSpec, step_solver, tread_memory, tread_shear
 from tireroad.contact.patch import Patch
 from tireroad.contact.setup import ContactSetup, SteadyRolling
@@ -50,7 +50,7 @@ def make_loop(
     solver = step_solver(spec, patch, felt[:p, :p], at_once)
     friction = _friction(spec, setup, felt, step, at_once, tolerance) if spec.has_friction else None
     problem = ContactProblem(patch, felt, solver, friction, of_nodes=tire.same_step)
-    loop = Loop(tire, problem, memory, slips=setup.slips if friction else None)
+    loop = Loop(tire, problem, memory, slips=setup.slips if turning(tire) else None)
     return loop.begun_at(setup.steady.state, setup.steady.change) if setup.steady else loop
 
 

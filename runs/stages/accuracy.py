@@ -205,6 +205,11 @@ class ReferenceRun:
         return rolling_steadily(spec, setup, self.response, 2 * self.step)
 
     @property
+    def states(self) -> RollingModes:
+        """The modes, with the attachment modes where there are any, whose states the response has."""
+        return self.attached or self.rolling
+
+    @property
     def probes(self) -> Probes:
         """The points between which the response is."""
         return probes(self.job, self.static.product, self.setup)
@@ -216,7 +221,7 @@ class ReferenceRun:
             job, done = coarser(self.job, self.static)
         greens, state = done["greens"].product, done["static"].product
         setup = equilibrated(job, done["setup"].product, greens.contact, state.normal_force)
-        return setup, greens.contact, greens.attached or done["rotating"].product
+        return setup, greens.contact, greens.states(done["rotating"].product)
 
     @cached_property
     def longer(self) -> ContactForces:
@@ -304,8 +309,7 @@ class ReferenceRun:
         step, steps = times * self.step, self.steps // times
         comm = self.comm or self.job.comm
         given = self.job, setup, response, step, steps, self.scheme, comm, contact
-        known = None if self.held else states or self.attached or self.rolling
-        return forces(*given, self.steady, known)
+        return forces(*given, self.steady, None if self.held else states or self.states)
 
 
 def equilibrated(
@@ -480,7 +484,7 @@ def fewer_modes(reference: ReferenceRun) -> ContactForces:
     A response of the same kind (greens.fewer_modes). Of the states of a `full` problem, and of those chosen by greens.dynamic,
     the ones from there to the highest are static instead; states above the highest mode are kept.
     """
-    rolling, response = reference.attached or reference.rolling, reference.response
+    rolling, response = reference.states, reference.response
     if rolling.full or reference.job.scene.greens.dynamic is not None:
         limits = FEWER * rolling.highest, rolling.highest
         coarse = response.keeping_where(
@@ -609,7 +613,7 @@ def companions(cause: str, reference: ReferenceRun) -> list[Companion]:
     """
     with console.quiet():
         beside = reference.own if cause == "step" else reference.base
-        if cause == "modes" and corner.turns_freely(reference.job):
+        if cause == "modes" and corner.turns_freely(reference.job.scene):
             # Fewer modes read no moment on the hub that could turn the wheel: both hold it.
             reference = reference.holding()
             beside = reference.base or reference.repeated(

@@ -141,11 +141,10 @@ def rubbing(record: Record, friction: float, scene: Scene, lagging: int) -> None
     """Record the coefficient of friction; warn where horizontal forces are those of a road without any, and of steps whose
     forces lag."""
     record.headline["friction"] = (friction, "-")
-    rotation, why = scene.rotation, corner.held_by(scene)
+    rotation, free = scene.rotation, corner.turns_freely(scene)
     if friction and rotation is not None and rotation.speed:
-        free = rotation.wheel == "free" and not why
         record.headline["the wheel's rate of rotation"] = ("free" if free else "held", "-")
-        if rotation.wheel == "free" and why:
+        if rotation.wheel == "free" and (why := corner.held_by(scene)):
             record.warnings.append(
                 f"the wheel's rate of rotation is held, since a free one does not go with {why}: the force along a rough road lacks most of "
                 "what it has below 50 Hz, and its mean is not the rolling resistance"
@@ -635,14 +634,15 @@ class ContactStage(Stage[ContactHistory]):
         response = large.response if large else self.greens.product.contact
         if large:
             plan = replace(plan, response=response.resolved(plan.step))
-        elif corner.turns_freely(self.job):
+        turns = corner.turns_freely(self.job.scene)
+        if turns:
             plan = replace(plan, response=with_spin(response, self._states).resolved(plan.step))
         chosen = integration(self.job, plan, scheme.scheme)
         if keeps_history(chosen.scheme):
             setup = replace(setup, steady=None)  # its history begins at t = 0
         with record.timing("tread and solver"):
             moved = self._moved(large, chosen)
-            wheel = free_wheel(self.job, chosen)
+            wheel = free_wheel(self.job, chosen) if turns else None
             driven = driven_tire(self.job, chosen, setup.patch, moved or wheel)
             loop = self._loop(record, setup, driven or moved or chosen.tire, chosen.step)
         totals = Totals(setup.patch, setup.reach, scheme.limit, work=Work(scheme.scheme))
@@ -738,7 +738,7 @@ class ContactStage(Stage[ContactHistory]):
     @property
     def _states(self) -> RollingModes:
         """The modes, with the attachment modes where there are any, whose states the loop has."""
-        return self.greens.product.attached or self.rotating.product
+        return self.greens.product.states(self.rotating.product)
 
     def _loop(self, record: Record, setup: ContactSetup, tire, step: float) -> Loop:
         """The loop of tire, normal solver and friction at the patch's points; recorded."""

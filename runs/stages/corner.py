@@ -51,12 +51,12 @@ def readings(job: Job) -> int:
     return HUB_MOMENTS if held else 0
 
 
-def turns_freely(job: Job) -> bool:
+def turns_freely(scene: Scene) -> bool:
     """Whether the wheel's rate of rotation is found in the loop: asked for, on a road that rubs it, and possible."""
-    contact, rotation = job.scene.contact, job.scene.rotation
+    contact, rotation = scene.contact, scene.rotation
     rolls = contact is not None and contact.has_friction and contact.brush == "rolling"
     asked = rotation is not None and rotation.speed != 0 and rotation.wheel == "free"
-    return rolls and asked and held_by(job.scene) is None
+    return rolls and asked and held_by(scene) is None
 
 
 def held_by(scene: Scene) -> str | None:
@@ -78,7 +78,7 @@ def layout(job: Job) -> dict[str, tuple[tuple, str]]:
     """Shape per step and unit of each reading, by the names in contact.h5."""
     names = {0: (), HUB_MOMENTS: ("hub_moment",)}.get(readings(job), tuple(UNITS))
     shapes = {name: ((3,) if name != "body/height" else (), UNITS[name]) for name in names}
-    return shapes | ({SPIN: ((), "rad/s")} if turns_freely(job) else {})
+    return shapes | ({SPIN: ((), "rad/s")} if turns_freely(job.scene) else {})
 
 
 def fill(file: h5py.File, corner: Corner | None) -> None:

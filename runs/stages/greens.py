@@ -87,6 +87,10 @@ class Responses:
     force: Response | None = None
     attached: RollingModes | None = None
 
+    def states(self, rolling: RollingModes) -> RollingModes:
+        """The modes whose states the responses have: those `rolling`, or with the attachment modes that joined them."""
+        return self.attached or rolling
+
     @property
     def named(self) -> dict[str, Response]:
         """The responses that exist, by name."""

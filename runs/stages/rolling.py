@@ -165,11 +165,9 @@ def shortest_excitation(scene: Scene, setup: ContactSetup) -> float:
     return min(passing, shortest_period(scene.force))
 
 
-def free_wheel(job: Job, chosen: Integration) -> FreeWheel | None:
-    """The tire of the integration, of a response with the spin, on its wheel that turns freely; None if its rate is held."""
-    if not corner.turns_freely(job):
-        return None
-    assert isinstance(chosen.tire, Recursion), "the scene's rules refuse a convolution"
+def free_wheel(job: Job, chosen: Integration) -> FreeWheel:
+    """The tire of the integration, of a response with the spin, on the job's wheel that turns freely."""
+    assert isinstance(chosen.tire, Recursion), "in a convolution the wheel is held"
     inertia = job.scene.axle.wheel_inertia[1]
     return FreeWheel(chosen.tire, inertia, job.speed, chosen.step, chosen.scheme)
 
@@ -240,7 +238,7 @@ def blocks(
     """The blocks of a loop as in `forces`, of a setup that rolls steadily, on the processes `comm` that share it. Collective
     on these."""
     spec, resolved = contact or job.scene.contact, response.resolved(step)
-    turns = states is not None and corner.turns_freely(job) and spec.has_friction
+    turns = states is not None and corner.turns_freely(job.scene) and spec.has_friction
     if turns:
         resolved = with_spin(response, states).resolved(step)
     tire = Recursion(response=resolved, step=step, scheme=scheme, comm=comm, look_ahead=True)

@@ -174,7 +174,7 @@ class StretchesStage(Computed[Stretches]):
         scheme = recursive(history.scheme)
         parts: dict[str, list[Array]] = {}
         arguments = self.job, setup, response, history.step, count, scheme, comm
-        states = self.greens.product.attached or self.rotating.product
+        states = self.greens.product.states(self.rotating.product)
         for block in blocks(*arguments, states=states):
             told = {"contact_force": block.total_force, "axle_force": block.axle_force}
             told |= self._read(setup, block.reading)

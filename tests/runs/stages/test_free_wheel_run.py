@@ -73,13 +73,13 @@ def datasets(folder) -> dict[str, np.ndarray]:
         return {name: file[name][:] for name in names if name in file}
 
 
-def indicators(folder, stage: str = "contact") -> dict:
-    return json.loads((folder / "summary.json").read_text())["stages"][stage]["indicators"]
+def told_by(folder, stage: str = "contact") -> dict:
+    return json.loads((folder / "summary.json").read_text())["stages"][stage]
 
 
 def test_moment_and_energy_add_up_and_nothing_drives_the_wheel(run) -> None:
     folder = run("free")
-    found, told = datasets(folder), indicators(folder)
+    found, told = datasets(folder), told_by(folder)["indicators"]
     spin, moment = found["wheel/spin"], found["hub_moment"][:, 1]
     turned = np.cumsum(0.5 * STEP * (moment[1:] + moment[:-1]))
     off = spin[1:] - spin[0] - turned / INERTIA
@@ -88,7 +88,7 @@ def test_moment_and_energy_add_up_and_nothing_drives_the_wheel(run) -> None:
     assert np.abs(off - np.polyval(drift, np.arange(len(off)))).max() < 1e-3 * np.ptp(spin)
     assert abs(drift[0]) / STEP * INERTIA < 2e-4 * 400.0 * 0.3
     still = run("held", "rotation.wheel=held")
-    held, before = datasets(still), indicators(still)
+    held, before = datasets(still), told_by(still)["indicators"]
     off, known = (one["energy that does not add up"]["value"] for one in (told, before))
     assert abs(off) < 1.2 * abs(known) < 5e-3 * told["energy lost in the material"]["value"]
     assert abs(told["work of the free wheel's inertia on the tire"]["value"]) > 0.1 * abs(known)
@@ -127,12 +127,11 @@ def test_it_goes_on_from_a_checkpoint_to_the_same_bits(run, monkeypatch) -> None
 
 @pytest.mark.long
 def test_error_bars_of_a_free_wheel(run) -> None:
-    told = json.loads((run("bars", until="accuracy") / "summary.json").read_text())
-    bars = told["stages"]["accuracy"]
-    with h5py.File(run("bars", until="accuracy") / "accuracy.h5") as file:
+    folder = run("bars", until="accuracy")
+    with h5py.File(folder / "accuracy.h5") as file:
         for cause in ("step", "points", "modes", "mesh"):
             assert np.isfinite(file[f"axle_force/{cause}/history"][:]).all(), cause
-    assert not bars.get("warnings")
+    assert not told_by(folder, "accuracy").get("warnings")
 
 
 @pytest.mark.mpi
@@ -141,10 +140,8 @@ def test_processes_that_share_the_states_turn_it_alike(run, monkeypatch) -> None
     alone = MPI.COMM_WORLD.bcast(alone)
     monkeypatch.setattr(recursion, "SHARED_FROM", 0.0)
     shared = datasets(run("shared", "time.duration=0.02", comm=MPI.COMM_WORLD))
-    for (
-        name,
-        values,
-    ) in alone.items():  # later on friction makes much of the rounding of several processes
+    # Later on friction makes much of the rounding of several processes.
+    for name, values in alone.items():
         off, size = np.abs(shared[name] - values), np.ptp(values, axis=0).max()
         assert off.max() < 0.05 * size and off[:20].max() < 1e-4 * size, name
 
@@ -161,8 +158,7 @@ def test_processes_that_share_the_states_turn_it_alike(run, monkeypatch) -> None
 def test_what_holds_it_is_said(run, sets, wanted) -> None:
     folder = run("still", "time.duration=0.01", *sets)
     assert "wheel/spin" not in datasets(folder)
-    told = json.loads((folder / "summary.json").read_text())["stages"]["contact"]["warnings"]
-    said = [text for text in told if "rate of rotation is held" in text]
+    said = [text for text in told_by(folder)["warnings"] if "rate of rotation is held" in text]
     assert (len(said) == 1 and wanted in said[0]) if wanted else not said
 
 
