@@ -471,9 +471,7 @@ class ContactProblem:
         }
         self._held |= {
             "points": c, "nodes": p, "components": self.components, "which": COMPILED.ints(np.empty(3 * p, np.int32)),
-            "w_begin": up.begin, "w_column": up.column, "w_value": up.value,
-            "t_begin": down.begin, "t_column": down.column, "t_value": down.value,
-        }  # fmt: skip
+        } | up.named("w_") | down.named("t_")  # fmt: skip
         self._compiled = COMPILED.ffi.new("meeting *", self._held)
 
     @property

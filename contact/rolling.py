@@ -274,6 +274,8 @@ class _Rolled:
         contact, memory = self.loop.contact, self.loop.memory
         state = contact.state() | (memory.state() if memory else {})
         state["lagging"] = np.zeros(2, int)  # counted from the loop's first step on
+        if "secants" in state:  # of this tire, not of the whole one
+            state["secants"] = state["secants"][:, :0]
         for name in ("moved", "tip"):
             state[name] = state[name] + [0.0, self._left_out @ contact.change]
         return state

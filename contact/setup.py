@@ -23,7 +23,7 @@ from tireroad.contact.tread.pattern import Pattern
 from tireroad.fem.static.road import RoadShape
 from tireroad.greens.response import Response
 
-_RUNG = 1.1
+_RUNG = 1.5  # of five seeds of a rough road the highest spots were within a factor of 2.1
 _APART = 1e-3  # of a point's half size: distance of the heights whose difference is a slope
 
 

@@ -113,28 +113,41 @@ int stick_slip_solve(stick_slip *s, double tolerance);
 int krylov(int n, int (*apply)(void *, const double *, double *), void *of, const double *right, double tolerance,
            double *x);
 
-/* A Newton step of normal and tangential forces at once, between `count` points of a grid: (contact/solver/grid_newton.py). */
+/* Normal and horizontal forces of a step at once, between the points of a box of a grid (contact/solver/grid_newton.py). */
 typedef struct {
     plane *compliance;                    /* the nodes and the tread; the tire's part of it is here: */
-    const double *tire;                   /* (3p, 3p) in z, x, y, by columns; or 0, and between nodes near each other */
-    const int *n_begin, *n_column;
+    const double *tire;                   /* (3p, 3p) in z, x, y, by columns; */
+    const int *n_begin, *n_column;        /* and between nodes near each other, or 0 where that is too little of it */
     const double *n_value;
     const double *pressed;                /* kernel zz of the tread, laid out as the others */
-    int count;
-    const int *index;                     /* (a,) points */
-    const double *slope;                  /* (a, 2) of the road under them */
-    const double *own, *beside, *spring;  /* (a,) m/N: diagonals normal to the road and in its plane; in series there */
-    const double *direction, *share;      /* (2, a), (a,) of what slips: the projection's derivative is b/|t| (I - n n^T) */
-    const uint8_t *kept;                  /* (2, a): whether the normal force, and that in the plane, is not to change */
-    double friction, caution;
-    int reach;                            /* cells up to which the tread's kernels are read */
+    double friction, caution;             /* negative: nothing slips */
+    const double *at_rest;                /* (c,) N */
+    const double *own, *beside, *spring;  /* (c,) m/N: diagonals normal to the road and in its plane; in series there */
+    int inside, near;                     /* points of the box; cells up to which a Newton step reads the tread's kernels */
+    const int *index;
+    const double *open, *free, *past, *height; /* of the step: (c,) m gaps over height 0; (2, c) m of nodes, and of bristles; (c,) m */
+    const uint8_t *bears;                 /* (c,) whether bristles do */
+    double *force, *slope;                /* (3, c) N; (c, 2) of the road under them */
+    double *moved, *base, *place;         /* (3, c), (2, c), (2, c) m: by the tire; of the bristles' two ends */
+    double *gap, *slip, *trial;           /* (c,) m, (2, c) m, (2, c) N in the box */
+    uint8_t *touches;                     /* (c,) in the box */
+    double residual, off, most;           /* of gaps, of the largest; N in the plane; the most that a point may bear there, N */
     int reads;                            /* whether the road is read where the points move to */
-    double *nodal, *nodes, *value;        /* workspace: (3p,) each */
-    int *which;
-    double *force, *field;                /* workspace: (a,), three fields on the grid */
+    int most_secants, *secants;           /* how many at most, and (1,) how many there are */
+    double *moves, *changes;              /* (most, 3, c) N, the last one last */
+    struct at_once_work *work;
 } at_once;
 
-int at_once_step(at_once *s, const double *right, double tolerance, double *step);
+void at_once_begin(at_once *s);
+void at_once_end(at_once *s);
+void at_once_box(at_once *s);
+void at_once_step(at_once *s);
+void at_once_push(at_once *s);
+void at_once_meet(at_once *s, const double *tread);
+int at_once_strays(const at_once *s, const double *place, double tolerance);
+void at_once_balance(at_once *s);
+void at_once_newton(at_once *s, int normal, int plane, int whole, double tolerance);
+void at_once_bound(at_once *s);
 
 /* A brush on the tire: normal and tangential forces of a step. */
 typedef struct {
@@ -1134,73 +1147,346 @@ int stick_slip_solve(stick_slip *s, double tolerance) {
 
 /* ---- Both at once, on a grid ---------------------------------------------------------------------------------------- */
 
+enum { CHANGED = 5 };                 /* points that touch or slip otherwise, up to which two Newton steps make a secant */
+static const double DEPENDENT = 1e-4; /* share of a secant that is not of later ones, below which it is none */
+
+/* Of a Newton step's problem between `count` points: their numbers, and what follows in arrays (count,) or (2, count). */
+struct at_once_work {
+    int count, *index, whole;
+    double *slope, *own, *beside, *spring, *direction, *share, *right, *step;
+    uint8_t *kept, *sets, *last_sets;     /* the latter two (c,): what touches and slips, now and a Newton step before */
+    double *last, *last_step, *now;       /* (3, c) N of the Newton step before: its forces and itself; this one */
+    double *basis, *reduced, *part;       /* of the secants: (most, 3c), (most, most), (most,) */
+    int follows;                          /* whether the last Newton step was of the same problem */
+    double *nodal, *nodes, *value, *force, *field; /* (3p,), (3p,), (3p,), (c,), three fields on the grid */
+    int *which, carriers, *carrier, *place; /* nodes that carry points of the box, and the place of each among them, or -1 */
+    double *compact;                      /* (3m, 3m) of the tire between these, by columns, once it is needed */
+};
+
+void at_once_begin(at_once *s) {
+    const int c = s->compliance->points, p = s->compliance->nodes, m = s->most_secants;
+    struct at_once_work *w = s->work = room(1, sizeof *w);
+    w->index = INTS(c), w->slope = DOUBLES(2 * c), w->own = DOUBLES(c), w->beside = DOUBLES(c), w->spring = DOUBLES(c);
+    w->direction = DOUBLES(2 * c), w->share = DOUBLES(c), w->right = DOUBLES(3 * c), w->step = DOUBLES(3 * c);
+    w->kept = room(2 * c, 1), w->sets = room(c, 1), w->last_sets = room(c, 1);
+    w->last = DOUBLES(3 * c), w->last_step = DOUBLES(3 * c), w->now = DOUBLES(3 * c);
+    w->basis = DOUBLES((size_t)m * 3 * c), w->reduced = DOUBLES(m * m), w->part = DOUBLES(m);
+    w->nodal = DOUBLES(3 * p), w->nodes = DOUBLES(3 * p), w->value = DOUBLES(3 * p), w->force = DOUBLES(c);
+    w->field = DOUBLES(3 * cells(s->compliance)), w->which = INTS(3 * p), w->carrier = INTS(p), w->place = INTS(p);
+}
+
+void at_once_end(at_once *s) {
+    struct at_once_work *w = s->work;
+    void *all[] = {w->index, w->slope, w->own, w->beside, w->spring, w->direction, w->share, w->right, w->step, w->kept, w->sets,
+                   w->last_sets, w->last, w->last_step, w->now, w->basis, w->reduced, w->part, w->nodal, w->nodes, w->value,
+                   w->force, w->field, w->which, w->carrier, w->place, w->compact, w};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++) free(all[i]);
+}
+
+/* The box has other points: find the nodes that carry them. */
+void at_once_box(at_once *s) {
+    const plane *c = s->compliance;
+    struct at_once_work *w = s->work;
+    free(w->compact), w->compact = 0, w->carriers = 0;
+    for (int i = 0; i < c->nodes; i++) w->place[i] = -1;
+    for (int k = 0; k < s->inside; k++)
+        for (int l = c->w_begin[s->index[k]]; l < c->w_begin[s->index[k] + 1]; l++) w->place[c->w_column[l]] = 0;
+    for (int i = 0; i < c->nodes; i++)
+        if (!w->place[i]) w->place[i] = w->carriers, w->carrier[w->carriers++] = i;
+}
+
+/* Another step begins. */
+void at_once_step(at_once *s) { s->work->follows = 0; }
+
+static void between_carriers(at_once *s) {
+    struct at_once_work *w = s->work;
+    const int p = s->compliance->nodes, m = w->carriers;
+    w->compact = DOUBLES(9 * (size_t)m * m);
+    for (int d = 0; d < 3; d++)
+        for (int j = 0; j < m; j++)
+            for (int e = 0; e < 3; e++) {
+                const double *restrict column = s->tire + (size_t)(d * p + w->carrier[j]) * 3 * p + e * p;
+                double *restrict to = w->compact + (size_t)(d * m + j) * 3 * m + e * m;
+                for (int i = 0; i < m; i++) to[i] = column[w->carrier[i]];
+            }
+}
+
+/* Forces (3, c) N on the tire, in z, x, y, by points on a sloping road. */
+static void on_nodes(const plane *c, int point, double f, double x, double y, const double *slope, double *nodal) {
+    const double px = x - f * slope[0], py = y - f * slope[1], pz = f + x * slope[0] + y * slope[1];
+    const int p = c->nodes;
+    for (int k = c->w_begin[point]; k < c->w_begin[point + 1]; k++) {
+        double *at = nodal + c->w_column[k];
+        at[0] += c->w_value[k] * pz, at[p] += c->w_value[k] * px, at[2 * p] += c->w_value[k] * py;
+    }
+}
+
+/* `moved`: the displacements of all points with the tire, by the change of forces from those at rest. */
+void at_once_push(at_once *s) {
+    const plane *c = s->compliance;
+    struct at_once_work *w = s->work;
+    const int n = c->points, size = 3 * c->nodes;
+    const double *f = s->force, *x = f + n, *y = x + n;
+    memset(w->nodal, 0, size * sizeof(double)), memset(w->nodes, 0, size * sizeof(double));
+    for (int i = 0; i < n; i++) {
+        if (f[i] != 0.0 || x[i] != 0.0 || y[i] != 0.0) on_nodes(c, i, f[i], x[i], y[i], s->slope + 2 * i, w->nodal);
+        if (s->at_rest[i] != 0.0)
+            for (int k = c->w_begin[i]; k < c->w_begin[i + 1]; k++) w->nodal[c->w_column[k]] -= c->w_value[k] * s->at_rest[i];
+    }
+    add_columns(size, size, s->tire, nonzero(size, w->nodal, w->which, w->value), w->which, w->value, w->nodes);
+    for (int i = 0; i < n; i++) {
+        for (int d = 0; d < 3; d++) s->moved[d * n + i] = from_nodes(c, w->nodes + d * c->nodes, i);
+        for (int d = 0; d < 2; d++) s->place[d * n + i] = s->base[d * n + i] = s->free[d * n + i] + s->moved[(d + 1) * n + i];
+    }
+}
+
+/* Where bristles begin and end, and gaps over height 0, with the `tread` (3, inside) m; after `at_once_push`. */
+void at_once_meet(at_once *s, const double *tread) {
+    const int n = s->compliance->points, a = s->inside;
+    for (int k = 0; k < a; k++) {
+        const int i = s->index[k];
+        s->gap[i] = s->open[i] + s->moved[i] + tread[k];
+        for (int d = 0; d < 2; d++) {
+            double *base = s->base + d * n + i;
+            *base += tread[(d + 1) * a + k];
+            s->place[d * n + i] = *base + s->force[(d + 1) * n + i] * s->spring[i];
+        }
+    }
+}
+
+/* Whether places since `place` (2, c) m have moved gaps, in the mean square, by more than `tolerance` of deflections. */
+int at_once_strays(const at_once *s, const double *place, double tolerance) {
+    const int n = s->compliance->points;
+    double moved = 0.0, size = 0.0;
+    for (int i = 0; i < n; i++) {
+        const double f = s->force[i];
+        if (!(f > 0.0)) continue;
+        const double shift = fabs(s->slope[2 * i] * (s->place[i] - place[i])) + fabs(s->slope[2 * i + 1] * (s->place[n + i] - place[n + i]));
+        moved += shift * shift, size += s->own[i] * f * s->own[i] * f;
+    }
+    return sqrt(moved) > tolerance * sqrt(size);
+}
+
+static double bound_of(const at_once *s, double f) { return s->friction < 0.0 ? INFINITY : s->friction * fmax(f, 0.0); }
+
+/* Residuals of gaps over the road and of slips of the box's points, and which of them touch; after `at_once_meet`. */
+void at_once_balance(at_once *s) {
+    const int n = s->compliance->points;
+    double widest = 0.0, deepest = 0.0, worst = 0.0, off = 0.0, most = 0.0;
+    for (int k = 0; k < s->inside; k++) {
+        const int i = s->index[k];
+        const double f = s->force[i], pressed = s->own[i] * f, gap = s->gap[i] -= s->height[i];
+        const double wrong = fabs(gap > pressed ? pressed : gap); /* NAN where gap is */
+        widest = fmax(widest, fabs(gap)), deepest = fmax(deepest, pressed);
+        if (!(wrong <= worst)) worst = wrong;
+        s->touches[i] = pressed - gap > 0.0;
+        const double bound = bound_of(s, f), r = 1.0 / s->beside[i];
+        double whole[2], length;
+        for (int d = 0, l = i; d < 2; d++, l += n) {
+            const double t = s->force[n + l];
+            s->slip[l] = s->base[l] + s->spring[i] * t + s->past[l];
+            s->trial[l] = t - s->caution * r * s->slip[l];
+            whole[d] = t - r * s->slip[l];
+        }
+        const double x = s->force[n + i], y = s->force[2 * n + i];
+        if (isfinite(bound)) most = fmax(most, bound);
+        most = fmax(most, hypot(x, y));
+        if (!s->touches[i] || !s->bears[i]) continue;
+        if ((length = hypot(whole[0], whole[1])) > bound) whole[0] *= bound / length, whole[1] *= bound / length;
+        off = fmax(off, hypot(x - whole[0], y - whole[1]));
+    }
+    const double scale = widest + deepest;
+    s->residual = scale > 0.0 || isnan(worst) ? worst / scale : 0.0, s->off = off, s->most = most;
+}
+
 /* The displacements under forces (3, a), z, x, y, in units of the forces: of a Newton step's problem. */
 static int both(void *of, const double *given, double *out) {
     at_once *s = of;
     plane *c = s->compliance;
-    const int a = s->count, p = c->nodes, size = 3 * p;
-    const double *f = given, *x = given + a, *y = given + 2 * a, *n = s->direction;
+    struct at_once_work *w = s->work;
+    const int a = w->count, p = c->nodes, size = 3 * p, whole = w->whole;
+    const int reach = whole ? everywhere(c) : s->near;
+    const double *f = given, *x = given + a, *y = given + 2 * a, *n = w->direction;
     const double *const pressed[] = {s->pressed, s->pressed};
-    double *uz = s->field, *ux = uz + cells(c), *uy = ux + cells(c);
-    memset(s->field, 0, 3 * cells(c) * sizeof(double));
-    spread(c, s->reach, a, s->index, f, 0, pressed, 1, uz, 0);
-    spread(c, s->reach, a, s->index, x, y, c->kernel, 3, ux, uy);
+    double *uz = w->field, *ux = uz + cells(c), *uy = ux + cells(c);
+    memset(w->field, 0, 3 * cells(c) * sizeof(double));
+    spread(c, reach, a, w->index, f, 0, pressed, 1, uz, 0);
+    spread(c, reach, a, w->index, x, y, c->kernel, 3, ux, uy);
     if (c->coupled) {
-        for (int k = 0; k < a; k++) s->force[k] = -f[k];
-        spread(c, s->reach, a, s->index, x, y, c->kernel + 3, 2, uz, 0);
-        spread(c, s->reach, a, s->index, s->force, 0, c->kernel + 3, 2, ux, uy);
+        for (int k = 0; k < a; k++) w->force[k] = -f[k];
+        spread(c, reach, a, w->index, x, y, c->kernel + 3, 2, uz, 0);
+        spread(c, reach, a, w->index, w->force, 0, c->kernel + 3, 2, ux, uy);
     }
-    memset(s->nodal, 0, size * sizeof(double));
-    for (int k = 0; k < a; k++) {
-        const int i = s->index[k];
-        const double along = s->slope[2 * k], across = s->slope[2 * k + 1];
-        const double pz = f[k] + x[k] * along + y[k] * across, px = x[k] - f[k] * along, py = y[k] - f[k] * across;
-        for (int w = c->w_begin[i]; w < c->w_begin[i + 1]; w++) {
-            const int at = c->w_column[w];
-            s->nodal[at] += c->w_value[w] * pz, s->nodal[p + at] += c->w_value[w] * px, s->nodal[2 * p + at] += c->w_value[w] * py;
-        }
-    }
-    if (s->tire) {
-        memset(s->nodes, 0, size * sizeof(double));
-        add_columns(size, size, s->tire, nonzero(size, s->nodal, s->which, s->value), s->which, s->value, s->nodes);
+    memset(w->nodal, 0, size * sizeof(double));
+    for (int k = 0; k < a; k++) on_nodes(c, w->index[k], f[k], x[k], y[k], w->slope + 2 * k, w->nodal);
+    if (whole || !s->n_value) {
+        const int m = w->carriers;
+        if (!w->compact) between_carriers(s);
+        int count = 0;
+        for (int d = 0; d < 3; d++)
+            for (int j = 0; j < m; j++) {
+                const double value = w->nodal[d * p + w->carrier[j]];
+                if (value != 0.0) w->which[count] = d * m + j, w->value[count++] = value;
+            }
+        memset(w->nodal, 0, size * sizeof(double));
+        add_columns(3 * m, 3 * m, w->compact, count, w->which, w->value, w->nodal);
+        for (int d = 0; d < 3; d++)
+            for (int j = 0; j < m; j++) w->nodes[d * p + w->carrier[j]] = w->nodal[d * m + j];
     } else {
         for (int i = 0; i < size; i++) { /* of nodes that carry some of the points */
             if (!c->work->bears[i % p]) continue;
             double sum = 0.0;
-            for (int k = s->n_begin[i]; k < s->n_begin[i + 1]; k++) sum += s->n_value[k] * s->nodal[s->n_column[k]];
-            s->nodes[i] = sum;
+            for (int k = s->n_begin[i]; k < s->n_begin[i + 1]; k++) sum += s->n_value[k] * w->nodal[s->n_column[k]];
+            w->nodes[i] = sum;
         }
     }
     for (int k = 0; k < a; k++) {
-        const int i = s->index[k], slips = s->share[k] < 1.0;
+        const int i = w->index[k], slips = w->share[k] < 1.0;
         const size_t at = cell(c, i);
-        const double tx = ux[at] + from_nodes(c, s->nodes + p, i) + s->spring[k] * x[k];
-        const double ty = uy[at] + from_nodes(c, s->nodes + 2 * p, i) + s->spring[k] * y[k];
-        double z = uz[at] + from_nodes(c, s->nodes, i);
-        if (slips && s->reads) z -= s->slope[2 * k] * tx + s->slope[2 * k + 1] * ty; /* what slips meets the road elsewhere */
-        out[k] = s->kept[k] ? f[k] : z / s->own[k];
-        if (s->kept[a + k]) {
+        const double tx = ux[at] + from_nodes(c, w->nodes + p, i) + w->spring[k] * x[k];
+        const double ty = uy[at] + from_nodes(c, w->nodes + 2 * p, i) + w->spring[k] * y[k];
+        double z = uz[at] + from_nodes(c, w->nodes, i);
+        if (slips && s->reads) z -= w->slope[2 * k] * tx + w->slope[2 * k + 1] * ty; /* what slips meets the road elsewhere */
+        out[k] = w->kept[k] ? f[k] : z / w->own[k];
+        if (w->kept[a + k]) {
             out[a + k] = x[k], out[2 * a + k] = y[k];
             continue;
         }
-        const double r = (slips ? s->caution : 1.0) / s->beside[k];
+        const double r = (slips ? s->caution : 1.0) / w->beside[k];
         double dx = r * tx - x[k], dy = r * ty - y[k];
-        const double along = n[k] * dx + n[a + k] * dy, follows = s->friction * f[k];
-        dx = s->share[k] * (dx - n[k] * along) - n[k] * follows, dy = s->share[k] * (dy - n[a + k] * along) - n[a + k] * follows;
+        const double along = n[k] * dx + n[a + k] * dy, follows = slips ? s->friction * f[k] : 0.0;
+        dx = w->share[k] * (dx - n[k] * along) - n[k] * follows, dy = w->share[k] * (dy - n[a + k] * along) - n[a + k] * follows;
         out[a + k] = x[k] + dx, out[2 * a + k] = y[k] + dy;
     }
     return 0;
 }
 
-/* step (3, a) N to the `tolerance` of what `right` (3, a) N is left of. */
-int at_once_step(at_once *s, const double *right, double tolerance, double *step) {
+/* The part of the last steps that this one, `step` (3, c) N from `force`, is best followed by: where a step d belongs to forces p, those
+   with the secants dP and dD are p + dP a + d + dD a, a that of the least |d + dD a|. */
+static void follow_secants(at_once *s) {
+    struct at_once_work *w = s->work;
+    const int n = s->compliance->points, a = w->count, size = 3 * a, had = *s->secants;
+    const size_t whole = 3 * (size_t)n;
+    double *rest = w->right; /* which is not needed any more */
+    memcpy(rest, w->step, size * sizeof(double));
+    for (int k = 0; k < 2 * a; k++)
+        if (w->kept[k]) {
+            rest[k] = 0.0;
+            if (k >= a) rest[a + k] = 0.0;
+        }
+    int count = 0, which[had + 1];
+    for (int j = had - 1; j >= 0; j--) { /* Gram and Schmidt, the last one first */
+        const double *change = s->changes + j * whole;
+        double *restrict q = w->basis + (size_t)count * size, *r = w->reduced + (size_t)count * s->most_secants;
+        for (int d = 0; d < 3; d++)
+            for (int k = 0; k < a; k++) q[d * a + k] = w->kept[(d > 0) * a + k] ? 0.0 : change[d * n + w->index[k]];
+        const double length = sqrt(dot(size, q, q));
+        for (int l = 0; l < count; l++) {
+            const double *restrict u = w->basis + (size_t)l * size, part = r[l] = dot(size, u, q);
+            for (int k = 0; k < size; k++) q[k] -= part * u[k];
+        }
+        const double left = sqrt(dot(size, q, q));
+        if (!(left > DEPENDENT * length)) continue;
+        for (int k = 0; k < size; k++) q[k] /= left;
+        r[count] = left, which[count] = j, w->part[count++] = -dot(size, q, rest);
+    }
+    for (int l = count - 1; l >= 0; l--) {
+        for (int m = l + 1; m < count; m++) w->part[l] -= w->reduced[(size_t)m * s->most_secants + l] * w->part[m];
+        w->part[l] /= w->reduced[(size_t)l * s->most_secants + l];
+        const double *move = s->moves + which[l] * whole, *change = s->changes + which[l] * whole;
+        for (int d = 0; d < 3; d++)
+            for (int k = 0; k < a; k++)
+                if (!w->kept[(d > 0) * a + k]) {
+                    const size_t at = (size_t)d * n + w->index[k];
+                    w->step[d * a + k] += w->part[l] * (move[at] + change[at]);
+                }
+    }
+}
+
+/* A secant of the Newton step before and this one, if both are of the same problem; the step is then the one before. */
+static void take_secant(at_once *s) {
+    struct at_once_work *w = s->work;
+    const int n = s->compliance->points, a = w->count;
+    const size_t whole = 3 * (size_t)n;
+    int other = 0;
+    for (int i = 0; i < n; i++) other += w->sets[i] != w->last_sets[i];
+    double *now = w->now;
+    memset(now, 0, whole * sizeof(double));
+    for (int d = 0; d < 3; d++)
+        for (int k = 0; k < a; k++) now[d * n + w->index[k]] = w->step[d * a + k];
+    if (s->most_secants && w->follows && !s->reads && other <= CHANGED) {
+        if (*s->secants == s->most_secants) {
+            memmove(s->moves, s->moves + whole, (s->most_secants - 1) * whole * sizeof(double));
+            memmove(s->changes, s->changes + whole, (s->most_secants - 1) * whole * sizeof(double));
+            --*s->secants;
+        }
+        double *restrict move = s->moves + *s->secants * whole, *restrict change = s->changes + *s->secants * whole;
+        for (size_t i = 0; i < whole; i++) move[i] = s->force[i] - w->last[i], change[i] = now[i] - w->last_step[i];
+        ++*s->secants;
+    }
+    memcpy(w->last, s->force, whole * sizeof(double)), memcpy(w->last_step, now, whole * sizeof(double));
+    memcpy(w->last_sets, w->sets, n);
+    w->follows = !s->reads;
+}
+
+/* Forces that balance gaps and slips where they are linear, `normal` to the road and in its `plane`, with the `whole` compliance or
+   what is near, to the `tolerance` of what they are out of balance; those of points that leave the road go. */
+void at_once_newton(at_once *s, int normal, int plane_too, int whole, double tolerance) {
     plane *c = s->compliance;
-    int done;
-    bounds(c, s->count, s->index);
+    struct at_once_work *w = s->work;
+    const int n = c->points;
+    const double *f = s->force, *x = f + n, *y = x + n;
+    memset(w->sets, 0, n);
+    int a = 0, done;
+    for (int k = 0; k < s->inside; k++) {
+        const int i = s->index[k], touches = normal ? s->touches[i] : f[i] > 0.0;
+        if (touches || f[i] != 0.0 || x[i] != 0.0 || y[i] != 0.0) w->sets[i] = touches, w->index[a++] = i;
+    }
+    if (!(w->count = a)) return;
+    for (int k = 0; k < a; k++) {
+        const int i = w->index[k], touches = w->sets[i], bears = touches && s->bears[i];
+        const double bound = bound_of(s, f[i]), length = hypot(s->trial[i], s->trial[n + i]);
+        const int slips = bears && length > bound;
+        w->share[k] = slips ? bound / length : 1.0;
+        w->sets[i] |= slips << 1;
+        w->own[k] = s->own[i], w->beside[k] = s->beside[i], w->spring[k] = s->spring[i];
+        w->kept[k] = !(touches && normal), w->kept[a + k] = !(bears && plane_too);
+        w->right[k] = !normal ? 0.0 : touches ? -s->gap[i] / s->own[i] : -f[i];
+        for (int d = 0, l = i, at = k; d < 2; d++, l += n, at += a) {
+            const double t = s->force[n + l], way = w->direction[at] = slips ? s->trial[l] / length : 0.0;
+            w->slope[2 * k + d] = s->slope[2 * i + d];
+            w->right[a + at] = !plane_too ? 0.0 : !bears ? -t : slips ? bound * way - t : -s->slip[l] / s->beside[i];
+        }
+    }
+    bounds(c, a, w->index);
     memset(c->work->bears, 0, c->nodes);
-    for (int k = 0; k < s->count; k++)
-        for (int w = c->w_begin[s->index[k]]; w < c->w_begin[s->index[k] + 1]; w++) c->work->bears[c->w_column[w]] = 1;
-    return cycle(3 * s->count, SHORT, both, s, right, tolerance, step, &done);
+    for (int k = 0; k < a; k++)
+        for (int l = c->w_begin[w->index[k]]; l < c->w_begin[w->index[k] + 1]; l++) c->work->bears[c->w_column[l]] = 1;
+    w->whole = whole;
+    cycle(3 * a, SHORT, both, s, w->right, tolerance, w->step, &done);
+    if (normal && plane_too && !whole) {
+        take_secant(s);
+        follow_secants(s);
+    } else
+        w->follows = 0;
+    for (int k = 0; k < a; k++) {
+        const int i = w->index[k], touches = w->sets[i] & 1;
+        for (int d = 0; d < 3; d++) s->force[d * n + i] += w->step[d * a + k];
+        if (normal && !touches) s->force[i] = 0.0;
+        if (plane_too && !(touches && s->bears[i])) s->force[n + i] = s->force[2 * n + i] = 0.0;
+    }
+}
+
+/* No point pulls at the road or bears more than friction holds. */
+void at_once_bound(at_once *s) {
+    const int n = s->compliance->points;
+    for (int i = 0; i < n; i++) {
+        double *f = s->force + i, *x = f + n, *y = x + n;
+        *f = fmax(*f, 0.0);
+        const double bound = bound_of(s, *f), length = hypot(*x, *y);
+        if (length > bound) *x *= bound / length, *y *= bound / length;
+        if (!(*f > 0.0)) *x = *y = 0.0;
+    }
 }
 
 /* ---- Both in turn -------------------------------------------------------------------------------------------------- */

@@ -35,6 +35,10 @@ class CompressedRows:
         )
         self.value = COMPILED.doubles(rows.data.astype(float))
 
+    def named(self, prefix: str) -> dict[str, Any]:
+        """The three as members of a structure whose names begin so."""
+        return {prefix + name: values for name, values in vars(self).items()}
+
 
 class PlaneCompliance:
     """Displacements of c points under forces in the plane of the road: W A W^T of the tire, and the tread's.
@@ -65,10 +69,8 @@ class PlaneCompliance:
         c, p = w.shape
         up, down = CompressedRows(w), CompressedRows(w.T)
         self._held: dict[str, Any] = {
-            "points": c, "nodes": p, "w_begin": up.begin, "w_column": up.column, "w_value": up.value,
-            "t_begin": down.begin, "t_column": down.column, "t_value": down.value,
-            "hh": COMPILED.doubles(np.ascontiguousarray(beside.T)),
-        }  # fmt: skip
+            "points": c, "nodes": p, "hh": COMPILED.doubles(np.ascontiguousarray(beside.T)),
+        } | up.named("w_") | down.named("t_")  # fmt: skip
         if first:
             self._held["zh"] = COMPILED.doubles(np.ascontiguousarray(tire[:p, p:].T))
             self._held["hz"] = COMPILED.doubles(np.ascontiguousarray(tire[p:, :p].T))

@@ -15,6 +15,7 @@ Mechanics, (3.75) and (3.76).
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -28,12 +29,13 @@ from tireroad.contact.tread.compliance import (
     rectangle_potential,
 )
 from tireroad.contact.tread.kernel import Box, GridPlaces, KernelTread, doubled, points_in
-from tireroad.fem.compiled import Library
+from tireroad.fem.compiled import Library, library
 
 Array = NDArray[np.float64]
 Plane = NDArray[np.complex128]  # x + iy
 Index = NDArray[np.intp]
 
+_SPECTRA = library(Path(__file__).with_name("spectra.c"))
 _WITHIN = 2  # cells of the inverse of a tread that precondition a Newton step
 _LEAST = 0.01  # of the largest eigenvalue: the least of what is inverted
 _UNREAD = 0.2  # share of the sum of a kernel that a Newton step leaves out, whose problem is solved to a tenth
@@ -312,29 +314,27 @@ class GridConvolution:
     def __init__(self, around: Array, coupled: bool, box: Box, cells: tuple[Index, Index]) -> None:
         top, bottom, left, right = box
         (rows, columns), inside = cells, points_in(box, cells)
-        self._row, self._column = rows[inside] - top, columns[inside] - left
         self.shape = shape = bottom - top, right - left
         self._size = tuple(fft.next_fast_len(2 * n - 1, real=True) for n in shape)
+        self._place = (rows[inside] - top) * self._size[1] + columns[inside] - left
         kernels, middle = np.zeros((6, *self._size)), [n // 2 for n in around.shape[1:]]
         i, j = (np.arange(1 - n, n) for n in shape)
         kernels[:, i[:, None], j] = around[:, middle[0] + i[:, None], middle[1] + j]
         spectra = fft.rfft2(kernels)
-        self._even, self._odd = np.ascontiguousarray(spectra[:4].real), 1j * spectra[4:].imag
-        self._coupled = coupled
+        self._even = np.ascontiguousarray(spectra[:4].real)
+        self._odd = np.ascontiguousarray(spectra[4:].imag) if coupled else None
 
     def __call__(self, force: Array) -> Array:
         """Displacements (3, a) m under forces (3, a) N at the points of the box."""
-        field = np.zeros((3, *self._size))
-        field[:, self._row, self._column] = force
-        z, x, y = fft.rfft2(field, overwrite_x=True)
-        zz, xx, xy, yy = self._even
-        moved = np.stack([zz * z, xx * x + xy * y, xy * x + yy * y])
-        if self._coupled:
-            zx, zy = self._odd
-            moved[0] += zx * x + zy * y
-            moved[1] -= zx * z
-            moved[2] -= zy * z
-        return fft.irfft2(moved, self._size, overwrite_x=True)[:, self._row, self._column]
+        field = np.zeros((3, self._size[0] * self._size[1]))
+        field[:, self._place] = force
+        forces = fft.rfft2(field.reshape(3, *self._size), overwrite_x=True)
+        moved = np.empty_like(forces)
+        odd = _SPECTRA.ffi.NULL if self._odd is None else _SPECTRA.doubles(self._odd)
+        spectra = (_SPECTRA.doubles(values.view(float)) for values in (forces, moved))
+        _SPECTRA.lib.convolve(forces[0].size, _SPECTRA.doubles(self._even), odd, *spectra)
+        whole = fft.irfft2(moved, self._size, overwrite_x=True)
+        return whole.reshape(3, -1).take(self._place, axis=1)  # in rows
 
 
 def _on_grid(library: Library, around: Array, read: Array, grid: GridPlaces) -> dict[str, Any]:

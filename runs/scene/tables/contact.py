@@ -151,7 +151,7 @@ class ContactTable(Variants):
     reach: float | None = number(
         None,
         "m",
-        "static gap up to which points take part; absent: 1.5 times the road's height and 5 mm, rounded up to 5 mm times a power of 1.1",
+        "static gap up to which points take part; absent: 1.5 times the road's height and 5 mm, rounded up to 5 mm times a power of 1.5",
         least=1e-6,
         most=1,
     )
