@@ -107,13 +107,15 @@ FINE: dict[str, Any] = {
 }
 REACH = 0.012  # m, of the patch: alike on every road, so that stages before the loop are shared
 # Free rolling is asked for, so that a run that does not find it fails: a wheel that begins at rest, without slip, has forces along and
-# across the road of another kind than those it would be compared with.
+# across the road of another kind than those it would be compared with. The wheel turns freely: held, forces along the road do not converge
+# with the points (docs/verification/contact-points.md).
 SCENE = """
 name = "case"
 {tire}
 [rotation]
 speed = {speed}
 free_rolling = true
+wheel = "free"
 [contact]
 youngs_modulus = 1e7
 reach = {reach}
