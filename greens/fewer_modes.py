@@ -29,9 +29,10 @@ from tireroad.fem.tire.material import Spectrum
 from tireroad.greens.basis import Array, Basis, modal_statics
 from tireroad.greens.coupling import FASTEST, dynamic, foremost, with_left_out
 from tireroad.greens.residuals import residual_of
-from tireroad.greens.response import Response, couple
+from tireroad.greens.response import Response, couple, reading
 from tireroad.greens.responses import cutoff
 from tireroad.modal.basis import ModalBasis, Projection
+from tireroad.modal.corner import HUB_MOMENTS
 from tireroad.modal.damping import tail_growth
 from tireroad.modal.rolling import RollingModes, decouple, pencil
 from tireroad.modal.rotating import held_matrices
@@ -49,12 +50,12 @@ def of_fewer_modes(
     residual: str,
     spectra: Sequence[Spectrum],
     comm: MPI.Comm,
-) -> Response:
-    """The response of the modes up to a `share` of the highest, with a residual of the same kind.
+) -> tuple[Response, RollingModes]:
+    """The response of the modes up to a `share` of the highest, with a residual of the same kind, and its states.
 
     `response` (r, k) of the states of `rolling`, whose first outputs are its inputs; `readings` (p, m) of the `probes` (p, 3 s)
     or wider per coordinate of the tire, k <= p <= r. `spectra` of the compounds' moduli, as many as the projection has
-    `parts`. Outputs beyond the probes, moments on the hub, are zero. InputError
+    `parts`. Outputs beyond the probes, but for moments on the hub, are zero. InputError
     where no mode or all modes are below the limit. Collective.
     """
     kind, turning = residual_of(residual), rolling.turning
@@ -81,7 +82,7 @@ def of_fewer_modes(
         few = _alone(old, count, spectra)
         made = _completed(made, own, _softening(own, rolling, few, readings, probes))
     relaxing = response.eigenvalue[slow], response.output[:, slow], response.input[slow]
-    return made.with_slow(*relaxing)
+    return made.with_slow(*relaxing), rolls
 
 
 def _joined(projection: Projection, count: int, columns: Array) -> Array:
@@ -158,16 +159,21 @@ def _coupled(response: Response, rolling: RollingModes, probes: sparse.csr_matri
     seen = basis.projection.seen(basis.shape, probes)
     outputs = np.zeros((len(response.residual), seen.shape[1]))
     outputs[: len(seen)] = seen
-    carried = Basis.of(rolling).carried
-    made = couple(rolling.states, outputs, seen[: response.residual.shape[1]], carried)
+    whole, count = Basis.of(rolling), response.residual.shape[1]
+    made = couple(rolling.states, outputs, seen[:count], whole.carried)
+    if response.moments is not None:
+        rows = np.flatnonzero(response.moments)
+        hub = sparse.csr_matrix(
+            (np.ones(len(rows)), (rows, np.arange(len(rows)))), (len(outputs), HUB_MOMENTS)
+        )
+        made = reading(made, rolling.states, hub, whole.beside(hub)[3:])
+        made = replace(made, residual=made.residual + hub @ whole.loaded(probes[:count]))
     return replace(made, pulse=response.pulse, offset=response.offset)
 
 
 def _completed(made: Response, response: Response, softer: Array) -> Response:
     """The response with what its states lack of the static answer of the run's own and what is `softer` (r, k) m/N."""
     whole = response.residual + response.static() + softer
-    if response.moments is not None:
-        whole[response.moments] = 0.0
     made = replace(made, residual=whole - made.static())
     if response.left_out is None:
         return made

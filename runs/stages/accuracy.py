@@ -56,7 +56,6 @@ from tireroad.runs.results.datasets import ABSENT
 from tireroad.runs.scene.estimate import estimate
 from tireroad.runs.scene.physics import compounds
 from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.stages import corner
 from tireroad.runs.stages.cavity import AirColumn
 from tireroad.runs.stages.contact_file import ContactHistory
 from tireroad.runs.stages.greens import GreensStage, Responses, as_read
@@ -168,7 +167,7 @@ class ReferenceRun:
     first `steps` of `step` s of its loop, integrated by `scheme`. `most`: touching points that a companion may
     have (contact.grid_patch.ratio). `comm`: the processes that repeat a loop together, by default those of the job.
     `attached`: the modes with their attachment modes, if any (runs.stages.greens.Responses). `steady`: whether its loop began
-    with steady rolling, as its companions then do. `held`: whether a wheel that turns freely is held in it.
+    with steady rolling, as its companions then do.
     """
 
     job: Job
@@ -184,7 +183,6 @@ class ReferenceRun:
     large: bool = False
     attached: RollingModes | None = None
     steady: bool = True
-    held: bool = False
 
     @property
     def points_ratio(self) -> float:
@@ -270,13 +268,9 @@ class ReferenceRun:
         known = (name for name in names if name in self.__dict__)
         return self._keeping(*known, comm=MPI.COMM_SELF)
 
-    def holding(self) -> ReferenceRun:
-        """The same with a wheel whose rate is held, as a reference of its own."""
-        return self._keeping("equilibrated", "rolled", held=True)
-
     def same_loop(self, other: ReferenceRun) -> bool:
         """Whether both repeat as many steps of the same size by the same scheme, begun alike."""
-        names = ("step", "steps", "scheme", "steady", "held")
+        names = ("step", "steps", "scheme", "steady")
         return all(getattr(self, name) == getattr(other, name) for name in names)
 
     def keeping_what(self, other: ReferenceRun) -> ReferenceRun:
@@ -309,7 +303,7 @@ class ReferenceRun:
         step, steps = times * self.step, self.steps // times
         comm = self.comm or self.job.comm
         given = self.job, setup, response, step, steps, self.scheme, comm, contact
-        return forces(*given, self.steady, None if self.held else states or self.states)
+        return forces(*given, self.steady, states or self.states)
 
 
 def equilibrated(
@@ -498,10 +492,10 @@ def fewer_modes(reference: ReferenceRun) -> ContactForces:
         arguments = seen, seen.basis.shape, points.loads[points.counted], FEWER
         residual, spectra = job.scene.greens.residual, _spectra(job)
         comm = reference.comm or job.comm
-        coarse = of_fewer_modes(response, *arguments, residual, spectra, comm)
+        coarse, rolling = of_fewer_modes(response, *arguments, residual, spectra, comm)
     force = reference.static.product.normal_force
     begun = equilibrated(reference.job, reference.setup, coarse, force)
-    return reference.repeated(begun, coarse)
+    return reference.repeated(begun, coarse, states=rolling)
 
 
 def _spectra(job: Job) -> list[Spectrum]:
@@ -613,12 +607,6 @@ def companions(cause: str, reference: ReferenceRun) -> list[Companion]:
     """
     with console.quiet():
         beside = reference.own if cause == "step" else reference.base
-        if cause == "modes" and corner.turns_freely(reference.job.scene):
-            # Fewer modes read no moment on the hub that could turn the wheel: both hold it.
-            reference = reference.holding()
-            beside = reference.base or reference.repeated(
-                reference.equilibrated, reference.response, 1
-            )
         told = COMPANIONS[cause](reference)
         if cause == "modes":
             pairs = [Companion(told, beside, within=FEWER)]

@@ -15,6 +15,7 @@ from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
 from tireroad.fem.wheel import Axle, Turning
 from tireroad.greens.basis import Basis
+from tireroad.greens.fewer_modes import of_fewer_modes
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.modal.basis import ModalBasis, with_corner
@@ -99,6 +100,29 @@ def test_it_is_a_corner_whose_wheel_may_turn(unloaded) -> None:
     assert np.abs(found - relative).max() < 1e-6 * np.abs(relative).max()
     apart = np.abs(H[:, :COUNT, :COUNT] - relative).max()
     assert apart > 0.02 * np.abs(relative).max()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("residual", ["none", "static"])
+def test_fewer_modes_turn_it_alike_below_them(unloaded, residual) -> None:
+    """They read the hub moments, also of what replaces the modes left out."""
+    if COMM.size > 1:
+        pytest.skip("all modes")
+    basis, rolling = unloaded[2], rolling_modes(unloaded[2])
+    probes = loads(SPEED, SEEN)[:COUNT]
+    wide = min(probes.shape[1], len(basis.shape))
+    readings = probes[:, :wide] @ basis.shape[:wide]
+    frequency = np.array([0.7, 5.0])
+    given = rolling, readings, probes, 0.2, residual, (), COMM
+    few, states = of_fewer_modes(held(basis), *given)
+    assert len(states.states.eigenvalue) < 0.6 * len(rolling.states.eigenvalue)
+    whole, found = held(basis).receptance(frequency), few.receptance(frequency)
+    moments = whole[:, COUNT:], found[:, COUNT:]
+    assert np.abs(moments[1] - moments[0]).max() < 1e-3 * np.abs(moments[0]).max()
+    spins = with_spin(few, states).receptance(frequency)
+    assert spins.shape == (2, COUNT + 3 + 2, COUNT + 2)
+    about = spins[:, COUNT + 1, COUNT], spun(basis).receptance(frequency)[:, COUNT + 1, COUNT]
+    assert about[0] == pytest.approx(about[1], rel=1e-3)
 
 
 @pytest.mark.slow
