@@ -36,6 +36,7 @@ from tireroad.fem.matrices.compliance import (
 from tireroad.fem.matrices.operators import Operators, RimMotion, Rotation, carried_pencil
 from tireroad.fem.nonlinear.force import RestoringForce
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
+from tireroad.fem.tire.mesh import NodeGrid
 from tireroad.fem.wheel import Axle
 
 Array = np.ndarray
@@ -105,6 +106,12 @@ class ModalDamping:
         return whole
 
 
+def equal_angles(lattice: NodeGrid) -> bool:
+    """Whether the nodes of a ring lie at equal angles around."""
+    angle = lattice.ring
+    return np.allclose(angle, 2 * np.pi * np.arange(len(angle)) / len(angle), rtol=0, atol=1e-9)
+
+
 class Around:
     """Fourier factors of fields around the axle, by the harmonics of their cylindrical components. Collective to make.
 
@@ -121,7 +128,7 @@ class Around:
     def __init__(self, operators: Operators) -> None:
         self._operators, lattice = operators, operators.body.lattice
         self._shape, angle = lattice.shape, lattice.ring
-        if not np.allclose(angle, 2 * np.pi * np.arange(len(angle)) / len(angle), atol=1e-9):
+        if not equal_angles(lattice):
             raise InputError(
                 "rubber that relaxes in full finite elements of a turning tire needs nodes at equal angles around the "
                 "axle: take tire.footprint_size = 1 and tire.order = 1 or 2"
