@@ -8,9 +8,11 @@ from mpi4py import MPI
 from scipy import sparse
 
 from tireroad.fem.matrices import probe
-from tireroad.fem.tire.material import compound, prony
+from tireroad.fem.tire.material import REFERENCE, compound, prony
 from tireroad.fem.wheel import StrainEnergy, Turning
 from tireroad.runs import library
+from tireroad.runs.scene.load import load
+from tireroad.runs.scene.physics import compounds
 from tireroad.tests.validation import relaxing
 
 SHARES, TIMES, SPEED = (0.1, 0.12, 0.2), (4e-3, 8e-4, 1.6e-4), 60.0
@@ -68,3 +70,19 @@ def test_the_law_of_a_run_is_near(tire):
     errors = off(run.receptance(FREQUENCY)[:, :, 0], tire.elements)
     assert errors[0] < 0.06
     assert (errors < 0.08).all()
+
+
+def test_the_rubber_of_the_validation_is_what_its_page_says(tmp_path):
+    """Loss factors from 20 to 500 Hz, and the same moduli at 100 Hz where there is one for all frequencies."""
+    found = {}
+    for name, rubber in (("relaxing", relaxing.RUBBER), ("one", relaxing.ONE_MODULUS)):
+        for speed, cases in relaxing.CASES.items():
+            for case in cases:
+                (tmp_path / "scene.toml").write_text(relaxing.scene(rubber, speed, *case))
+                found[name] = load(tmp_path / "scene.toml")
+    rubbers, elastic = (compounds(one.tire, REFERENCE) for one in found.values())
+    for region, loss in {"tread": 0.3, "sidewall": 0.2, "bead": 0.05}.items():
+        lost = [rubbers[region].loss(f) for f in (20.0, 50.0, 100.0, 200.0, 500.0)]
+        np.testing.assert_allclose(lost, loss, rtol=0.05)
+        assert elastic[region].dynamic == pytest.approx(rubbers[region].dynamic, rel=0.01)
+        assert elastic[region].spectrum.exponent == 0.0
