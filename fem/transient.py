@@ -7,6 +7,8 @@ integrated by the method of Wood, Bossak and Zienkiewicz (1980), M [(1 - a) u''_
 the step does not resolve: a = (rho - 1)/(rho + 1), gamma = 1/2 - a, beta = (1 - a)^2/4. rho = 1 is
 Newmark's average acceleration, which chatters in unilateral contact and does not converge there;
 rho = 0 does not chatter. One factorisation in total, and one pair of triangular solves per step.
+Damping is that of the matrices D, of modes beside it (`ModalDamping`), or of the rubber itself
+(`Relaxation`), whose memory turns with the material.
 """
 
 from __future__ import annotations
@@ -22,6 +24,7 @@ from tireroad.fem.cavity import Column
 from tireroad.fem.collective import summed
 from tireroad.fem.errors import ConvergenceError, InputError, NearlySingular
 from tireroad.fem.matrices.compliance import (
+    add_part,
     factorise,
     multiply,
     on_own_rows,
@@ -33,6 +36,7 @@ from tireroad.fem.matrices.compliance import (
 from tireroad.fem.matrices.operators import Operators, RimMotion, Rotation, carried_pencil
 from tireroad.fem.nonlinear.force import RestoringForce
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
+from tireroad.fem.tire.mesh import NodeGrid
 from tireroad.fem.wheel import Axle
 
 Array = np.ndarray
@@ -47,6 +51,7 @@ _MOST_MET = 500  # solutions of the contact in one of them
 PATIENT = 30
 SECANTS = 40  # kept at most
 _DEPENDENT = 1e-12  # squares of their singular values that are taken for none, of the largest
+_RESTING = 1e-11  # of the forces: residual of a shape at rest in space
 _PART = 0.1  # of what is out of balance: changes of the contact's forces that are not felt
 
 
@@ -99,6 +104,175 @@ class ModalDamping:
             return first - through @ np.linalg.solve(small, summed(self._comm, reading.T @ first))
 
         return whole
+
+
+def equal_angles(lattice: NodeGrid) -> bool:
+    """Whether the nodes of a ring lie at equal angles around."""
+    angle = lattice.ring
+    return np.allclose(angle, 2 * np.pi * np.arange(len(angle)) / len(angle), rtol=0, atol=1e-9)
+
+
+class Around:
+    """Fourier factors of fields around the axle, by the harmonics of their cylindrical components. Collective to make.
+
+    A field (n, k) on own unknowns is gathered on every process, whose section's nodes are at equal angles
+    theta_j, and each component (radial, tangential, along the axle) becomes
+
+        v(theta) = sum_m v_m e^{i m theta}  ->  sum_m f_m v_m e^{i m theta}
+
+    with factors f (m, k or 1) for m from 0 to half the number of nodes around. Exact for what the nodes hold,
+    nothing is interpolated. Each call sends the n k numbers of all processes to all, which transform them alike.
+    InputError for nodes at unequal angles.
+    """
+
+    def __init__(self, operators: Operators) -> None:
+        self._operators, lattice = operators, operators.body.lattice
+        self._shape, angle = lattice.shape, lattice.ring
+        if not equal_angles(lattice):
+            raise InputError(
+                "rubber that relaxes in full finite elements of a turning tire needs nodes at equal angles around the "
+                "axle: take tire.footprint_size = 1 and tire.order = 1 or 2"
+            )
+        sine, cosine, none = np.sin(angle), np.cos(angle), np.zeros_like(angle)
+        rows = (sine, none, -cosine), (cosine, none, sine), (none, none + 1, none)
+        self._turn = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+    def turning(self, angle: float) -> Array:
+        """Factors (m, 1) of turning the field by an angle (rad), against theta.
+
+        Real for two nodes a wave, which have no direction in which to move.
+        """
+        around = self._shape[0]
+        factors = np.exp(1j * angle * np.arange(around // 2 + 1))
+        if around % 2 == 0:
+            factors[-1] = factors[-1].real
+        return factors[:, None]
+
+    def __call__(self, fields: Array, factors: Array) -> Array:
+        """Own rows (n, k) of the fields (n, k) times the factors. Collective."""
+        operators, (around, across) = self._operators, self._shape
+        every = operators.body.everywhere(operators.spread(fields))
+        every = every.reshape(around, across, 3, -1)
+        series = np.fft.rfft(np.einsum("aij,asjk->asik", self._turn, every), axis=0)
+        series *= factors[:, None, None, :]
+        turned = np.fft.irfft(series, around, axis=0)
+        back = np.einsum("aji,asjk->asik", self._turn, turned).reshape(around * across, 3, -1)
+        return operators.restrict(back[operators.body.ids])
+
+
+class Relaxation:
+    """The memory of rubber in implicit steps of `step` s, of a tire that turns at `speed` (rad/s). Collective.
+
+    Every compound c is a Prony series: of its instantaneous modulus e_c the parts g_ck relax in the times t_k,
+    both moduli over the storage modulus at DYNAMIC_FREQUENCY, which the stiffness K has. With K_c the compounds' own
+    part of K (fem.matrices.operators.Compound; stress, pressure and cords are elastic) the wall resists a motion u with
+
+        F = K u + sum_c [(e_c - 1) K_c u - sum_k g_ck K_c z_k],     z_k + t_k Dz_k/Dt = u,
+
+    a displacement z_k for each relaxation time. It is carried with the material through a mesh that stands, so that
+
+        D/Dt = d/dt - Omega d/dtheta
+
+    on cylindrical components. Along the path of the material u is taken to be linear over a step h: with x = h / t_k
+    and S the turning by Omega h about the axle (`Around`),
+
+        z+ = e^-x S z + (p - e^-x) S u + (1 - p) u+,    p = (1 - e^-x) / x,
+
+    of second order in h and stable for any x. About a state that is not alike all around, K_c at a place is that of
+    the material there now, as in the modes' law. `memory` (n, k) m: z on own unknowns.
+
+    InputError if a compound has losses that are no Prony series, and for Omega where nodes are at unequal angles.
+    """
+
+    def __init__(self, operators: Operators, step: float, speed: float) -> None:
+        compounds = operators.compounds()
+        series = [one.kind.spectrum.relaxing() for one in compounds]
+        times = np.array(sorted({time for _, parts in series for time in parts}))
+        self._parts = [one.stiffness for one in compounds]
+        self._instant = np.array([instant for instant, _ in series])
+        shares = [[parts.get(t, 0.0) for t in times] for _, parts in series]
+        self._shares = np.reshape(shares, (len(series), len(times)))
+        self._around = Around(operators) if speed else None
+        x = step / times
+        self._kept, mean = np.exp(-x), -np.expm1(-x) / x
+        self._before, self._after = mean - self._kept, 1 - mean
+        self._turned = self._around.turning(speed * step) if self._around else np.ones((1, 1))
+        self.memory = np.zeros((len(operators.mass), len(times)))
+
+    def stiffen(self, stiffness: PETSc.Mat) -> None:
+        """Give the matrix K its instantaneous moduli."""
+        for instant, part in zip(self._instant, self._parts, strict=True):
+            add_part(stiffness, instant - 1, part)
+
+    def soften(self, system: PETSc.Mat) -> None:
+        """Take from a matrix with instantaneous moduli what relaxes within a step."""
+        for relaxed, part in zip(self._shares @ self._after, self._parts, strict=True):
+            add_part(system, -relaxed, part)
+
+    def remembered(self, before: Array) -> Array:
+        """Force (own rows) N by the motions up to `before` (own rows), a step ago, at the end of the step."""
+        carried = self._kept * self.memory + self._before * before[:, None]
+        self._carried = self._around(carried, self._turned) if self._around else carried
+        return self.force(self._carried)
+
+    def advance(self, new: Array) -> None:
+        """End the step at displacement `new` (own rows); call after `remembered`."""
+        self.memory = self._carried + self._after * new[:, None]
+
+    def steady(self, motion: Array) -> Array:
+        """The memory of a motion (own rows) that has always rested in space."""
+        whole = np.repeat(motion[:, None], len(self._kept), axis=1)
+        if self._around is None:
+            return whole
+        turned = self._turned
+        gone = (self._after + self._before * turned) / (1 - self._kept * turned)
+        return self._around(whole, gone)
+
+    def force(self, memory: Array) -> Array:
+        """sum_c,k g_ck K_c z_k, own rows, N, of a memory (n, k)."""
+        out = np.zeros(len(memory))
+        for part, shares in zip(self._parts, self._shares, strict=True):
+            out += multiply(part, (memory @ shares)[:, None])[:, 0]
+        return out
+
+
+class _Resting:
+    """The stiffness of motions at rest in space (PETSc's Python matrix), of a matrix with instantaneous moduli."""
+
+    def __init__(self, stiffness: PETSc.Mat, relaxation: Relaxation) -> None:
+        self._stiffness, self._relaxation = stiffness, relaxation
+
+    def mult(self, matrix: PETSc.Mat, motion: PETSc.Vec, force: PETSc.Vec) -> None:
+        """The force of a motion. Collective."""
+        self._stiffness.mult(motion, force)
+        force.array[:] -= self._relaxation.force(self._relaxation.steady(motion.array_r))
+
+    def solve(self, force: Array) -> Array:
+        """The motion (own rows) under a force (own rows) N, by GMRES. Collective.
+
+        ConvergenceError near a critical speed.
+        """
+        stiffness = self._stiffness
+        whole = PETSc.Mat().createPython(stiffness.getSizes(), self, comm=stiffness.comm)
+        whole.setUp()
+        solver = PETSc.KSP().create(stiffness.comm)
+        solver.setOperators(whole, stiffness)
+        solver.setType(PETSc.KSP.Type.GMRES)
+        solver.getPC().setType(PETSc.PC.Type.LU)
+        solver.getPC().setFactorSolverType("mumps")
+        solver.setTolerances(rtol=_RESTING)
+        right, found = stiffness.createVecs()
+        right.array[:] = force
+        solver.solve(right, found)
+        if solver.getConvergedReason() <= 0:
+            raise ConvergenceError(
+                "full finite elements: no shape at rest under constant forces was found, as at a critical speed. "
+                "Lower the speed."
+            )
+        motion = found.array_r.copy()
+        for used in (solver, whole, right, found):
+            used.destroy()
+        return motion
 
 
 class AirStep:
@@ -289,9 +463,10 @@ class FullTire:
     The interface is that of greens.recursion.Recursion, so the same contact loop runs on it.
     `outputs` (r, 3 s) and `loads` (k, 3 s) are weights of the outer face's nodes; `air`: the
     cavity's air, whose coordinates follow the tire's; `corner`: suspension and rim coupling of a
-    moving wheel, without `air` and `modal`; the unknowns are then the tire's whole motion, followed
-    by the wheel's. `modal`: damping by modes in addition to `damping`, (gamma1 1/s, gamma2 s). All
-    methods are collective.
+    moving wheel, without `air`, `modal` and `relaxes`; the unknowns are then the tire's whole motion, followed
+    by the wheel's. `modal`: damping by modes in addition to `damping`, (gamma1 1/s, gamma2 s);
+    `relaxes`: the rubber's own losses and moduli instead, by the Prony series of its compounds
+    (`Relaxation`). All methods are collective.
     """
 
     def __init__(
@@ -308,10 +483,15 @@ class FullTire:
         spectral_radius: float = 0.0,
         air: Column | None = None,
         modal: ModalDamping | None = None,
+        relaxes: bool = False,
         corner: tuple[Axle, RimMotion] | None = None,
     ) -> None:
-        if corner and (air or modal):
+        if corner and (air or modal or relaxes):
             raise InputError("a full tire on a corner has neither air nor loss factors here")
+        if modal and relaxes:
+            raise InputError(
+                "a full tire loses by its modes or by its rubber that relaxes, not by both"
+            )
         self._set_scheme(step, spectral_radius)
         self._operators, self.comm, self._step = operators, operators.body.comm, step
         self._mass, self._carried = operators.mass, operators.carried
@@ -321,6 +501,10 @@ class FullTire:
         wheel = (
             MovingWheel(operators, *corner[::-1], speed, self._drag, stiffness) if corner else None
         )
+        relaxing = relaxes and operators.body.wall.kinds()
+        self._relaxation = Relaxation(operators, step, speed) if relaxing else None
+        if self._relaxation:
+            self._relaxation.stiffen(stiffness)
         system = stiffness.copy()
         different = PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
         self._stiffness = stiffness
@@ -329,6 +513,8 @@ class FullTire:
         diagonal = system.getDiagonal()
         diagonal.array[:] += (1 - self._a) / (self._beta * step**2) * self._mass
         system.setDiagonal(diagonal)
+        if self._relaxation:
+            self._relaxation.soften(system)
         system.setOption(PETSc.Mat.Option.SYMMETRIC, speed == 0)
         self._columns = on_own_rows(operators, loads).toarray()
         self._modal, self._share = modal, share
@@ -385,8 +571,13 @@ class FullTire:
                 "full finite elements with air or a moving wheel begin without horizontal forces"
             )
         self.start(np.zeros_like(force) if sudden is None else sudden)
-        pushed = (self._columns @ force)[:, None]
-        self.displacement = solve_columns(factorise(self._stiffness), self._stiffness, pushed)[:, 0]
+        pushed = self._columns @ force
+        if self._relaxation:
+            self.displacement = _Resting(self._stiffness, self._relaxation).solve(pushed)
+            self._relaxation.memory = self._relaxation.steady(self.displacement)
+        else:
+            factor = factorise(self._stiffness)
+            self.displacement = solve_columns(factor, self._stiffness, pushed[:, None])[:, 0]
         return summed(self.comm, self._outputs @ self.displacement)
 
     def predict(self) -> np.ndarray:
@@ -397,7 +588,10 @@ class FullTire:
         right = (1 - a) * (moved / (beta * h**2) + kept) - a * self.acceleration
         rate = gamma / (beta * h) * moved - self.velocity
         rate += h * (gamma * kept - (1 - gamma) * self.acceleration)
-        self._free = self._solved(self._mass * right + self._product(rate))
+        right = self._mass * right + self._product(rate)
+        if self._relaxation:
+            right[: self._tire] += self._relaxation.remembered(self.displacement[: self._tire])
+        self._free = self._solved(right)
         return summed(self.comm, self._outputs @ self._free[: self._tire])
 
     def _by_factors(self, right: np.ndarray) -> np.ndarray:
@@ -451,6 +645,8 @@ class FullTire:
         # step.
         self.balanced = (1 - self._a) * acceleration + self._a * self.acceleration
         self.displacement, self.acceleration = new, acceleration
+        if self._relaxation:
+            self._relaxation.advance(new[: self._tire])
 
     def wheel_motion(self) -> np.ndarray:
         """Motion (7,) of rim and body: three translations m, three rotations rad, height m."""
@@ -459,13 +655,15 @@ class FullTire:
 
     def snapshot(self) -> dict[str, np.ndarray]:
         """State at all lattice nodes, (n, 3) each: m, m/s, m/s2, m/s2, on every process; "air": (4,
-        a).
+        a); "memory" (n, 3, k) m of rubber that relaxes.
         """
         spread, everywhere = self._operators.spread, self._operators.body.everywhere
         states = {name: np.split(getattr(self, name), [self._tire]) for name in _STATE}
         kept = {name: everywhere(spread(own)) for name, (own, _) in states.items()}
         if self._air:
             kept["air"] = self._air.shared(np.array([air for _, air in states.values()]))
+        if self._relaxation:
+            kept["memory"] = everywhere(spread(self._relaxation.memory))
         return kept
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
@@ -475,6 +673,9 @@ class FullTire:
             if self._air and self._air.mine:
                 own = np.concatenate([own, state["air"][k]])
             setattr(self, name, own)
+        if self._relaxation:
+            memory = state["memory"][self._operators.body.ids]
+            self._relaxation.memory = self._operators.restrict(memory)
 
     def inertia_force(self) -> np.ndarray:
         """Rate of momentum (3,) of tire and air, N; convective parts cancel around the ring."""

@@ -114,13 +114,16 @@ class Spectrum:
     """Storage modulus and loss factor of small motions over those at DYNAMIC_FREQUENCY.
 
     `frequency` (k,) Hz ascending, `storage` and `loss` (k,), -. Between them power laws; beyond the
-    ends `exponent` goes on for the modulus, and the loss factor stays.
+    ends `exponent` goes on for the modulus, and the loss factor stays. `series`: shares g_k of the
+    instantaneous modulus and relaxation times t_k, s, of a Prony series, whose samples the others
+    are; empty if it is none.
     """
 
     frequency: tuple[float, ...] = (DYNAMIC_FREQUENCY,)
     storage: tuple[float, ...] = (1.0,)
     loss: tuple[float, ...] = (1.0,)
     exponent: float = 0.0
+    series: tuple[tuple[float, float], ...] = ()
 
     def modulus(self, frequency: np.ndarray) -> np.ndarray:
         """Storage modulus over that at DYNAMIC_FREQUENCY, at frequencies in Hz; below LOADING that at LOADING."""
@@ -149,7 +152,25 @@ class Spectrum:
             tuple(g / storage for g in self.storage),
             tuple(part / (loss or 1.0) for part in self.loss),
             self.exponent,
+            tuple((share, factor * time) for share, time in self.series),
         )
+
+    def relaxing(self) -> tuple[float, dict[float, float]]:
+        """Instantaneous modulus, and what of it relaxes by relaxation time (s), of a Prony series.
+
+        Both over the storage modulus at DYNAMIC_FREQUENCY, E_0 / E' and g_k E_0 / E'. InputError if it is none.
+        """
+        if not self.series:
+            raise InputError(
+                "a rubber relaxes in time by a Prony series: give prony_shares and prony_times for every compound"
+            )
+        shares, times = np.array(self.series).T
+        turned = (2 * np.pi * DYNAMIC_FREQUENCY * times) ** 2
+        instant = 1 / (1 - float((shares / (1 + turned)).sum()))
+        out: dict[float, float] = {}
+        for share, time in self.series:
+            out[time] = out.get(time, 0.0) + share * instant
+        return instant, out
 
 
 CONSTANT = Spectrum()
@@ -181,6 +202,7 @@ def prony(
         tuple(sampled.tolist()),
         tuple((storage[:-1] / storage[-1]).tolist()),
         tuple((loss[:-1] / there).tolist()),
+        series=tuple(zip(g.tolist(), t.tolist(), strict=True)),
     )
     return float(storage[-1] / (1 - g.sum())), float(loss[-1]), spectrum
 

@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 from tireroad.contact.model import ContactSpec
 from tireroad.contact.rolling import make_loop, rolling_steadily
 from tireroad.contact.setup import ContactSetup
-from tireroad.fem.transient import FullTire, ModalDamping, NonlinearTire
+from tireroad.fem.transient import FullTire, ModalDamping, NonlinearTire, equal_angles
 from tireroad.greens.coupling import Wheel
 from tireroad.greens.response import Response
 from tireroad.modal.damping import StrainEnergy, beyond, modal_damping
@@ -97,12 +97,22 @@ class Elements:
         """The full matrices of the rotating wheel."""
         return self.run.wheel
 
+    @property
+    def relaxes(self) -> bool:
+        """Whether the full finite elements have the rubber of the scene: Prony series, and nodes at equal angles if it turns."""
+        wheel, kinds = self.wheel, self.motions.body.wall.kinds()
+        series = bool(kinds) and all(kind.spectrum.series for kind, _ in kinds)
+        turns = not wheel.speed or equal_angles(self.motions.lattice)
+        return isinstance(wheel.damping, StrainEnergy) and series and turns and not self.job.axle
+
     def full(self, step: float, radius: float = RADIUS) -> tuple[FullTire, float, float]:
         """All degrees of freedom between the same points; step; set-up in s."""
         wheel, axle = self.wheel, self.job.axle
         began = time.perf_counter()
+        losses = {"damping": (0.0, 0.0), "relaxes": True} if self.relaxes else self._damping()
         tire = FullTire(
             **self._between_points(step),
+            **losses,
             rotation=wheel.rotation,
             speed=wheel.speed,
             inertia=wheel.inertia,
@@ -118,6 +128,7 @@ class Elements:
         began = time.perf_counter()
         tire = NonlinearTire(
             **self._between_points(step),
+            **self._damping(),
             inflation=static.inflation,
             spectral_radius=RADIUS,
             turning=(wheel.rotation, static.rolling) if wheel.speed else None,
@@ -126,16 +137,8 @@ class Elements:
 
     def _between_points(self, step: float) -> dict[str, Any]:
         """The arguments that any full tire has between the points of the contact. Collective."""
-        points = self._all_points
-        damping, modal = self._damping()
-        return {
-            "operators": self.wheel.operators,
-            "damping": damping,
-            "modal": modal,
-            "step": step,
-            "outputs": points,
-            "loads": points,
-        }
+        points, operators = self._all_points, self.wheel.operators
+        return {"operators": operators, "step": step, "outputs": points, "loads": points}
 
     @property
     def _all_points(self) -> sparse.csr_matrix:
@@ -143,16 +146,17 @@ class Elements:
         assert self.probes is not None, "points of a contact"
         return self.probes.on_face.loads
 
-    def _damping(self) -> tuple[tuple[float, float], ModalDamping | None]:
+    def _damping(self) -> dict[str, Any]:
         """Uniform damping of the full matrices, and additional modal damping. Collective."""
         wheel, modes = self.wheel, self.modes
         if not isinstance(wheel.damping, StrainEnergy):
-            return wheel.damping, None
+            return {"damping": wheel.damping}
         uniform = beyond(wheel.damping, modes.projection)
         excess = modal_damping(wheel.damping, modes.projection)
         excess = excess - uniform.mass * np.eye(len(excess))
         turning = (wheel.rotation.body, wheel.speed) if wheel.speed else ()
-        return uniform, ModalDamping(wheel.operators, modes.modes.vectors, excess, *turning)
+        modal = ModalDamping(wheel.operators, modes.modes.vectors, excess, *turning)
+        return {"damping": uniform, "modal": modal}
 
 
 def percent(part: float) -> float:

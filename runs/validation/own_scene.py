@@ -1,8 +1,9 @@
 """A scene of one's own: its run against full finite elements in time, on the same mesh, road and points.
 
-Full finite elements have one modulus for all frequencies, that of 100 Hz (fem.tire.material.DYNAMIC_FREQUENCY), beside the
-losses of the modes. Where moduli depend on frequency, the modes are therefore run with these moduli too: what they are off is
-their truncation and the step, and what the run differs from them is its rubber.
+Full finite elements have the scene's rubber where all its compounds are Prony series (fem.transient.Relaxation), and, of a tire
+that turns, nodes lie at equal angles. Others have one modulus for all frequencies, that of 100 Hz
+(fem.tire.material.DYNAMIC_FREQUENCY), beside the losses of the modes. Where moduli depend on frequency, the modes are
+then run with these moduli too: what they are off is their truncation and the step, and what the run differs from them is its rubber.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ from tireroad.runs.validation.tables import Table
 LONGEST = 0.05  # s of the road: full finite elements take a second of CPU for a few of their steps
 REFINED = 2  # steps of the full finite elements in one of the run's, in the reference
 AXES = ("along the road", "across it", "vertical")
+_RELAXES = "The full finite elements have the Prony series of the compounds: what the run is off contains its law of the rubber."
 _RUBBER = (
     "The full finite elements have the moduli of 100 Hz at all frequencies; 'modes with its rubber': so have the modes, and "
     "nothing relaxes. What the run differs from them is what its moduli over frequency change."
@@ -105,7 +107,7 @@ def _compared(scene: Path, run: Finished, seconds: float) -> Table:
         "full FE at the run's step": coarser,
         "the run": FullHistory(history.step, values, seconds, 0.0),
     }
-    varies = run.rolling.basis.projection.rise is not None
+    varies = run.rolling.basis.projection.rise is not None and not elements.relaxes
     if varies:
         compared["modes with its rubber"] = _with_its_rubber(elements, trial, history)
     rows = [
@@ -125,6 +127,7 @@ def _compared(scene: Path, run: Finished, seconds: float) -> Table:
         "L2 norms of what varies, in the band of the other validations. What halving the step changes in the full finite elements stands "
         "beside what the run is off: where that is not smaller, the figure is of the reference.",
         *([_RUBBER] if varies else []),
+        *([_RELAXES] if elements.relaxes else []),
         f"CPU time: the scene's stages and loop {seconds:.0f} s; loops of the full finite elements {coarser.seconds:.0f} and "
         f"{reference.seconds:.0f} s, and {reference.setup:.0f} s for a factor.",
     ]

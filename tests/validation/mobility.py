@@ -69,14 +69,16 @@ def by_halves(up_to: float, places: list[float], bench: Bench) -> list[Array]:
 
 
 class Bench:
-    """The inflated `tire` of equal elements in its `static` state, and patches of its tread.
+    """The inflated `tire` of equal elements in its `static` state, by default the built-in one, and patches of its tread.
 
     The state is that of an inflated `ring` by Fourier series, on the nodes of the elements, or else their own, whose tangent takes
     more memory than all that comes later.
     """
 
-    def __init__(self, ring: InflatedRing | None = None) -> None:
-        self.tire = library.radial(SIZE, segments=AROUND, elements_arc=ALONG, footprint_size=1.0)
+    def __init__(self, ring: InflatedRing | None = None, tire: TireModel | None = None) -> None:
+        self.tire = tire or library.radial(
+            SIZE, segments=AROUND, elements_arc=ALONG, footprint_size=1.0
+        )
         self.static = (
             library.press(self.tire, inflation=PRESSURE) if ring is None else self._as_in(ring)
         )

@@ -48,6 +48,24 @@ def test_a_series_is_the_transform_of_its_relaxation():
         assert found == pytest.approx(1 + w * parts[0] + 1j * w * parts[1], rel=2e-3)
 
 
+@pytest.mark.parametrize("shift", [1.0, 0.03])
+def test_what_relaxes_in_time_is_the_series(shift):
+    """Complex moduli of springs and dashpots by `relaxing`, at the reference and at another temperature: those of the spectrum."""
+    _, loss, spectrum = prony(SHARES, TIMES)
+    warm = spectrum.shifted(shift)
+    loss *= float(spectrum.loss_factor(np.array([shift * 100.0]))[0])
+    instant, relaxes = warm.relaxing()
+    s = 2j * np.pi * FREQUENCY
+    found = instant - sum(part / (1 + s * time) for time, part in relaxes.items())
+    exact = warm.modulus(FREQUENCY) * (1 + 1j * loss * warm.loss_factor(FREQUENCY))
+    np.testing.assert_allclose(found, exact, rtol=2e-3)
+
+
+def test_a_power_law_does_not_relax_by_a_series():
+    with pytest.raises(InputError, match="prony_shares"):
+        power_law(0.1).relaxing()
+
+
 def test_storage_and_loss_obey_the_dispersion_relation():
     """Kramers and Kronig: E'(w) - E_inf = (2 w^2 / pi) PV int E''(x) / (x (w^2 - x^2)) dx."""
     x = np.geomspace(1e-3, 1e6, 200_001)

@@ -77,6 +77,28 @@ def test_moduli_over_frequency_are_told_from_what_modes_cost(tmp_path: Path) -> 
     assert any("moduli of 100 Hz" in note for note in table.notes)
 
 
+@pytest.mark.slow
+def test_full_elements_have_the_prony_series_of_a_scene(tmp_path: Path) -> None:
+    """On elements of one length around they relax, and nothing stands in for them; on others they have moduli of 100 Hz."""
+    series = "prony_shares = [0.1, 0.15, 0.2]\nprony_times = [1e-2, 1.6e-3, 3e-4]\n"
+    text = SCENE.replace("[damping]\nmass = 300.0\n", "").format(modes=150, duration=0.2)
+    tables = []
+    for size in ("footprint_size = 1.0\n", ""):
+        path = tmp_path / "mine.toml"
+        path.write_text(text.replace("elements_arc = 6\n", f"elements_arc = 6\n{size}{series}"))
+        tables += against_elements(path, 0.03)
+    relaxing, one_modulus = tables
+    assert any("Prony series" in note for note in relaxing.notes)
+    assert any("moduli of 100 Hz" in note for note in one_modulus.notes)
+    off = []
+    for table in tables:
+        names = [name for name, _ in table.columns]
+        row = next(row for row in table.rows if row[:2] == ["axle force", "vertical"])
+        off.append(row[names.index("the run")])
+    assert "modes with its rubber" not in [name for name, _ in relaxing.columns]
+    assert off[0] < 0.5 * off[1]
+
+
 @pytest.mark.long
 def test_the_command_writes_a_page(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     out = tmp_path / "found.json"
