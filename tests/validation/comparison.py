@@ -106,10 +106,13 @@ class Tires(Elements):
         static, contact = self.run.static, self.job.scene.contact
         setup = scene_setup(self.job, static) if contact else None
         self.probes = probes(self.job, static, setup)
-        if setup:
+        if setup and contact:
+            exact = self.response(len(self.modes.frequency), "static")
+            setup = setup.equilibrated(exact, static.normal_force, contact)[0]
             begins = contact.has_friction and self.wheel.speed > 0
-            exact = self.response(len(self.modes.frequency), "static") if begins else None
-            self.trial = Conditions(contact, setup, self.job.scene.time.duration, exact)
+            self.trial = Conditions(
+                contact, setup, self.job.scene.time.duration, exact if begins else None
+            )
 
     def modal(self, choice: Choice) -> tuple[Recursion, float, float]:
         """The lowest modes with their residual between the scene's points; step; set-up in s."""

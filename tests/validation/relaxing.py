@@ -299,9 +299,7 @@ def _histories(tires: Tires, text: str, steps: Sequence[float]) -> list[FullHist
     in space is the nearest to theirs; other laws in that of the run.
     """
     tires.change(text)
-    spec, count = tires.job.scene.contact, len(tires.modes.frequency)
-    whole = tires.response(count, "static", counted=False)
-    settled, _ = tires.trial.setup.equilibrated(whole, tires.run.static.normal_force, spec)
+    spec, settled = tires.job.scene.contact, tires.trial.setup
     responses, begun = laws(tires), {}
 
     def trial(response: Response, step: float) -> Conditions:
