@@ -64,7 +64,7 @@ def test_a_wave_pushes_the_tire_back_by_the_load_times_its_slope(rolling, wavele
     static pressure: 4000 N on a wave of 2 mm and 1 m gives 50 N, less what the footprint smooths."""
     low = 1e-6
     road = tr.make_road(kind="sine", wavelength=wavelength, amplitude=low)
-    run = tr.drive(rolling, road, duration=0.02, step=1e-4, spacing=0.008, friction=0.0)
+    run = tr.drive(rolling, road, duration=0.022, step=1e-4, spacing=0.008, friction=0.0)
     speed = 50.0 * rolling.standing.motions.static.rolling_radius()
     k = 2 * np.pi / wavelength
     patch = run.patch
