@@ -80,12 +80,17 @@ class Basis:
         response = couple(self.states, *arguments, self.carried)
         needed = self.of_hub(outputs)
         if needed.nnz:
-            response = reading(response, self.states, needed, self.beside(needed)[3:])
-            direct = needed @ self.loaded(loads)
-            response = replace(response, residual=response.residual + direct)
+            response = self.reading_hub(response, needed, loads)
         if flexibility is None:
             return response
         return replace(response, residual=flexibility - response.static())
+
+    def reading_hub(
+        self, response: Response, moments: sparse.csr_matrix, loads: sparse.csr_matrix
+    ) -> Response:
+        """The response (r, k) of the states to the probes `loads` (k, 3 s), with hub `moments` (r, 3) in its outputs."""
+        response = reading(response, self.states, moments, self.beside(moments)[3:])
+        return replace(response, residual=response.residual + moments @ self.loaded(loads))
 
     def of_hub(self, outputs: sparse.csr_matrix) -> sparse.csr_matrix:
         """Weights (r, 3) by which the probes read the hub moments."""

@@ -29,7 +29,7 @@ from tireroad.fem.tire.material import Spectrum
 from tireroad.greens.basis import Array, Basis, modal_statics
 from tireroad.greens.coupling import FASTEST, dynamic, foremost, with_left_out
 from tireroad.greens.residuals import residual_of
-from tireroad.greens.response import Response, couple, reading
+from tireroad.greens.response import Response, couple
 from tireroad.greens.responses import cutoff
 from tireroad.modal.basis import ModalBasis, Projection
 from tireroad.modal.corner import HUB_MOMENTS
@@ -166,8 +166,7 @@ def _coupled(response: Response, rolling: RollingModes, probes: sparse.csr_matri
         hub = sparse.csr_matrix(
             (np.ones(len(rows)), (rows, np.arange(len(rows)))), (len(outputs), HUB_MOMENTS)
         )
-        made = reading(made, rolling.states, hub, whole.beside(hub)[3:])
-        made = replace(made, residual=made.residual + hub @ whole.loaded(probes[:count]))
+        made = whole.reading_hub(made, hub, probes[:count])
     return replace(made, pulse=response.pulse, offset=response.offset)
 
 

@@ -944,11 +944,14 @@ static void stiffness(stick_slip *s, int reach, const double *force, double *mov
         for (int i = 0; i < a; i++) moved[d * a + i] += s->spring[i] * force[d * a + i];
 }
 
+/* The force (x, y) cut down to its bound. */
+static void onto_disc(double bound, double *x, double *y) {
+    const double length = hypot(*x, *y);
+    if (length > bound) *x *= bound / length, *y *= bound / length;
+}
+
 static void onto_discs(int a, const double *bound, double *force) {
-    for (int i = 0; i < a; i++) {
-        const double length = hypot(force[i], force[a + i]);
-        if (length > bound[i]) force[i] *= bound[i] / length, force[a + i] *= bound[i] / length;
-    }
+    for (int i = 0; i < a; i++) onto_disc(bound[i], force + i, force + a + i);
 }
 
 static double most_force(const stick_slip *s) {
@@ -1153,7 +1156,7 @@ static const double DEPENDENT = 1e-4; /* share of a secant that is not of later 
 /* Of a Newton step's problem between `count` points: their numbers, and what follows in arrays (count,) or (2, count). */
 struct at_once_work {
     int count, *index, whole;
-    double *slope, *own, *beside, *spring, *direction, *share, *right, *step;
+    double *direction, *share, *right, *step;
     uint8_t *kept, *sets, *last_sets;     /* the latter two (c,): what touches and slips, now and a Newton step before */
     double *last, *last_step, *now;       /* (3, c) N of the Newton step before: its forces and itself; this one */
     double *basis, *reduced, *part;       /* of the secants: (most, 3c), (most, most), (most,) */
@@ -1166,8 +1169,7 @@ struct at_once_work {
 void at_once_begin(at_once *s) {
     const int c = s->compliance->points, p = s->compliance->nodes, m = s->most_secants;
     struct at_once_work *w = s->work = room(1, sizeof *w);
-    w->index = INTS(c), w->slope = DOUBLES(2 * c), w->own = DOUBLES(c), w->beside = DOUBLES(c), w->spring = DOUBLES(c);
-    w->direction = DOUBLES(2 * c), w->share = DOUBLES(c), w->right = DOUBLES(3 * c), w->step = DOUBLES(3 * c);
+    w->index = INTS(c), w->direction = DOUBLES(2 * c), w->share = DOUBLES(c), w->right = DOUBLES(3 * c), w->step = DOUBLES(3 * c);
     w->kept = room(2 * c, 1), w->sets = room(c, 1), w->last_sets = room(c, 1);
     w->last = DOUBLES(3 * c), w->last_step = DOUBLES(3 * c), w->now = DOUBLES(3 * c);
     w->basis = DOUBLES((size_t)m * 3 * c), w->reduced = DOUBLES(m * m), w->part = DOUBLES(m);
@@ -1177,7 +1179,7 @@ void at_once_begin(at_once *s) {
 
 void at_once_end(at_once *s) {
     struct at_once_work *w = s->work;
-    void *all[] = {w->index, w->slope, w->own, w->beside, w->spring, w->direction, w->share, w->right, w->step, w->kept, w->sets,
+    void *all[] = {w->index, w->direction, w->share, w->right, w->step, w->kept, w->sets,
                    w->last_sets, w->last, w->last_step, w->now, w->basis, w->reduced, w->part, w->nodal, w->nodes, w->value,
                    w->force, w->field, w->which, w->carrier, w->place, w->compact, w};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) free(all[i]);
@@ -1281,7 +1283,7 @@ void at_once_balance(at_once *s) {
         if (!(wrong <= worst)) worst = wrong;
         s->touches[i] = pressed - gap > 0.0;
         const double bound = bound_of(s, f), r = 1.0 / s->beside[i];
-        double whole[2], length;
+        double whole[2];
         for (int d = 0, l = i; d < 2; d++, l += n) {
             const double t = s->force[n + l];
             s->slip[l] = s->base[l] + s->spring[i] * t + s->past[l];
@@ -1292,7 +1294,7 @@ void at_once_balance(at_once *s) {
         if (isfinite(bound)) most = fmax(most, bound);
         most = fmax(most, hypot(x, y));
         if (!s->touches[i] || !s->bears[i]) continue;
-        if ((length = hypot(whole[0], whole[1])) > bound) whole[0] *= bound / length, whole[1] *= bound / length;
+        onto_disc(bound, whole, whole + 1);
         off = fmax(off, hypot(x - whole[0], y - whole[1]));
     }
     const double scale = widest + deepest;
@@ -1318,7 +1320,7 @@ static int both(void *of, const double *given, double *out) {
         spread(c, reach, a, w->index, w->force, 0, c->kernel + 3, 2, ux, uy);
     }
     memset(w->nodal, 0, size * sizeof(double));
-    for (int k = 0; k < a; k++) on_nodes(c, w->index[k], f[k], x[k], y[k], w->slope + 2 * k, w->nodal);
+    for (int k = 0; k < a; k++) on_nodes(c, w->index[k], f[k], x[k], y[k], s->slope + 2 * w->index[k], w->nodal);
     if (whole || !s->n_value) {
         const int m = w->carriers;
         if (!w->compact) between_carriers(s);
@@ -1343,16 +1345,16 @@ static int both(void *of, const double *given, double *out) {
     for (int k = 0; k < a; k++) {
         const int i = w->index[k], slips = w->share[k] < 1.0;
         const size_t at = cell(c, i);
-        const double tx = ux[at] + from_nodes(c, w->nodes + p, i) + w->spring[k] * x[k];
-        const double ty = uy[at] + from_nodes(c, w->nodes + 2 * p, i) + w->spring[k] * y[k];
+        const double tx = ux[at] + from_nodes(c, w->nodes + p, i) + s->spring[i] * x[k];
+        const double ty = uy[at] + from_nodes(c, w->nodes + 2 * p, i) + s->spring[i] * y[k];
         double z = uz[at] + from_nodes(c, w->nodes, i);
-        if (slips && s->reads) z -= w->slope[2 * k] * tx + w->slope[2 * k + 1] * ty; /* what slips meets the road elsewhere */
-        out[k] = w->kept[k] ? f[k] : z / w->own[k];
+        if (slips && s->reads) z -= s->slope[2 * i] * tx + s->slope[2 * i + 1] * ty; /* what slips meets the road elsewhere */
+        out[k] = w->kept[k] ? f[k] : z / s->own[i];
         if (w->kept[a + k]) {
             out[a + k] = x[k], out[2 * a + k] = y[k];
             continue;
         }
-        const double r = (slips ? s->caution : 1.0) / w->beside[k];
+        const double r = (slips ? s->caution : 1.0) / s->beside[i];
         double dx = r * tx - x[k], dy = r * ty - y[k];
         const double along = n[k] * dx + n[a + k] * dy, follows = slips ? s->friction * f[k] : 0.0;
         dx = w->share[k] * (dx - n[k] * along) - n[k] * follows, dy = w->share[k] * (dy - n[a + k] * along) - n[a + k] * follows;
@@ -1449,12 +1451,10 @@ void at_once_newton(at_once *s, int normal, int plane_too, int whole, double tol
         const int slips = bears && length > bound;
         w->share[k] = slips ? bound / length : 1.0;
         w->sets[i] |= slips << 1;
-        w->own[k] = s->own[i], w->beside[k] = s->beside[i], w->spring[k] = s->spring[i];
         w->kept[k] = !(touches && normal), w->kept[a + k] = !(bears && plane_too);
         w->right[k] = !normal ? 0.0 : touches ? -s->gap[i] / s->own[i] : -f[i];
         for (int d = 0, l = i, at = k; d < 2; d++, l += n, at += a) {
             const double t = s->force[n + l], way = w->direction[at] = slips ? s->trial[l] / length : 0.0;
-            w->slope[2 * k + d] = s->slope[2 * i + d];
             w->right[a + at] = !plane_too ? 0.0 : !bears ? -t : slips ? bound * way - t : -s->slip[l] / s->beside[i];
         }
     }
@@ -1483,8 +1483,7 @@ void at_once_bound(at_once *s) {
     for (int i = 0; i < n; i++) {
         double *f = s->force + i, *x = f + n, *y = x + n;
         *f = fmax(*f, 0.0);
-        const double bound = bound_of(s, *f), length = hypot(*x, *y);
-        if (length > bound) *x *= bound / length, *y *= bound / length;
+        onto_disc(bound_of(s, *f), x, y);
         if (!(*f > 0.0)) *x = *y = 0.0;
     }
 }

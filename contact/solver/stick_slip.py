@@ -301,12 +301,6 @@ class BrushFriction:
         """Forces (3, c) N where a step has carried the road that they are of."""
         return np.ascontiguousarray((self._brush.upstream @ force.T).T)
 
-    def bound(self, force: Array) -> Array:
-        """Largest horizontal forces (n,) N under normal forces (n,) N."""
-        if self.coefficient is None:
-            return np.full(len(force), np.inf)
-        return self.coefficient * np.maximum(force, 0.0)
-
     def limit(self, first: float, most: float) -> float:
         """Residual (N) that a step may leave, of its `first` one (N) and the `most` (N) that a point may bear."""
         return float(_C.brush_limit(self.compiled, first, most))
