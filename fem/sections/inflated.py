@@ -24,7 +24,7 @@ and the losses of those waves are its rolling resistance.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any, Protocol
 
@@ -194,13 +194,35 @@ class SectionModes:
     """Modes of a wave, of unit mass over one radian, at dynamic moduli.
 
     `squares` (m,) 1/s2; `push` (m,) N kg^-1/2 of a load; `parts` (m, m) 1/s2 of the stiffness, of each kind of
-    compounds (fem.tire.material.kinds); `flexibility` w . K_n^-1 w, m rad/N, of the load at its own place.
+    compounds (fem.tire.material.kinds); `turned`: M J and M J^2 (m, m), J turning the directions r and theta; `flexibility`
+    w . K_n^-1 w, m rad/N, of the load at its own place.
     """
 
+    wave: int
     squares: np.ndarray
     push: np.ndarray
     parts: Sequence[np.ndarray]
+    turned: Sequence[np.ndarray]
     flexibility: float
+
+    def first(self, count: int) -> SectionModes:
+        """The lowest `count` of them."""
+        few = slice(count)
+        parts, turned = ([part[few, few] for part in some] for some in (self.parts, self.turned))
+        return replace(
+            self, squares=self.squares[few], push=self.push[few], parts=parts, turned=turned
+        )
+
+    def inertia(self, rate: float, speed: float) -> np.ndarray:
+        """-M (i rate + speed (i n + J))^2 (m, m) 1/s2, as of `InflatedRing`."""
+        return _inertia(np.eye(len(self.squares)), self.turned, self.wave, rate, speed)
+
+
+def _inertia(mass: Any, turned: Sequence[Any], wave: int, rate: float, speed: float) -> Any:
+    """-M (i rate + speed (i n + J))^2 of a wave of n that oscillates in space at a rate while the tire turns at a speed
+    through it, rad/s; J turns the directions r and theta with the tire, `turned` M J and M J^2."""
+    met, (once, twice) = rate + speed * wave, turned
+    return met**2 * mass - 2j * met * speed * once - speed**2 * twice
 
 
 def mean_over(
@@ -328,14 +350,7 @@ class InflatedRing:
 
     def _carried(self, wave: int) -> sparse.csr_matrix:
         """M C_n of a wave that rests in space while the tire turns through it."""
-        return self._inertia(wave, 0.0, 1.0)
-
-    def _inertia(self, wave: int, rate: float, speed: float) -> sparse.csr_matrix:
-        """-M (i rate + speed (i n + J))^2 of a wave of n that oscillates in space at a rate while the tire turns at a speed
-        through it, rad/s; J turns the directions r and theta with the tire."""
-        met = rate + speed * wave
-        once, twice = self._turned
-        return met**2 * self.mass - 2j * met * speed * once - speed**2 * twice
+        return _inertia(self.mass, self._turned, wave, 0.0, 1.0)
 
     @cached_property
     def _turned(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
@@ -387,7 +402,9 @@ class InflatedRing:
             stiffness, share = self._dynamic_stiffness(wave), patch_share(abs(wave), half_angle)
             around = np.exp(1j * wave * angles) / 2 if speed and wave else np.cos(wave * angles)
             for row, f in zip(out, frequency, strict=True):
-                inertia = self._inside(self._inertia(wave, 2 * np.pi * f, speed))
+                inertia = self._inside(
+                    _inertia(self.mass, self._turned, wave, 2 * np.pi * f, speed)
+                )
                 dynamic = stiffness(f + wave * speed / (2 * np.pi)) - inertia
                 row += share * around * (load @ splu(dynamic).solve(load))
         return out
@@ -421,11 +438,14 @@ class InflatedRing:
         squares, fields = eigh(
             (stiffness + stiffness.T.conj()) / 2, mass, subset_by_index=[0, count - 1]
         )
-        parts = [self._inside(self._of_kind(wave, share)) for share in self._kinds.values()]
+        wall = [self._of_kind(wave, share) for share in self._kinds.values()]
+        among = [fields.T.conj() @ (self._inside(part) @ fields) for part in (*wall, *self._turned)]
         return SectionModes(
+            wave=wave,
             squares=squares,
             push=fields.T.conj() @ load,
-            parts=[fields.T.conj() @ (part @ fields) for part in parts],
+            parts=among[:-2],
+            turned=among[-2:],
             flexibility=float((load @ np.linalg.solve(stiffness, load)).real),
         )
 

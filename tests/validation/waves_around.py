@@ -8,6 +8,9 @@ Everything here is solved wave by wave around, so that one cause changes at a ti
 - Modes: those of the Fourier series to 1 kHz, with the static response of all others. First with complex
   moduli between all of them, then as each mode alone has moduli and damping of its own frequency, then with what
   couples modes at their own frequencies, which is a run's (modal.basis.Projection).
+
+The same of a tire that turns, in which a wave of n meets the rubber at the frequency of the force and n turns a second. There the
+modes are those to 1410 Hz, as a run takes for a band to 1 kHz.
 """
 
 from __future__ import annotations
@@ -27,10 +30,12 @@ from tireroad.fem.sections.radial import radial
 from tireroad.fem.tire.material import Kind, own_moduli
 from tireroad.runs import library
 from tireroad.runs.validation.tables import Table
+from tireroad.tests.validation import rolling_mobility
 from tireroad.tests.validation.mobility import ALONG, ANGLES, HALF, PRESSURE, SIZE, level
 
 ABOUT = "what weakens waves around the tire: elements around, moduli and losses of modes, what couples them"
-UP_TO = 1000.0  # Hz, of the modes
+UP_TO = 1000.0, 1410.0  # Hz, of the modes, standing and rolling
+SPEED = rolling_mobility.SPEED  # rad/s, of the rolling tire
 FREQUENCY = np.array([100, 200, 250, 315, 400, 500, 630, 800.0])  # Hz
 WAVES = 80
 ELEMENTS = (29, 48, 72, 144)  # around: 12.4, 7.5, 5 and 2.5 degrees each
@@ -39,19 +44,33 @@ Array = np.ndarray
 
 
 def run() -> list[Table]:
-    """Levels less those of complex moduli, a table for each angle from the force."""
+    """Levels less those of complex moduli, a table for each angle from the force, of the standing and of the rolling tire."""
     ring = InflatedRing(radial(SIZE), ALONG, 2, PRESSURE)
+    return [
+        *_tables(ring, 0.0, ANGLES, ELEMENTS),
+        *_tables(ring, SPEED, rolling_mobility.ANGLES, ELEMENTS[2:]),
+    ]
+
+
+def _tables(
+    ring: InflatedRing, speed: float, angles: Array, elements: Sequence[int]
+) -> list[Table]:
+    """A table for each angle from the force, of a tire that turns at a speed (rad/s) towards smaller angles."""
     weights = ring.patch(0.0, HALF[0])
-    exact = level(ring.receptance(weights, HALF[1], FREQUENCY, ANGLES, WAVES), FREQUENCY)
-    elements = [_summed(_of_elements(ring, weights, count)) for count in ELEMENTS]
-    elements += [_summed(answers) for answers in zip(*_of_modes(ring, weights), strict=True)]
-    off = [level(H, FREQUENCY) - exact for H in elements]
-    names = [f"{360 / count:.1f}\u00b0 elements" for count in ELEMENTS]
+    place = HALF[1], FREQUENCY, angles
+    exact = level(ring.receptance(weights, *place, WAVES, speed=-speed), FREQUENCY)
+    found = [_summed(_of_elements(ring, weights, count, speed), angles) for count in elements]
+    found += [
+        _summed(answers, angles) for answers in zip(*_of_modes(ring, weights, speed), strict=True)
+    ]
+    off = [level(H, FREQUENCY) - exact for H in found]
+    names = [f"{360 / count:.1f}\u00b0 elements" for count in elements]
     columns = [("frequency", "Hz"), ("complex moduli, Fourier series", "dB")]
     columns += [(name, "dB more") for name in [*names, *(f"modes: {count}" for count in MODES)]]
+    motion = f"rolling at {speed:g} rad/s" if speed else "standing"
     return [
         Table(
-            f"Crown of {SIZE}, {PRESSURE / 1e3:.0f} kPa, standing: {np.degrees(angle):.0f}\u00b0 from the force",
+            f"Crown of {SIZE}, {PRESSURE / 1e3:.0f} kPa, {motion}: {np.degrees(angle):.0f}\u00b0 from the force",
             columns,
             [
                 [
@@ -67,54 +86,71 @@ def run() -> list[Table]:
                 "dB re 1 m/(N s); every column but the second: one simplification alone, less the second"
             ],
         )
-        for k, angle in enumerate(ANGLES)
+        for k, angle in enumerate(angles)
     ]
 
 
-def _summed(answers: Sequence[Array] | Iterator[Array]) -> Array:
-    """H (f, a) m/N of the answers (f,) m rad/N of all waves."""
-    out = np.zeros((len(FREQUENCY), len(ANGLES)), complex)
-    for wave, answer in enumerate(answers):
-        out += patch_share(wave, HALF[1]) * answer[:, None] * np.cos(wave * ANGLES)
+def _waves(speed: float) -> range:
+    """The waves around of a tire at a speed; those of -n are those of n where it stands."""
+    return range(-WAVES if speed else 0, WAVES + 1)
+
+
+def _summed(answers: Sequence[Array] | Iterator[Array], angles: Array) -> Array:
+    """H (f, a) m/N at angles from the force, of the answers (f,) m rad/N of all `_waves`."""
+    found = np.array(list(answers))
+    waves = range(WAVES + 1 - len(found), WAVES + 1)
+    both = len(found) > WAVES + 1
+    out = np.zeros((len(FREQUENCY), len(angles)), complex)
+    for wave, answer in zip(waves, found, strict=True):
+        around = np.exp(1j * wave * angles) / 2 if both and wave else np.cos(wave * angles)
+        out += patch_share(abs(wave), HALF[1]) * answer[:, None] * around
     return out
 
 
-def _of_modes(ring: InflatedRing, weights: Array) -> Iterator[list[Array]]:
+def _of_modes(ring: InflatedRing, weights: Array, speed: float) -> Iterator[list[Array]]:
     """For each wave the answers (f,) of `MODES`."""
-    circular = 2 * np.pi * FREQUENCY
-    for wave in range(WAVES + 1):
+    circular, highest = 2 * np.pi * FREQUENCY, 2 * np.pi * UP_TO[bool(speed)]
+    for wave in _waves(speed):
         modes = ring.modes(wave, weights)
         stored = np.array([np.diag(part).real for part in modes.parts])
         rise, loss = own_moduli(modes.squares, stored, ring.kinds)
         own = modes.squares + rise
-        few = slice(int(np.count_nonzero(own <= (2 * np.pi * UP_TO) ** 2)))
-        squares, push, own = modes.squares[few], modes.push[few], np.sqrt(own[few])
+        count = int(np.count_nonzero(own <= highest**2))
+        modes, own, loss = modes.first(count), np.sqrt(own[:count]), loss[:count]
+        push, squares = modes.push, modes.squares
         rest = modes.flexibility - float((np.abs(push) ** 2 / squares).sum())
-        parts, unit = [part[few, few] for part in modes.parts], np.eye(len(push))
         moduli = [kind.spectrum.modulus(own / (2 * np.pi)) for kind in ring.kinds]
-        coupled, lost = np.diag(squares).astype(complex), np.zeros_like(parts[0])
-        for kind, part, g in zip(ring.kinds, parts, moduli, strict=True):
+        coupled, lost = np.diag(squares).astype(complex), np.zeros((count, count), complex)
+        for kind, part, g in zip(ring.kinds, modes.parts, moduli, strict=True):
             eta = kind.loss_factor * kind.spectrum.loss_factor(own / (2 * np.pi)) * g / own
             coupled += (np.sqrt(np.outer(g, g)) - 1) * part
             lost += np.sqrt(np.outer(eta, eta)) * part
         out = np.full((len(MODES), len(FREQUENCY)), rest, complex)
         for k, w in enumerate(circular):
+            met, inertia = w - wave * speed, modes.inertia(w, -speed)
             moved = sum(
-                (c.modulus(FREQUENCY[k]) - 1) * p for c, p in zip(ring.kinds, parts, strict=True)
+                (_modulus(kind, met / (2 * np.pi)) - 1) * part
+                for kind, part in zip(ring.kinds, modes.parts, strict=True)
             )
-            alone = np.diag(own**2 + 1j * w * own * loss[few])
+            alone = np.diag(own**2 + 1j * met * own * loss)
             for row, stiffness in enumerate(
-                (np.diag(squares) + moved, alone, coupled + 1j * w * lost)
+                (np.diag(squares) + moved, alone, coupled + 1j * met * lost)
             ):
-                out[row, k] += push.conj() @ np.linalg.solve(stiffness - w**2 * unit, push)
+                out[row, k] += push.conj() @ np.linalg.solve(stiffness - inertia, push)
         yield list(out)
 
 
-def _of_elements(ring: InflatedRing, weights: Array, count: int) -> Iterator[Array]:
+def _modulus(kind: Kind, frequency: float) -> complex:
+    """The complex modulus over the dynamic one, at a frequency (Hz) of either sign."""
+    found = kind.modulus(abs(frequency))
+    return found if frequency >= 0 else np.conj(found)
+
+
+def _of_elements(ring: InflatedRing, weights: Array, count: int, speed: float) -> Iterator[Array]:
     """For each wave the answer (f,) of a ring of `count` equal three-dimensional elements around."""
     cell = _Cell(ring, weights, count)
-    for wave in range(WAVES + 1):
-        yield cell.answers(wave)
+    for wave in _waves(speed):
+        yield cell.answers(wave, speed)
 
 
 class _Cell:
@@ -150,19 +186,25 @@ class _Cell:
         self._kinds: list[Kind] = [compound.kind for compound in compounds]
         self._whole = own_rows(operators.stiffness)
         self._parts = [own_rows(compound.stiffness) for compound in compounds]
+        rotation = operators.rotation()
+        self._turning = own_rows(rotation.gyroscopic), own_rows(rotation.convective)
         self._mass = operators.mass[rows]
         self._across = weights[same][used]
 
-    def answers(self, wave: int) -> Array:
-        """w . (K_n*(omega) - omega^2 M)^-1 w (f,), m rad/N, as of InflatedRing.receptance."""
+    def answers(self, wave: int, speed: float) -> Array:
+        """w . (K_n*(omega - n Omega) + 2 i omega Omega G_n + Omega^2 S_n - omega^2 M)^-1 w (f,), m rad/N, of a tire that
+        turns at a speed Omega towards smaller angles, as of InflatedRing.receptance."""
         load = np.zeros(self._size, complex)
         load[::3] = np.outer(self._around(wave), self._across).ravel()
         whole, *parts = (self._of(wave, part) for part in (self._whole, *self._parts))
+        gyroscopic, convective = (self._of(wave, part) for part in self._turning)
         out = np.empty(len(FREQUENCY), complex)
         for k, f in enumerate(FREQUENCY):
-            matrix = whole - sparse.diags((2 * np.pi * f) ** 2 * self._mass)
+            omega = 2 * np.pi * float(f)
+            matrix = whole + speed**2 * convective + 2j * omega * speed * gyroscopic
+            matrix = matrix - sparse.diags(omega**2 * self._mass)
             for kind, part in zip(self._kinds, parts, strict=True):
-                matrix = matrix + (kind.modulus(float(f)) - 1) * part
+                matrix = matrix + (_modulus(kind, f - wave * speed / (2 * np.pi)) - 1) * part
             out[k] = load.conj() @ splu(matrix.tocsc()).solve(load)
         return out * 2 * np.pi / self._count
 
