@@ -686,7 +686,7 @@ def _describe(record: Record, sound: SoundPressure) -> None:
             continue
         levels = sound.total_weighted[heard] if name == "CPX" else sound.total_intensity
         mean = 10 * np.log10((10 ** (levels / 10)).mean())
-        # That of the vibration is the same at all microphones: it does not average out.
+        # Errors of one vibration at several microphones go together: they do not average out.
         error = sound.total_weighted_error[heard].mean()
         _told(record, f"A-weighted {name} level", mean, error, unit)
     if sound.probes:
