@@ -219,7 +219,7 @@ class ReferenceRun:
 
     @cached_property
     def whole(self) -> Vibrating:
-        """What tells the vibration of the whole tire under the forces of a loop."""
+        """The tire whose vibration under the forces of a loop is told."""
         loads = driven_loads(self.job, self.static.product, self.setup)
         basis = Basis.of(self.rolling)
         return Vibrating(

@@ -200,7 +200,7 @@ class ContactForces(NamedTuple):
 
 
 class Listener(Protocol):
-    """What tells the vibration of the whole tire (runs.stages.replay.Vibrating)."""
+    """A tire whose vibration is told (runs.stages.replay.Vibrating)."""
 
     def lines(
         self, change: np.ndarray, begun: np.ndarray, step: float, scheme: str
