@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import h5py
 import numpy as np
-from scipy import sparse
+from scipy import linalg, sparse
 
 from tireroad.contact.results.spectra import low_part
 from tireroad.contact.setup import ContactSetup
@@ -227,15 +227,9 @@ def wheel_motion(basis: Basis) -> Array:
 def on_other_mesh(basis: Basis, lattice: NodeGrid, other: Basis, coarser: NodeGrid) -> Array:
     """Coordinates (m', m) of a basis per coordinate of an `other` one on another mesh: what moves the outer face, and a wheel
     that moves, most alike in the least squares."""
-    weights = between(coarser, lattice)
-    carried = np.vstack(
-        [
-            (weights @ other.face(weights.shape[1]).reshape(weights.shape[1], -1)).reshape(
-                3 * len(lattice.face), -1
-            ),
-            wheel_motion(other),
-        ]
-    )
-    own = np.vstack([basis.face(len(lattice.face)), wheel_motion(basis)])
-    found: Array = np.linalg.lstsq(own.T @ own, own.T @ carried, rcond=_ROUNDING)[0]
+    weights, nodes = between(coarser, lattice), len(lattice.face)
+    moved = other.face(weights.shape[1]).reshape(weights.shape[1], -1)
+    carried = np.vstack([(weights @ moved).reshape(3 * nodes, -1), wheel_motion(other)])
+    own = np.vstack([basis.face(nodes), wheel_motion(basis)])
+    found: Array = linalg.lstsq(own.T @ own, own.T @ carried, _ROUNDING, lapack_driver="gelsy")[0]
     return found
