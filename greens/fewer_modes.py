@@ -50,8 +50,9 @@ def of_fewer_modes(
     residual: str,
     spectra: Sequence[Spectrum],
     comm: MPI.Comm,
-) -> tuple[Response, RollingModes]:
-    """The response of the modes up to a `share` of the highest, with a residual of the same kind, and its states.
+) -> tuple[Response, RollingModes, Array]:
+    """The response of the modes up to a `share` of the highest, with a residual of the same kind, its states, and the combinations
+    T (m, m') of the tire's coordinates that are theirs.
 
     `response` (r, k) of the states of `rolling`, whose first outputs are its inputs; `readings` (p, m) of the `probes` (p, 3 s)
     or wider per coordinate of the tire, k <= p <= r. `spectra` of the compounds' moduli, as many as the projection has
@@ -82,7 +83,7 @@ def of_fewer_modes(
         few = _alone(old, count, spectra)
         made = _completed(made, own, _softening(own, rolling, few, readings, probes))
     relaxing = response.eigenvalue[slow], response.output[:, slow], response.input[slow]
-    return made.with_slow(*relaxing), rolls
+    return made.with_slow(*relaxing), rolls, turn
 
 
 def _joined(projection: Projection, count: int, columns: Array) -> Array:

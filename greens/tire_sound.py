@@ -162,12 +162,12 @@ class SoundingTire:
     def volumes(self, shape: Array, rigid: Array | None = None) -> Array:
         """U (e, m) m2 per unit of m coordinates, which move the face by `shape` (3 s, m) m.
 
-        `rigid` (6, m): how they move the wheel, in m and rad.
+        `rigid` (6, m): how they move the wheel, in m and rad; none (0, m) of a wheel that is held.
         """
         s = len(self.area)
         moved = np.einsum("sc,scm->sm", self.area, shape.reshape(s, 3, -1))
         volumes = np.asarray(self.nodes.T @ moved)
-        if rigid is not None:
+        if rigid is not None and len(rigid):
             some = ~self.face
             place = self.body.center[some] - [0, 0, self.height]
             place, vector = place @ self.axes, self.body.vector[some] @ self.axes

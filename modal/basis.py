@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from scipy import sparse
+from scipy import linalg, sparse
 
 from tireroad.fem.cavity import Column, Duct
 from tireroad.fem.collective import summed
@@ -360,6 +360,12 @@ class Projection:
             whole["corner"] = self.corner.on(turn)
         shapes = turn.shape[1] - modes
         return replace(self, momentum=self.momentum @ turn, shapes=shapes, **whole)
+
+    def containing(self, part: Projection, turn: np.ndarray) -> np.ndarray:
+        """Its coordinates (m + a + c, m' + a + c) per coordinate of a `part` whose own are the combinations `turn` (m, m') of them."""
+        beside = np.eye(self.carried.shape[1] - self.own)
+        whole = linalg.block_diag(turn, beside)
+        return np.linalg.solve(self._change, whole @ part._change) if self.moves else whole
 
     def among(self, wanted: np.ndarray) -> Projection:
         """The projection on the coordinates where `wanted` (m,) is true, without air and corner."""

@@ -24,12 +24,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from tireroad.contact.results.chance import freedom
-from tireroad.contact.results.spectra import FEWEST, deviation, low_part, third_octaves
+from tireroad.contact.results.spectra import (
+    FEWEST,
+    band_sums,
+    deviation,
+    low_part,
+    third_octaves,
+)
 from tireroad.greens.schemes import SCHEMES
 
 _NAMES = ("mean", "deviation", "level", "history")
@@ -97,6 +103,17 @@ class Measured:
         low, high = centre * 10 ** (-decades / 2), centre * 10 ** (decades / 2)
         least = FEWEST / 2 * self.spacing
         return min(low, centre - least), max(high, centre + least)
+
+
+def of_sound(pressure: np.ndarray, spacing: float, up_to: float, bands: np.ndarray) -> Measured:
+    """Quantities of a sound from the lines (f, k) Pa of its pressure at k microphones from 0 Hz on, `spacing` Hz apart and a little
+    beyond `up_to` Hz at most; levels in `bands` (b,) Hz."""
+    centre, square = band_sums(spacing * np.arange(1, len(pressure)), np.abs(pressure[1:]) ** 2)
+    level = np.full((len(bands), pressure.shape[1]), np.nan)
+    own, band = np.nonzero(np.isclose(bands[:, None], centre))
+    level[own] = 10 * np.log10(np.maximum(square[band], np.finfo(float).tiny))
+    none = np.zeros(pressure.shape[1])
+    return Measured(none, none, bands, level, pressure, spacing, up_to)
 
 
 @dataclass(frozen=True)
@@ -189,6 +206,24 @@ def estimated(
         level,
         share * apart.history,
     )
+
+
+class Relation(NamedTuple):
+    """How the error of a run follows from its differences to a companion.
+
+    `share`: of the differences, the error; `within` < 1: of the run's band that in which they are compared, where the error is the
+    run's by similarity; `longer`: of errors that differ from line to line at random, as in `estimated`, else None.
+    """
+
+    share: float = 1.0
+    within: float = 1.0
+    longer: float | None = None
+
+    def bars(self, run: Measured, companion: Measured) -> Bars:
+        """The error of the run."""
+        if self.within < 1.0:
+            return similar(run, companion, self.within)
+        return estimated(run, companion, self.share, self.longer)
 
 
 def _lasting(difference: np.ndarray, random: np.ndarray, longer: float) -> np.ndarray:

@@ -284,7 +284,7 @@ def density(
 
 @dataclass(frozen=True)
 class Distance:
-    """Relative L2 distance in the band, and largest difference over largest variation."""
+    """Relative L2 distance in the band, and largest difference over largest variation; NaN where nothing varies."""
 
     mean: float
     worst: float
@@ -293,13 +293,16 @@ class Distance:
 def distance(
     reference: np.ndarray, history: np.ndarray, duration: float, band: float = BAND
 ) -> Distance:
-    """Fourier coefficients of windowed values (n, k) at t = h ... duration, up to `band` Hz."""
+    """The distance of a history (n, k) from a reference of the same duration (s), both at t = h ... duration, in what varies up to
+    `band` Hz."""
     rest = reference.mean(axis=0)
     exact = low_part(reference - rest, duration, band)
     off = low_part(history - rest, duration, band) - exact
     # Back in time, at the same number of instants for both.
     seen = [np.fft.irfft(part, 8 * len(exact), axis=0) for part in (off, exact)]
     worst, most = (np.abs(part).max() for part in seen)
+    if not most:
+        return Distance(np.nan, np.nan)
     return Distance(float(np.linalg.norm(off) / np.linalg.norm(exact)), float(worst / most))
 
 

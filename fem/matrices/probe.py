@@ -55,6 +55,14 @@ def spot(
     return np.outer(shape_ring[:-1], shape_arc).ravel()
 
 
+def between(lattice: NodeGrid, other: NodeGrid) -> sparse.csr_matrix:
+    """Weights (s', s) of the outer face's nodes of a lattice in fields at those of another mesh of the same tire."""
+    around = _shape(lattice.ring_corners, lattice.edge, other.ring)
+    around[:, 0] += around[:, -1]
+    across = _shape(lattice.arc_corners, lattice.edge, other.arc)
+    return sparse.kron(sparse.csr_matrix(around[:, :-1]), sparse.csr_matrix(across), format="csr")
+
+
 def _area(lattice: NodeGrid, arc: np.ndarray) -> np.ndarray:
     """Undeformed outer area per ring and section angle, m2/rad2, at section angles (k,)."""
     element, local = _local(lattice.arc_corners, arc)

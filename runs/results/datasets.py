@@ -228,6 +228,9 @@ DATASETS: Mapping[str, tuple[Dataset, ...]] = {
             ("FORCE/CAUSE/level", "b, 3", "dB", "error of the third octaves"),
             ("contact_force_mean", "3", "N", "mean of the contact force in the window"),
             ("axle_force_mean", "3", "N", "mean of the axle force in the window"),
+            ("vibration/CAUSE/NUMBER/run", "f, m", "m kg^1/2", "complex lines of the tire's coordinates from 0 Hz on, attribute `spacing` Hz apart, in what a companion is compared with"),
+            ("vibration/CAUSE/NUMBER/companion", "f, m", "m kg^1/2", "the same in the companion"),
+            ("vibration/CAUSE/NUMBER/relation", "3", "-", "share of the difference that is the error; share of the band in which it is judged by similarity; longer record, NaN if not at random"),
         ),
         "stretches.h5": (
             ("contact_force", "r, n, 3", "N", "force of further stretches of road on the tire, after their run-in"),

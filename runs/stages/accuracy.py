@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any, ClassVar, NamedTuple
 
+import h5py
 import numpy as np
 from mpi4py import MPI
 
@@ -19,12 +20,11 @@ from tireroad.contact.results.error_bars import (
     CAUSES,
     Bars,
     Measured,
-    estimated,
+    Relation,
     measured,
     orders,
     random_share,
     share,
-    similar,
     total,
 )
 from tireroad.contact.results.spectra import Limit, limits, lowest, pitch, wide_enough
@@ -44,6 +44,7 @@ from tireroad.fem.sections.mesh2d import Ring, crown_layer
 from tireroad.fem.static.load_error import carried_over
 from tireroad.fem.static.state import StaticState
 from tireroad.fem.tire.material import CONSTANT, Spectrum, kinds
+from tireroad.greens.basis import Basis
 from tireroad.greens.fewer_modes import of_fewer_modes
 from tireroad.greens.response import Response
 from tireroad.modal.rolling import RollingModes
@@ -60,6 +61,7 @@ from tireroad.runs.stages.cavity import AirColumn
 from tireroad.runs.stages.contact_file import ContactHistory
 from tireroad.runs.stages.greens import GreensStage, Responses, as_read
 from tireroad.runs.stages.modes import Fields, ModesStage, Motions
+from tireroad.runs.stages.replay import PatchForces, Vibrating, driven_loads, on_other_mesh
 from tireroad.runs.stages.rolling import ContactForces, first_step, forces, recursive
 from tireroad.runs.stages.rotating import FullMatrices, RotatingStage
 from tireroad.runs.stages.setup import Probes, Setup, points_of, probes, tread_surface
@@ -105,6 +107,7 @@ _AHEAD = (
     "modes",
 )  # that need no other process: elements of twice the size take all
 FORCES = ("contact_force", "axle_force")
+_VIBRATION = "vibration"
 _UNITS = {"mean": "N", "deviation": "N", "level": "dB", "history": "-"}
 
 
@@ -167,7 +170,7 @@ class ReferenceRun:
     first `steps` of `step` s of its loop, integrated by `scheme`. `most`: touching points that a companion may
     have (contact.grid_patch.ratio). `comm`: the processes that repeat a loop together, by default those of the job.
     `attached`: the modes with their attachment modes, if any (runs.stages.greens.Responses). `steady`: whether its loop began
-    with steady rolling, as its companions then do.
+    with steady rolling, as its companions then do. The vibration of the whole tire is told from `since` s on and `up_to` Hz.
     """
 
     job: Job
@@ -183,6 +186,8 @@ class ReferenceRun:
     large: bool = False
     attached: RollingModes | None = None
     steady: bool = True
+    since: float = 0.0
+    up_to: float = 0.0
 
     @property
     def points_ratio(self) -> float:
@@ -213,13 +218,31 @@ class ReferenceRun:
         return probes(self.job, self.static.product, self.setup)
 
     @cached_property
-    def on_coarser_mesh(self) -> tuple[ContactSetup, Response, RollingModes]:
-        """Setup, response and its states of the tire with elements of twice the size. Collective on the job's processes."""
+    def whole(self) -> Vibrating:
+        """The tire whose vibration under the forces of a loop is told."""
+        loads = driven_loads(self.job, self.static.product, self.setup)
+        basis = Basis.of(self.rolling)
+        return Vibrating(
+            job=self.job,
+            basis=basis,
+            seen=basis.seen(loads),
+            since=self.since,
+            up_to=self.up_to,
+        )
+
+    @cached_property
+    def on_coarser_mesh(self) -> CoarserMesh:
+        """The tire with elements of twice the size. Collective on the job's processes."""
         with console.quiet():
             job, done = coarser(self.job, self.static)
         greens, state = done["greens"].product, done["static"].product
         setup = equilibrated(job, done["setup"].product, greens.contact, state.normal_force)
-        return setup, greens.contact, greens.states(done["rotating"].product)
+        rolling = done["rotating"].product
+        loads = driven_loads(job, state, done["setup"].product)
+        basis = Basis.of(rolling)
+        into = on_other_mesh(self.whole.basis, self.job.tire.lattice, basis, job.tire.lattice)
+        whole = replace(self.whole, basis=basis, seen=basis.seen(loads), into=into)
+        return CoarserMesh(setup, greens.contact, greens.states(rolling), whole)
 
     @cached_property
     def longer(self) -> ContactForces:
@@ -253,10 +276,10 @@ class ReferenceRun:
         except (ConvergenceError, InputError):
             return self.own
 
-    def first(self, steps: int) -> ReferenceRun:
-        """The same for fewer steps."""
-        names = "equilibrated", "rolled"
-        return self._keeping(*(name for name in names if name in self.__dict__), steps=steps)
+    def first(self, steps: int, since: float, up_to: float) -> ReferenceRun:
+        """The same for fewer steps, whose vibrations are told from `since` s on and `up_to` Hz."""
+        known = (name for name in ("equilibrated", "rolled") if name in self.__dict__)
+        return self._keeping(*known, steps=steps, since=since, up_to=up_to)
 
     def of(self, job: Job) -> ReferenceRun:
         """The same with another job; `base` stays that of the run."""
@@ -264,7 +287,7 @@ class ReferenceRun:
 
     def alone(self) -> ReferenceRun:
         """The same for this process by itself, with what all processes have found."""
-        names = ("equilibrated", "rolled", "on_coarser_mesh", "longer", "own", "base")
+        names = ("equilibrated", "rolled", "whole", "on_coarser_mesh", "longer", "own", "base")
         known = (name for name in names if name in self.__dict__)
         return self._keeping(*known, comm=MPI.COMM_SELF)
 
@@ -275,7 +298,7 @@ class ReferenceRun:
 
     def keeping_what(self, other: ReferenceRun) -> ReferenceRun:
         """The same with what another has found for the same loop."""
-        names = ("equilibrated", "rolled", "longer", "own", "base")
+        names = ("equilibrated", "rolled", "whole", "longer", "own", "base")
         narrowed = replace(self)
         narrowed.__dict__.update({name: vars(other)[name] for name in names if name in vars(other)})
         return narrowed
@@ -293,17 +316,27 @@ class ReferenceRun:
         coarser: int | None = None,
         contact: TreadContact | None = None,
         states: RollingModes | None = None,
+        whole: Vibrating | None = None,
     ) -> ContactForces:
         """Repeat the loop with another setup (settled), response or `contact`.
 
         `coarser`: factor on the time step, by default that of `base`; `states` of the response, by default the run's, for
-        a wheel that turns freely. Collective on `comm`.
+        a wheel that turns freely; `whole`: of the tire that vibrates, by default the run's. Collective on `comm`.
         """
         times = coarser or (1 if self.base is self.own else 2)
         step, steps = times * self.step, self.steps // times
         comm = self.comm or self.job.comm
         given = self.job, setup, response, step, steps, self.scheme, comm, contact
-        return forces(*given, self.steady, states or self.states)
+        return forces(*given, self.steady, states or self.states, whole or self.whole)
+
+
+class CoarserMesh(NamedTuple):
+    """The tire with elements of twice the size: setup (settled), response, its states, and what tells the vibration of the whole tire."""
+
+    setup: ContactSetup
+    response: Response
+    states: RollingModes
+    whole: Vibrating
 
 
 def equilibrated(
@@ -481,21 +514,26 @@ def fewer_modes(reference: ReferenceRun) -> ContactForces:
     rolling, response = reference.states, reference.response
     if rolling.full or reference.job.scene.greens.dynamic is not None:
         limits = FEWER * rolling.highest, rolling.highest
-        coarse = response.keeping_where(
-            lambda s: (np.abs(s) <= limits[0]) | (np.abs(s) > limits[1])
-        )
+
+        def stays(s: np.ndarray) -> np.ndarray:
+            kept: np.ndarray = (np.abs(s) <= limits[0]) | (np.abs(s) > limits[1])
+            return kept
+
+        coarse = response.keeping_where(stays)
         if len(coarse.every) == len(response.every):
             raise InputError("all states lie far below the highest mode: none can be left out")
+        whole = reference.whole.keeping_where(stays)
     else:
         job, points = reference.job, reference.probes
         seen = rolling if reference.attached else as_read(rolling, points)
         arguments = seen, seen.basis.shape, points.loads[points.counted], FEWER
         residual, spectra = job.scene.greens.residual, _spectra(job)
         comm = reference.comm or job.comm
-        coarse, rolling = of_fewer_modes(response, *arguments, residual, spectra, comm)
+        coarse, rolling, turn = of_fewer_modes(response, *arguments, residual, spectra, comm)
+        whole = reference.whole.of_combinations(rolling, turn, points.loads[points.counted])
     force = reference.static.product.normal_force
     begun = equilibrated(reference.job, reference.setup, coarse, force)
-    return reference.repeated(begun, coarse, states=rolling)
+    return reference.repeated(begun, coarse, states=rolling, whole=whole)
 
 
 def _spectra(job: Job) -> list[Spectrum]:
@@ -508,8 +546,8 @@ def _spectra(job: Job) -> list[Spectrum]:
 
 def coarser_mesh(reference: ReferenceRun) -> ContactForces:
     """Elements of twice the size, from the static state on. Collective."""
-    setup, response, states = reference.on_coarser_mesh
-    return reference.repeated(setup, response, states=states)
+    setup, response, states, whole = reference.on_coarser_mesh
+    return reference.repeated(setup, response, states=states, whole=whole)
 
 
 def finer_wall(reference: ReferenceRun) -> tuple[ContactForces, ContactForces | None]:
@@ -561,16 +599,24 @@ class Companion(NamedTuple):
     within: float = 1.0
     random: bool = False
 
+    def relation(self, longer: float) -> Relation:
+        """How the error follows, of a record so much `longer`."""
+        return Relation(self.share, self.within, longer if self.random else None)
+
     def bars(
         self, own: ContactForces, since: float, *limits: Any, longer: float = 1.0
     ) -> dict[str, Bars]:
         """Error bars of a run with its `own` forces after `since` s, of a record so much `longer`; `limits` as in `figures`."""
         off = figures(self.forces, since, *limits)
         run = figures(self.beside or own, since, *limits)
-        if self.within < 1.0:
-            return {name: similar(run[name], off[name], self.within) for name in run}
-        more = longer if self.random else None
-        return {name: estimated(run[name], off[name], self.share, more) for name in run}
+        relation = self.relation(longer)
+        return {name: relation.bars(run[name], off[name]) for name in run}
+
+    def vibration(self, own: ContactForces, longer: float) -> Vibrations:
+        """The vibrations of the whole tire in both, of a run with its `own`."""
+        beside = self.beside or own
+        assert beside.lines is not None and self.forces.lines is not None, "told by each loop"
+        return Vibrations(beside.lines, self.forces.lines, self.relation(longer))
 
     def doubt(self, bars: Mapping[str, Bars]) -> str | None:
         """Why `bars` by an order are a guess: the vertical forces of the two runs differ by more than they vary."""
@@ -616,6 +662,14 @@ def companions(cause: str, reference: ReferenceRun) -> list[Companion]:
             with suppress(InputError, ConvergenceError):
                 pairs.append(Companion(*finer_wall(reference)))
     return pairs
+
+
+class Vibrations(NamedTuple):
+    """Lines (f, m) m kg^1/2 of the tire's coordinates from 0 Hz on, of a `run` and its `companion`, and how its error follows."""
+
+    run: np.ndarray
+    companion: np.ndarray
+    relation: Relation
 
 
 Told = list[Companion] | ConvergenceError | InputError
@@ -680,7 +734,8 @@ class Accuracy:
 
     `centre` (b,) Hz: the third octaves; `window` s: the part of the run they were estimated on,
     from its start; `up_to` Hz: upper frequency of the histories compared; `mean` (3,) N of each
-    force over the window; `absent`: why a cause has no estimate.
+    force over the window; `absent`: why a cause has no estimate. `vibrations`: of the whole tire in the companions of each cause and in what
+    they are compared with, on lines `spacing` Hz apart.
     """
 
     centre: np.ndarray
@@ -689,6 +744,8 @@ class Accuracy:
     mean: Mapping[str, np.ndarray]
     by_cause: Mapping[str, Mapping[str, Bars]]
     absent: Mapping[str, str] = field(default_factory=dict)
+    vibrations: Mapping[str, Sequence[Vibrations]] = field(default_factory=dict)
+    spacing: float = 1.0
 
     def total(self, force: str) -> Bars | None:
         """Combined error of all causes with an estimate; None if there is none."""
@@ -737,7 +794,8 @@ class AccuracyStage(Computed[Accuracy]):
         reference, start, limit, up_to = window
         steps = reference.steps
         axle = None if history.axle_force is None else history.axle_force[:steps]
-        own = ContactForces(history.total_force[:steps], axle, history.step)
+        lines = on_root(self.job.comm, lambda: self._own_lines(reference))
+        own = ContactForces(history.total_force[:steps], axle, history.step, lines)
         since = start * history.step
         length = len(history.time) * history.step - since
         longer = length / (steps * history.step - since)
@@ -745,6 +803,7 @@ class AccuracyStage(Computed[Accuracy]):
         exact = figures(own, since, limit, up_to, bands)
         bars_of: dict[str, dict[str, Bars]] = {name: {} for name in exact}
         absent: dict[str, str] = {}
+        vibrations: dict[str, list[Vibrations]] = {}
         for cause, told in self._companions(reference, record).items():
             if isinstance(told, Exception):
                 absent[cause] = str(told)
@@ -754,6 +813,7 @@ class AccuracyStage(Computed[Accuracy]):
             record.notes += [f"error by the {cause}: {doubt}" for doubt in doubts if doubt]
             for name in exact:
                 bars_of[name][cause] = total(dict(enumerate(part[name] for part in parts)))
+            vibrations[cause] = [one.vibration(own, longer) for one in told]
         product = Accuracy(
             centre=exact["contact_force"].centre,
             window=steps * history.step,
@@ -761,6 +821,8 @@ class AccuracyStage(Computed[Accuracy]):
             mean={name: one.mean for name, one in exact.items()},
             by_cause=bars_of,
             absent=absent,
+            vibrations=vibrations,
+            spacing=1.0 / (steps * history.step - since),
         )
         record.indicators["errors are estimated from"] = (since, "s")
         record.indicators["errors are estimated up to"] = (product.window, "s")
@@ -770,6 +832,12 @@ class AccuracyStage(Computed[Accuracy]):
                 "the error bars are those of the linear tire: they do not contain the force left out by the nonlinear training, which the stage contact tells"
             )
         return product
+
+    def _own_lines(self, reference: ReferenceRun) -> np.ndarray:
+        """The vibration of the whole tire in the run itself. Root process only."""
+        whole = reference.whole
+        forces = PatchForces.of(self.job, reference.setup, self.contact.product, whole.seen)
+        return whole.lines_of(forces, reference.steps)
 
     def _window(self) -> Window | None:
         """The window that companions repeat; None for a run too short for any. The same on every process."""
@@ -782,7 +850,10 @@ class AccuracyStage(Computed[Accuracy]):
         budget = Budget.of(self.job.scene, len(history.time))
         reference = self._given(budget.steps, budget.most_touching(least))
         steps = budget.window(least, most, reference)
-        return Window(reference.first(steps), start, limit, up_to) if steps - start >= 2 else None
+        if steps - start < 2:
+            return None
+        since = start * history.step
+        return Window(reference.first(steps, since, limit), start, limit, up_to)
 
     def ahead(self, ended: Callable[[], bool]) -> None:
         """Repeat loops while the root computes the run's own, until that has `ended`: those that need nothing of other
@@ -874,6 +945,13 @@ class AccuracyStage(Computed[Accuracy]):
             for cause, bar in causes.items():
                 for name, unit in _UNITS.items():
                     put(file, f"{force}/{cause}/{name}", getattr(bar, name), unit)
+        for cause, both in product.vibrations.items():
+            for number, one in enumerate(both):
+                group = file.create_group(f"{_VIBRATION}/{cause}/{number}")
+                put(group, "run", one.run, "m kg^1/2")
+                put(group, "companion", one.companion, "m kg^1/2")
+                put(group, "relation", np.array(one.relation, float), "-")
+        file.attrs["spacing"] = product.spacing
 
     def read(self, file) -> Accuracy:
         """The same, read back."""
@@ -897,7 +975,18 @@ class AccuracyStage(Computed[Accuracy]):
             mean={force: file[f"{force}_mean"][:] for force in FORCES if force in file},
             by_cause=by_cause,
             absent=absent,
+            vibrations={
+                cause: [_vibrations(one) for one in held.values()]
+                for cause, held in file.get(_VIBRATION, {}).items()
+            },
+            spacing=float(file.attrs.get("spacing", 1.0)),  # runs of before 2026-12 have none
         )
+
+
+def _vibrations(group: h5py.Group) -> Vibrations:
+    share, within, longer = group["relation"][:]
+    relation = Relation(share, within, None if np.isnan(longer) else longer)
+    return Vibrations(group["run"][:], group["companion"][:], relation)
 
 
 def begin_ahead(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from mpi4py import MPI
@@ -189,12 +189,22 @@ def driven_tire(
 class ContactForces(NamedTuple):
     """Forces (n, 3) N of the road on the tire (`contact`) and of the tire on the axle (`axle`, None where unknown).
 
-    After each of n steps of `step` s.
+    After each of n steps of `step` s. `lines` (f, m) m kg^1/2: what the whole tire does under them (runs.stages.replay), None
+    where it was not asked for.
     """
 
     contact: np.ndarray
     axle: np.ndarray | None
     step: float
+    lines: np.ndarray | None = None
+
+
+class Listener(Protocol):
+    """A tire whose vibration is told (runs.stages.replay.Vibrating)."""
+
+    def lines(
+        self, change: np.ndarray, begun: np.ndarray, step: float, scheme: str
+    ) -> np.ndarray: ...
 
 
 def forces(
@@ -208,20 +218,27 @@ def forces(
     contact=None,
     steady: bool = True,
     states: RollingModes | None = None,
+    whole: Listener | None = None,
 ) -> ContactForces:
     """Run the loop of the job's scene with another response, step or setup (settled), in memory.
 
     `scheme`: see greens.recursion; `contact` replaces the scene's table; `steady`: begun with steady rolling, else at rest; `states` of
-    the response, for a wheel that turns freely: held without.
+    the response, for a wheel that turns freely: held without; `whole`: tells the vibration of the whole tire.
     Raises ConvergenceError if the road touches outside the patch, or nothing rolls steadily. Collective on `comm`.
     """
     if steady:
         setup = rolling_steadily(contact or job.scene.contact, setup, response, step)
     comm = loop_communicator(response.resolved(step), comm)
     rolled = blocks(job, setup, response, step, steps, scheme, comm, contact, states)
-    both = [(block.total_force, block.axle_force) for block in rolled]
-    total, axle = map(np.concatenate, zip(*both, strict=True))
-    return ContactForces(total, axle, step)
+    found = [
+        (block.total_force, block.axle_force, block.change if whole else block.total_force[:0])
+        for block in rolled
+    ]
+    total, axle, change = map(np.concatenate, zip(*found, strict=True))
+    if whole is None:
+        return ContactForces(total, axle, step)
+    begun = setup.steady.change if setup.steady else np.zeros(change.shape[1])
+    return ContactForces(total, axle, step, whole.lines(change, begun, step, scheme))
 
 
 def blocks(

@@ -9,8 +9,8 @@ from typing import Any, ClassVar
 
 import h5py
 import numpy as np
-from scipy import sparse
 
+from tireroad.contact.results.error_bars import Measured, of_sound
 from tireroad.contact.results.spectra import a_weighting, band_sums
 from tireroad.contact.setup import ContactSetup
 from tireroad.fem.static.state import StaticState
@@ -26,10 +26,11 @@ from tireroad.greens.tire_sound import (
     source_errors,
     transfer,
 )
-from tireroad.modal.corner import BODY, SEEN
 from tireroad.runs.files.store import attribute, dataset, put, read_fields, write_fields
 from tireroad.runs.scene.tables.sound import SQUEEZED, SoundTable
+from tireroad.runs.stages.accuracy import Accuracy
 from tireroad.runs.stages.footprint_air import LeavingAir
+from tireroad.runs.stages.replay import wheel_motion
 from tireroad.runs.stages.spectra import Spectra
 from tireroad.runs.stages.stage import UNKNOWN, Computed, Record, Result
 from tireroad.runs.stages.vibration import HANN, POWER, decibels
@@ -287,6 +288,7 @@ class SoundStage(WholeTire[SoundPressure]):
     reads: ClassVar[tuple[str, ...]] = (*WholeTire.reads, "sound.air")
     lines: Result[Lines | None]
     spectra: Result[Spectra] | None = None
+    accuracy: Result[Accuracy] | None = None
 
     def compute(self, record: Record) -> SoundPressure | None:
         """None but on the root process. Collective."""
@@ -332,7 +334,9 @@ class SoundStage(WholeTire[SoundPressure]):
             )
             over_time = over_time + spectrum
         with record.timing("pressure"):
-            parts = _sound(heard, vibration, self._errors, over_time, lines.duration)
+            centre, _ = vibration.bands(np.zeros(len(lines.frequency)))
+            errors = self._errors(paths, volumes, centre)
+            parts = _sound(heard, vibration, errors, over_time, lines.duration)
             normal = _normal_velocity(tire, shape, lines.amplitude, lines.frequency)
             efficiency = vibration.efficiency(normal)
         unknown = self.spectra.product.unknown_error if self.spectra else UNKNOWN
@@ -360,23 +364,30 @@ class SoundStage(WholeTire[SoundPressure]):
         record.indicators["mean gap in the footprint"] = (air.height, "m")
         return air
 
-    @cached_property
-    def _errors(self) -> tuple[np.ndarray, np.ndarray]:
-        """Bands (b,) Hz and the errors (b,) dB of the vibration in them, NaN where unknown.
+    def _errors(self, paths: Paths, volumes: np.ndarray, bands: np.ndarray) -> np.ndarray:
+        """Errors (k, b) dB of the vibration's levels in bands (b,) Hz at the microphones, NaN where unknown.
 
-        Those of the vertical contact force, which drives it, and of the force on the axle, which the modes
-        carry there as they do to the outer face: of its three directions by their power.
+        As of the forces (contact.results.error_bars), by the pressures of the vibrations in the error bars' companions: `volumes`
+        (e, m) displaced per coordinate.
         """
-        spectra = self.spectra.product if self.spectra else None
-        if spectra is None or spectra.contact_level_error is None:
-            return np.zeros(0), np.zeros(0)
-        error = spectra.contact_level_error[:, 2]
-        if spectra.level_error is not None:
-            level = spectra.levels["third_octave/level"]
-            share = 10 ** ((level - level.max(axis=1, keepdims=True)) / 10)
-            axle = (share * spectra.level_error).sum(axis=1) / share.sum(axis=1)
-            error = np.hypot(error, axle)
-        return spectra.levels["third_octave/centre"], error
+        accuracy = self.accuracy.product if self.accuracy else None
+        if accuracy is None or not accuracy.vibrations:
+            return np.full((len(paths.names), len(bands)), np.nan)
+
+        def at_microphones(lines: np.ndarray) -> Measured:
+            frequency = accuracy.spacing * np.arange(len(lines))
+            frequency = frequency[frequency <= paths.near.frequency[-1]]
+            pressure = np.zeros((len(frequency), len(paths.names)), complex)
+            moved = volumes @ lines[1 : len(frequency)].T
+            pressure[1:] = paths.near.pressure(moved, frequency[1:]).T
+            return of_sound(pressure, accuracy.spacing, frequency[-1], bands)
+
+        squares = np.zeros((len(bands), len(paths.names)))
+        for both in accuracy.vibrations.values():
+            for one in both:
+                bars = one.relation.bars(at_microphones(one.run), at_microphones(one.companion))
+                squares += bars.level**2
+        return np.sqrt(squares).T
 
     def write(self, file: h5py.File, product: SoundPressure) -> None:
         """All fields of the product."""
@@ -403,16 +414,6 @@ def angles() -> tuple[np.ndarray, np.ndarray]:
     elevation = np.unique(np.degrees(np.arcsin(way[:, 2])).round(9))
     azimuth = np.unique((np.degrees(np.arctan2(way[:, 1], way[:, 0])) % 360).round(9))
     return elevation, azimuth
-
-
-def wheel_motion(basis: Basis) -> np.ndarray | None:
-    """Motion (6, m) of the wheel in m and rad per coordinate; None of a wheel that is held."""
-    if not basis.projection.moves:
-        return None
-    beside = sparse.identity(SEEN, format="csr")[:BODY]
-    return basis.seen(
-        sparse.hstack([sparse.csr_matrix((BODY, len(basis.shape))), beside], format="csr")
-    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -480,13 +481,13 @@ def _normal_velocity(
 def _sound(
     heard: Heard,
     vibration: Heard,
-    of_vibration: tuple[np.ndarray, np.ndarray],
+    of_vibration: np.ndarray,
     volume: np.ndarray,
     duration: float,
 ) -> dict[str, Any]:
     """The fields of SoundPressure but the efficiency; `volume` (e, f): of the record over time.
 
-    `vibration`: what of all that is `heard` the tire's face makes.
+    `vibration`: what of all that is `heard` the tire's face makes; `of_vibration` (k, b) dB: the error of its levels.
     """
     paths, frequency = heard.paths, heard.frequency
     ears = 10 ** (a_weighting(frequency) / 10)
@@ -499,7 +500,7 @@ def _sound(
     elements = _of_elements(paths, centre, 10 * np.log10(coarse / band))
     _, alone = heard.bands((np.abs(vibration.pressure) ** 2 / 2).T)
     level, air = decibels(alone, PRESSURE**2).T, np.full(alone.T.shape, np.nan)
-    error = np.hypot(elements, _of_vibration(centre, *of_vibration))
+    error = np.hypot(elements, of_vibration)
     if heard is not vibration:
         _, rest = heard.bands((np.abs(heard.pressure - vibration.pressure) ** 2 / 2).T)
         air = decibels(rest, PRESSURE**2).T
@@ -590,14 +591,6 @@ def _of_elements(paths: Paths, centre: np.ndarray, coarser: np.ndarray) -> np.nd
         len(paths.names), -1
     )
     return np.hypot(elements, inside)
-
-
-def _of_vibration(centre: np.ndarray, known: np.ndarray, error: np.ndarray) -> np.ndarray:
-    """Errors (b,) dB of the vibration in the bands, NaN where unknown, from those in `known` (c,) Hz."""
-    moved = np.full(len(centre), np.nan)
-    for band, value in zip(known, error, strict=True):
-        moved[np.isclose(centre, band)] = value
-    return moved
 
 
 def _signal(
@@ -693,7 +686,7 @@ def _describe(record: Record, sound: SoundPressure) -> None:
             continue
         levels = sound.total_weighted[heard] if name == "CPX" else sound.total_intensity
         mean = 10 * np.log10((10 ** (levels / 10)).mean())
-        # That of the vibration is the same at all microphones: it does not average out.
+        # Errors of one vibration at several microphones go together: they do not average out.
         error = sound.total_weighted_error[heard].mean()
         _told(record, f"A-weighted {name} level", mean, error, unit)
     if sound.probes:

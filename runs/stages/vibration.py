@@ -13,9 +13,10 @@ from tireroad.greens.basis import Basis
 from tireroad.greens.outputs import Surface, mean_square_velocity, radiated_power
 from tireroad.runs.files.store import attribute, dataset
 from tireroad.runs.process.mpi import on_root
+from tireroad.runs.stages.replay import PatchForces, replayed
 from tireroad.runs.stages.spectra import Spectra
 from tireroad.runs.stages.stage import Record, Result
-from tireroad.runs.stages.whole_tire import Lines, PatchForces, WholeTire, replayed
+from tireroad.runs.stages.whole_tire import Lines, WholeTire
 
 VELOCITY, POWER = 1e-9, 1e-12  # m/s, W: reference values of the levels, ISO 1683
 _LARGEST = 2e8  # bytes: largest size of the stored displacement fields

@@ -64,7 +64,7 @@ def test_it_is_as_far_off_as_as_few_modes_on_the_finite_elements(tire, speed, mo
     run, rolling = attached(tire, 60, speed)
     share = 0.5 * (modes.frequency[41] + modes.frequency[42]) / modes.frequency[59]
     few, _ = attached(tire, 42, speed)
-    found, _ = of_fewer_modes(
+    found, *_ = of_fewer_modes(
         run, rolling, rolling.basis.shape, probes, share, "attachment", (), COMM
     )
     frequency = np.linspace(0.0, 0.8 * share * modes.frequency[59], 12)
@@ -92,10 +92,10 @@ def test_what_relaxes_stays_as_it_is(tire, monkeypatch):
     run, rolling = attached(tire, 30, 0.0)
     share = 0.5 * (tire[1].frequency[20] + tire[1].frequency[21]) / tire[1].frequency[29]
     given = rolling, rolling.basis.shape, tire[2], share, "attachment", (), COMM
-    plain, _ = of_fewer_modes(run, *given)
+    plain, *_ = of_fewer_modes(run, *given)
     into = np.full((1, run.residual.shape[1]), 3.0)
     output = np.full((len(run.residual), 1), 2e-7)
-    slow, _ = of_fewer_modes(run.with_slow(np.array([-5.0]), output, into), *given)
+    slow, *_ = of_fewer_modes(run.with_slow(np.array([-5.0]), output, into), *given)
     assert slow.relaxing == 1 and slow.eigenvalue[-1] == -5.0
     assert np.allclose(slow.residual, plain.residual, rtol=1e-12, atol=0)
     frequency = np.array([0.0, 1.0, 40.0])
@@ -127,7 +127,7 @@ def test_static_shapes_have_the_moduli_beside_as_few_modes(residual):
     spectra = [kind.spectrum for kind in kinds if kind.spectrum != CONSTANT]
     share = fewer.states.highest / rolling.highest * 1.001
     readings = probes @ rolling.basis.shape
-    found, _ = of_fewer_modes(
+    found, *_ = of_fewer_modes(
         whole.response, rolling, readings, probes, share, residual, spectra, COMM
     )
 

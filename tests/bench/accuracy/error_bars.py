@@ -16,6 +16,7 @@ from tireroad.tests.bench.parts.effectivity import (
     ALL,
     FORCES,
     SMALL,
+    SOUND,
     Effectivity,
     by_cause,
     every,
@@ -93,13 +94,14 @@ class _Where:
 
     def own(self) -> Driven:
         """The run with its error bars."""
-        scene = self.case.scene(self.folder, self.duration, *sets(**self.coarse))
-        return driven(scene, self.folder / "run", "spectra", self._cache)
+        keys, heard = sets(**self.coarse), self.case.radial
+        scene = self.case.scene(self.folder, self.duration, *keys, heard=heard)
+        return driven(scene, self.folder / "run", "sound" if heard else "spectra", self._cache)
 
-    def finer(self, *names: str) -> Recorded:
-        """The run with some settings as fine as the reference's."""
+    def finer(self, *names: str, heard: bool = False) -> Recorded:
+        """The run with some settings as fine as the reference's, `heard` by microphones or not."""
         keys = self.coarse | {name: self.fine[name] for name in names if name in self.fine}
-        scene = self.case.scene(self.folder, self.duration, *sets(**keys))
+        scene = self.case.scene(self.folder, self.duration, *sets(**keys), heard=heard)
         folder = self.folder / "-".join(("fine", *names))
         return recorded(scene, folder, self.kept / "forces", self._cache)
 
@@ -116,8 +118,11 @@ def _judged(where: _Where) -> Iterator[Effectivity]:
     """Effectivities of all causes together, and of each from two runs that differ only in it."""
     own = where.own()
     more = where.finer("modes")
+    exact = where.finer(*_MESH, "pitch", "step", "residual", heard=where.case.radial)
+    if exact.heard:
+        yield from _heard(str(where.case), own, exact)
     pairs: dict[str, tuple[Recorded, Recorded]] = {
-        ALL: (own, where.finer(*_MESH, "pitch", "step", "residual")),
+        ALL: (own, exact),
         "step": (own, where.finer("step")),
         "points": (own, where.finer("pitch")),
         "modes": (own, more),
@@ -161,3 +166,15 @@ def _compared(
                 figures.append((f"{centre:.4g} Hz", far, level, SMALL["level"]))
         for figure, *numbers in figures:
             yield Effectivity(case, f"{force} {direction}", cause, figure, *map(float, numbers))
+
+
+def _heard(case: str, own: Driven, exact: Recorded) -> Iterator[Effectivity]:
+    """Every third octave of known error at each microphone, all causes together."""
+    sound = own.done.done["sound"].product
+    for name, level, error in zip(sound.names, sound.level, sound.error, strict=True):
+        middle, truth = exact.heard[name]
+        for centre, value, bar in zip(sound.centre, level, error, strict=True):
+            far = np.abs(truth[np.isclose(middle, centre)] - value)
+            if far.size and np.isfinite([far[0], bar]).all():
+                figure = f"{centre:.4g} Hz", float(far[0]), float(bar), SMALL["level"]
+                yield Effectivity(case, f"{SOUND} {name}", ALL, *figure)

@@ -18,13 +18,14 @@ SMALL = {
 }  # of the load, of the deviation, %, dB: smaller errors count as none
 ALL = "all"  # all causes together
 FORCES = {"contact_force": "total_force", "axle_force": "axle_force"}
+SOUND = "sound"
 
 
 @dataclass(frozen=True)
 class Effectivity:
     """A figure of a case with true and estimated error (N, % or dB), by one `cause` or all.
 
-    `force`: its name, and its direction x, y or z.
+    `force`: its name, and its direction x, y or z; or "sound" and the microphone.
     """
 
     case: str
@@ -74,7 +75,8 @@ JUDGED = [
 
 
 def by_kind(some: Sequence[Effectivity]) -> list[list]:
-    """Rows (force, figure, *judgement): of each force along and across the road, and vertical, and of all its figures."""
+    """Rows (force, figure, *judgement): of each force along and across the road, and vertical, of all its figures, and of
+    the sound."""
     rows: list[list] = []
     for force in FORCES:
         own = [one for one in some if one.force.startswith(force)]
@@ -86,7 +88,10 @@ def by_kind(some: Sequence[Effectivity]) -> list[list]:
                 rows.append([which, kind, *judgement([one for one in part if one.kind == kind])])
         if own:
             rows.append([name, "all", *judgement(own)])
-    return [*rows, ["both", "all", *judgement(some)]]
+    heard = [one for one in some if one.force.startswith(SOUND)]
+    if heard:
+        rows.append([SOUND, "third octaves", *judgement(heard)])
+    return [*rows, ["each", "all", *judgement(some)]]
 
 
 def shares(found: list[Effectivity], note: str, failed: Sequence[str] = ()) -> Table:

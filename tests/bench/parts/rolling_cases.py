@@ -66,6 +66,11 @@ inflation = 2.2e5
 load = 4000.0
 error_estimate = false
 """
+# What is heard of the built-in tire in benches that judge its error bars.
+HEARD = """
+[sound]
+microphones = ["cpx", "pass-by"]
+"""
 _ATTACHED = {"residual": "attachment"}
 # The mesh and the points of quickstart.toml.
 _QUICK = {"segments": 16, "arc": 10, "order": 2, "pitch": 0.010}
@@ -152,14 +157,19 @@ class Case:
         """Tire and road as in a scene."""
         return TIRES[self.tire].text, ROADS[self.road]
 
-    def scene(self, folder: Path, duration: float, *sets: str) -> Scene:
-        """The scene with keys as for --set; its file is written to the folder."""
+    @property
+    def radial(self) -> bool:
+        """Whether the tire is the built-in one, whose sound is of interest."""
+        return TIRES[self.tire].text == _RADIAL
+
+    def scene(self, folder: Path, duration: float, *sets: str, heard: bool = False) -> Scene:
+        """The scene with keys as for --set, `heard` by microphones or not; its file is written to the folder."""
         from tireroad.runs.scene.load import load
 
         folder.mkdir(parents=True, exist_ok=True)
         tire, road = self.given
         keys = {"tire": tire, "road": road, "speed": self.speed}
-        text = SCENE.format(**keys, reach=REACH, duration=duration)
+        text = SCENE.format(**keys, reach=REACH, duration=duration) + (HEARD if heard else "")
         (folder / "given.toml").write_text(text)
         return load(folder / "given.toml", sets)
 
@@ -231,10 +241,12 @@ NAMES = ("total_force", "axle_force")
 
 @dataclass(frozen=True)
 class Recorded:
-    """The `total_force` and `axle_force` (n, 3) N of a run after each of its steps of `step` s."""
+    """The `total_force` and `axle_force` (n, 3) N of a run after each of its steps of `step` s, and the third octaves `heard`
+    at its microphones, if any, each (2, b): their middle, Hz, and level, dB."""
 
     forces: dict[str, np.ndarray]
     step: float
+    heard: dict[str, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -253,11 +265,16 @@ def driven(scene: Scene, folder: Path, until: str, cache: Cache = NO_CACHE) -> D
         )
     with h5py.File(folder / "contact.h5") as file:
         step, forces = done.done["contact"].product.step, {name: file[name][:] for name in NAMES}
-    return Driven(forces, step, done)
+    heard = {}
+    if "sound" in done.done:
+        sound = done.done["sound"].product
+        levels = [np.array([sound.centre, level]) for level in sound.level]
+        heard = dict(zip(sound.names, levels, strict=True))
+    return Driven(forces, step, heard, done)
 
 
 def recorded(scene: Scene, folder: Path, kept: Path, cache: Cache = NO_CACHE) -> Recorded:
-    """The forces of a run in a separate process, or those stored in the folder `kept` for the same
+    """The forces of a run, and what is heard of it, in a separate process, or those stored in the folder `kept` for the same
     scene (used whatever program version computed them, until deleted)."""
     bare = replace(scene, accuracy=AccuracyTable(estimate=False))
     values = json.dumps(tomllib.loads(dumps(bare)), sort_keys=True)  # without the keys' comments
@@ -265,13 +282,16 @@ def recorded(scene: Scene, folder: Path, kept: Path, cache: Cache = NO_CACHE) ->
     if not file.exists():
         apart(_record, bare, folder, file, cache)  # frees the memory of a fine run
     with np.load(file) as found:
-        return Recorded(dict(zip(NAMES, found["forces"], strict=True)), float(found["step"]))
+        forces = dict(zip(NAMES, found["forces"], strict=True))
+        heard = dict(zip(found["names"].tolist(), found["levels"], strict=True))
+        return Recorded(forces, float(found["step"]), heard)
 
 
 def _record(scene: Scene, folder: Path, file: Path, cache: Cache) -> None:
-    """Write the forces of a run to a file. On one process."""
-    run = driven(scene, folder, "contact", cache)
+    """Write the forces of a run, and what is heard of it, to a file. On one process."""
+    run = driven(scene, folder, "sound" if scene.sound else "contact", cache)
     forces = np.array([run.forces[name] for name in NAMES])
     file.parent.mkdir(parents=True, exist_ok=True)
     with replacing(file) as part, part.open("wb") as opened:
-        np.savez_compressed(opened, step=run.step, forces=forces)
+        names, levels = np.array(list(run.heard), str), np.array(list(run.heard.values()))
+        np.savez_compressed(opened, step=run.step, forces=forces, names=names, levels=levels)

@@ -114,7 +114,7 @@ def test_fewer_modes_turn_it_alike_below_them(unloaded, residual) -> None:
     readings = probes[:, :wide] @ basis.shape[:wide]
     frequency = np.array([0.7, 5.0])
     given = rolling, readings, probes, 0.2, residual, (), COMM
-    few, states = of_fewer_modes(held(basis), *given)
+    few, states, _ = of_fewer_modes(held(basis), *given)
     assert len(states.states.eigenvalue) < 0.6 * len(rolling.states.eigenvalue)
     whole, found = held(basis).receptance(frequency), few.receptance(frequency)
     moments = whole[:, COUNT:], found[:, COUNT:]

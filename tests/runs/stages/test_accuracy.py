@@ -3,6 +3,7 @@
 import json
 import shutil
 from dataclasses import replace
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -10,10 +11,12 @@ import pytest
 from mpi4py import MPI
 from tires import soft_torus
 
-from tireroad.contact.results.error_bars import CAUSES, Bars, bars, measured
+from tireroad.contact.results.error_bars import CAUSES, Bars, Relation, bars, measured
 from tireroad.contact.results.spectra import wide_enough
 from tireroad.contact.tread.kernel import KernelTread
 from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.greens.basis import Basis
+from tireroad.greens.fewer_modes import of_fewer_modes
 from tireroad.runs.files.disk import Refused
 from tireroad.runs.pipeline import run_scene
 from tireroad.runs.process import console
@@ -22,14 +25,18 @@ from tireroad.runs.stages import accuracy, contact, rolling
 from tireroad.runs.stages.accuracy import (
     Companion,
     ReferenceRun,
+    Vibrations,
     _dealt,
     backed,
     coarser,
     coarser_job,
     companions,
 )
+from tireroad.runs.stages.greens import as_read
+from tireroad.runs.stages.replay import PatchForces, on_other_mesh
 from tireroad.runs.stages.rolling import ContactForces
 from tireroad.runs.stages.setup import points_of
+from tireroad.runs.stages.sound import SoundStage
 from tireroad.runs.stages.stage import Job
 
 pytestmark = pytest.mark.slow
@@ -238,6 +245,66 @@ def test_bars_are_in_the_summary_and_beside_the_bands(whole):
     with h5py.File(folder / "spectra.h5") as file:
         shape = file["third_octave/level"].shape
         assert file["third_octave/level_error"].shape == shape
+
+
+def test_a_repeated_loop_tells_the_vibration_of_the_run(whole):
+    """The forces on the nodes that a loop hands over and those in the file of the run move the whole tire alike, to rounding but for
+    where turns of friction end."""
+    folder, done = whole
+    given = replace(_given(whole), since=0.0051, up_to=400.0)
+    again = given.repeated(given.equilibrated, given.response, coarser=1).lines
+    history = done.done["contact"].product
+    forces = PatchForces.of(done.job, given.setup, history, given.whole.seen)
+    own = given.whole.lines_of(forces, given.steps)
+    assert own.shape == again.shape and own.shape[1] == Basis.of(done.rolling).coordinates
+    assert np.linalg.norm(again - own) < 1e-3 * np.linalg.norm(own)
+    late = given.whole.lines_of(forces, given.steps - 20)
+    assert np.linalg.norm(late - own) > 1e-2 * np.linalg.norm(own)
+
+
+def test_fewer_modes_move_what_their_combinations_of_all_do(whole):
+    """Readings of the patch by their own coordinates and by those of the run that these are."""
+    given = replace(_given(whole), up_to=400.0)
+    points = given.probes
+    seen = as_read(given.rolling, points)
+    loads = points.loads[points.counted]
+    arguments = seen, seen.basis.shape, loads, accuracy.FEWER, "static", (), MPI.COMM_SELF
+    _, rolling, turn = of_fewer_modes(given.response, *arguments)
+    few = given.whole.of_combinations(rolling, turn, loads)
+    assert few.into.shape == (given.whole.basis.coordinates, few.basis.coordinates)
+    assert few.basis.coordinates < 0.9 * given.whole.basis.coordinates
+    np.testing.assert_allclose(given.whole.seen @ few.into, few.seen, atol=1e-9)
+
+
+def test_modes_of_a_coarser_mesh_are_known_in_those_of_the_run(whole):
+    """Its lowest modes are nearly combinations of unit length of the run's lowest."""
+    _, done = whole
+    job, parts = coarser(done.job, done.done["static"])
+    run, other = (Basis.of(one) for one in (done.rolling, parts["rotating"].product))
+    into = on_other_mesh(run, done.job.tire.lattice, other, job.tire.lattice)
+    assert into.shape == (run.coordinates, other.coordinates)
+    assert np.linalg.norm(into[:, :8], axis=0) == pytest.approx(np.ones(8), abs=0.05)
+    assert np.linalg.norm(into[10:, :6], axis=0).max() < 0.1
+
+
+def test_the_sound_errs_as_vibrations_of_companions_do(run):
+    """At each microphone, by the pressure of each companion's vibration; unknown where nothing is estimated."""
+    sets = ('sound={microphones=["cpx"],up_to=300.0}', "time.duration=0.1")
+    _, done = run("heard", "sound", *sets)
+    sound, known = done.done["sound"].product, done.done["accuracy"].product
+    assert set(known.vibrations) == set(CAUSES) and not known.absent
+    assert np.isfinite(sound.error).all() and (sound.error > sound.of_elements).all()
+    random, count = np.random.default_rng(1), known.vibrations["step"][0].run.shape[1]
+    lines = random.normal(size=(150, count)) + 1j * random.normal(size=(150, count))
+    alike = [Vibrations(lines, 1.6 * lines, Relation(share=1 / 3))]
+    product = replace(known, vibrations={"step": alike}, spacing=2.0)
+    stage = SimpleNamespace(accuracy=SimpleNamespace(product=product))
+    paths, bands = done.done["radiation"].product, np.array([100.0, 199.526])
+    volumes = random.normal(size=(paths.near.ahead.shape[2], count))
+    found = SoundStage._errors(stage, paths, volumes, bands)
+    assert found == pytest.approx(np.full((2, 2), 20 * np.log10(1.2)), abs=1e-6)
+    stage.accuracy = None
+    assert np.isnan(SoundStage._errors(stage, paths, volumes, bands)).all()
 
 
 @pytest.mark.long

@@ -28,7 +28,7 @@ from tireroad.runs.report.page import write_report
 from tireroad.runs.results.export import export
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.footprint_air import grooves
-from tireroad.runs.stages.sound import SPACING, SoundStage, _total_error, intensity
+from tireroad.runs.stages.sound import SPACING, _total_error, intensity
 
 pytestmark = pytest.mark.slow
 
@@ -271,30 +271,6 @@ def test_four_tires_pass(results: tireroad.RunResults) -> None:
     assert heard.level[early] < heard.maximum - 8.0
     with pytest.raises(tireroad.InputError, match="to the nearest tires"):
         tireroad.pass_by(results, side=2.0)
-
-
-def test_the_vibration_errs_as_the_contact_force_and_the_axle_force() -> None:
-    """Per band, as a root of squares; unknown where one is unknown, and the contact alone without the axle.
-
-    A direction 60 dB below the others does not count: its level in dB may be off by anything.
-    """
-    contact, axle = (
-        np.array([[9.0, 9.0, 3.0], [9.0, 9.0, np.nan]]),
-        np.array([[3.0, 90.0, 5.0]] * 2),
-    )
-    levels = {
-        "third_octave/centre": np.array([100.0, 126.0]),
-        "third_octave/level": np.array([[40.0, -40.0, 40.0]] * 2),
-    }
-    found = SimpleNamespace(contact_level_error=contact, level_error=axle, levels=levels)
-    stage = SimpleNamespace(spectra=SimpleNamespace(product=found))
-    centre, error = SoundStage._errors.func(stage)
-    np.testing.assert_allclose(centre, [100.0, 126.0])
-    np.testing.assert_allclose(error, [5.0, np.nan], rtol=1e-6)
-    found.level_error = None
-    np.testing.assert_allclose(SoundStage._errors.func(stage)[1], [3.0, np.nan])
-    found.contact_level_error = None
-    assert not len(SoundStage._errors.func(stage)[0])
 
 
 def test_air_of_the_footprint_is_heard_beside_the_vibration(tmp_path: Path) -> None:
