@@ -137,9 +137,9 @@ def meeting(record: Record, contact: ContactProblem, steps: int) -> None:
         )
 
 
-def rubbing(record: Record, friction: float, scene: Scene, lagging: int) -> None:
-    """Record the coefficient of friction; warn where horizontal forces are those of a road without any, and of steps whose
-    forces lag."""
+def rubbing(record: Record, friction: float, scene: Scene, lagging: int, steps: int) -> None:
+    """Record the coefficient of friction; warn where horizontal forces are those of a road without any, and where more than
+    single ones of the `steps` have forces that lag."""
     record.headline["friction"] = (friction, "-")
     rotation, free = scene.rotation, corner.turns_freely(scene)
     if friction and rotation is not None and rotation.speed:
@@ -154,9 +154,9 @@ def rubbing(record: Record, friction: float, scene: Scene, lagging: int) -> None
             lagging,
             "-",
         )
-    if lagging:
+    if lagging > _ASTRAY * steps:
         record.warnings.append(
-            f"in {lagging} steps no normal and horizontal forces were found that fit each other: there each took the other's of "
+            f"in {lagging} of {steps} steps no normal and horizontal forces were found that fit each other: there each took the other's of "
             f"the step before. A footprint that slides as a whole at a friction of {friction:g} vibrates by itself; "
             "contact.friction up to 0.8 slides steadily on a passenger tire"
         )
@@ -673,7 +673,13 @@ class ContactStage(Stage[ContactHistory]):
             record.indicators["processor time a step"] = (1e6 * busy, "us")
             file.finish()
         describe(record, totals, loop.contact.factorisations, chosen, chosen.steps - done)
-        rubbing(record, self._coefficient, self.job.scene, loop.contact.lagging)
+        rubbing(
+            record,
+            self._coefficient,
+            self.job.scene,
+            loop.contact.lagging,
+            totals.figures.steps,
+        )
         meeting(record, loop.contact, totals.figures.steps)
         alternation(record, totals.alternation.worst, scheme)
         points(record, setup.patch, self.static.product.footprint(), setup.relief)
