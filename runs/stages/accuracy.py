@@ -794,6 +794,7 @@ class AccuracyStage(Computed[Accuracy]):
         reference, start, limit, up_to = window
         steps = reference.steps
         axle = None if history.axle_force is None else history.axle_force[:steps]
+        _ = reference.whole  # by all: a tire's mesh may have to be made
         lines = on_root(self.job.comm, lambda: self._own_lines(reference))
         own = ContactForces(history.total_force[:steps], axle, history.step, lines)
         since = start * history.step

@@ -534,6 +534,8 @@ class ContactStage(Stage[ContactHistory]):
         products = {name: getattr(self, name) for name in ("static", "rotating", "greens", "setup")}
         for part in products.values():  # reading one is collective
             _ = part.product
+        if self.job.scene.force:
+            _ = self.job.tire  # as is making its mesh, on which the forces have their places
         alone = replace(self, job=self.job.alone())
 
         def meanwhile(ended: Callable[[], bool]) -> None:
