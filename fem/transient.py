@@ -913,7 +913,7 @@ class NonlinearTire(FullTire):
     def snapshot(self) -> dict[str, np.ndarray]:
         """FullTire.snapshot, with the motion of the factor if it was taken anew, and the last forces."""
         spread, everywhere = self._operators.spread, self._operators.body.everywhere
-        kept = super().snapshot() | {"met": self._met, "begun": everywhere(spread(self._begun))}
+        kept = super().snapshot() | {"pushed": self._met, "begun": everywhere(spread(self._begun))}
         if (secants := self._secants.state()).size:
             kept["secants"] = np.stack([everywhere(spread(one)) for one in secants.T])
         if self._factored is not None:
@@ -923,7 +923,7 @@ class NonlinearTire(FullTire):
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """Continue from a snapshot, before `predict`; written by any number of processes."""
         super().restore(state)
-        self._met = state["met"]
+        self._met = state["pushed"]
         self._begun = self._operators.restrict(state["begun"][self._operators.body.ids])
         self._elastic = self._restoring(self.displacement) - self._begun
         self._secants = Secants(self.comm)
