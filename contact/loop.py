@@ -35,6 +35,7 @@ MEETING = 3e-2
 MEETINGS = 20  # solutions of a step, at most
 # Slopes up to which points are followed wholly, and from which on they are not.
 GENTLE, STEEP = 0.5, 1.0
+ASTRAY = 10.0  # times the size of a patch: motions of its points in the plane that are none of a tire
 
 # What needs no contact is computed for as many steps at once as make this many points, and for at most so many.
 _POINTS_AHEAD, STEPS_AHEAD = 200_000, 64
@@ -345,7 +346,7 @@ class Drive:
                 known = known + self.height(along, across)
             follows = self._follows(along, across, patch) if leans else np.ones(along.shape)
             road = self if leans else None
-            farthest = _widest(patch)
+            farthest = ASTRAY * _widest(patch)
             met = [
                 RoadMet(road, along[k], y, known[k], follows[k], farthest)
                 for k in range(len(times))
@@ -396,8 +397,8 @@ class RoadMet:
         """
         if not (moved := float(np.abs(place).max(initial=0.0))) <= self.farthest:
             raise ConvergenceError(
-                f"contact: points are {moved:.3g} m from their places at rest, more than all of them are apart: the motion has "
-                'grown without bound; take a smaller [time] step or scheme = "constant"'
+                f"contact: points have moved by {moved:.3g} m in the plane, {ASTRAY:g} times as far as they lie apart: the motion has grown "
+                'without bound; take a smaller [time] step or scheme = "constant"'
             )
         assert self.driven is not None and self.driven.slope is not None, "a road that leans"
         x, y = (self.along + place[0])[None], (self.across + place[1])[None]
