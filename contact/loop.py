@@ -35,7 +35,7 @@ MEETING = 3e-2
 MEETINGS = 20  # solutions of a step, at most
 # Slopes up to which points are followed wholly, and from which on they are not.
 GENTLE, STEEP = 0.5, 1.0
-ASTRAY = 10.0  # times the size of a patch: motions of its points in the plane that are none of a tire
+ASTRAY = 10.0  # times the size of a patch: motions in the plane that are none of a tire
 
 # What needs no contact is computed for as many steps at once as make this many points, and for at most so many.
 _POINTS_AHEAD, STEPS_AHEAD = 200_000, 64

@@ -883,7 +883,8 @@ class NonlinearTire(FullTire):
             raise self._stuck(trial.off, size) from None
         self._secants, self._anew = Secants(self.comm), True
         change = self._solved(trial.defect)
-        self._free, self._off = trial.motion - change - self._pushed(trial.force), self._largest(change)
+        self._free = trial.motion - change - self._pushed(trial.force)
+        self._off = self._largest(change)
 
     def advance(self, force: np.ndarray) -> None:
         """The motion under the force (k,) N for which `settle` returned None is that of the end of the step."""
