@@ -3,8 +3,8 @@
 First the standing tire climbs rises, and the road as it lies under the footprint at places along the run. Then the time
 loop runs with the first few vectors of these states, and it is found what the road feels of what they leave out: more of them
 follow where it is much. States of a run join only where none goes through: a belted tire does not move where its
-reduced force lets it, and its vectors then answer to what no tire does, which the road's force does not tell: on a bar of 15 mm it was
-7.6 % left out with them, and the axle's force 15 % off in place of 5. Vectors of a linear tire's motion alone did not let the loop settle.
+reduced force lets it, and its vectors then answer to what no tire does, which the road's force does not tell: on a bar of 15 mm it
+told that 7.6 % was left out with them, and the axle's force was 15 % off in place of 5.5. Vectors of a linear tire's motion alone did not let the loop settle.
 """
 
 from __future__ import annotations
