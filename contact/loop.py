@@ -35,6 +35,7 @@ MEETING = 3e-2
 MEETINGS = 20  # solutions of a step, at most
 # Slopes up to which points are followed wholly, and from which on they are not.
 GENTLE, STEEP = 0.5, 1.0
+ASTRAY = 10.0  # times the size of a patch: motions in the plane that are none of a tire
 
 # What needs no contact is computed for as many steps at once as make this many points, and for at most so many.
 _POINTS_AHEAD, STEPS_AHEAD = 200_000, 64
@@ -345,7 +346,11 @@ class Drive:
                 known = known + self.height(along, across)
             follows = self._follows(along, across, patch) if leans else np.ones(along.shape)
             road = self if leans else None
-            met = [RoadMet(road, along[k], y, known[k], follows[k]) for k in range(len(times))]
+            farthest = ASTRAY * _widest(patch)
+            met = [
+                RoadMet(road, along[k], y, known[k], follows[k], farthest)
+                for k in range(len(times))
+            ]
             skipped = max(done - first, 0)
             yield times[skipped:], met[skipped:]
 
@@ -365,13 +370,14 @@ class Drive:
 class RoadMet:
     """The road under the points at the end of a step: `known` (c,) m on a level road, and on one that is `driven` over to be
     added to its height at the places of the points, `along` and `across` (c,) m of their own. `follows` (c,): share of
-    their motion with which the points are followed."""
+    their motion with which the points are followed; `farthest` m that they may have moved."""
 
     driven: Drive | None
     along: Array
     across: Array
     known: Array
     follows: Array
+    farthest: float = np.inf
 
     @staticmethod
     def level(patch: Patch) -> RoadMet:
@@ -385,7 +391,15 @@ class RoadMet:
         return self.driven is not None
 
     def at(self, place: Array) -> tuple[Array, Array]:
-        """Height (c,) m and slope (c, 2) of a road that leans, for points at a `place` (2, c) m beside their own."""
+        """Height (c,) m and slope (c, 2) of a road that leans, for points at a `place` (2, c) m beside their own.
+
+        ConvergenceError beyond the `farthest`: heights are kept of all of the road between the points, and would take all memory.
+        """
+        if not (moved := float(np.abs(place).max(initial=0.0))) <= self.farthest:
+            raise ConvergenceError(
+                f"contact: points have moved by {moved:.3g} m in the plane, {ASTRAY:g} times as far as they lie apart: the motion has grown "
+                'without bound; take a smaller [time] step or scheme = "constant"'
+            )
         assert self.driven is not None and self.driven.slope is not None, "a road that leans"
         x, y = (self.along + place[0])[None], (self.across + place[1])[None]
         slope = np.ascontiguousarray(self.driven.slope(x, y)[0], dtype=float)
@@ -659,6 +673,12 @@ class ContactProblem:
         if self.components == 3:
             self._solution[:], self._before[:] = state["met"]
             self.solutions, self.unsettled = (int(count) for count in state["meetings"])
+
+
+def _widest(patch: Patch) -> float:
+    """Size (m) of the rectangle that a patch's points lie in, along or across, the larger one."""
+    lies = patch.points[:, :2]
+    return float((np.ptp(lies, axis=0) + 2.0 * patch.half_sizes.max(axis=0)).max())
 
 
 def _in_plane(same_step: Array, weights: sparse.csr_matrix, p: int) -> Array:

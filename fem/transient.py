@@ -14,6 +14,7 @@ Damping is that of the matrices D, of modes beside it (`ModalDamping`), or of th
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -47,8 +48,10 @@ TOLERANCE = 1e-9  # of the largest displacement
 _FLOOR = 1e-11  # of the wall's thickness: rounding of F
 MOST_TURNS = 90
 _MOST_MET = 500  # solutions of the contact in one of them
-# Iterations of a step after which the matrix is factorised anew: that takes as long as some forty of them.
-PATIENT = 30
+# Iterations of a step that may pass until a tenth is left of what is out of balance; then the matrix is factorised anew, which
+# takes as long as some ten of them. From then on it is at every one that leaves more than a part.
+PATIENT, GAIN, LEFT = 4, 0.1, 0.3
+_ASTRAY = 10.0  # times what the nearest trial leaves: nothing is known of the motion there
 SECANTS = 40  # kept at most
 _DEPENDENT = 1e-12  # squares of their singular values that are taken for none, of the largest
 _RESTING = 1e-11  # of the forces: residual of a shape at rest in space
@@ -727,6 +730,15 @@ class Secants:
         return x + rest - (np.stack(self._moves, axis=1) + changes) @ part
 
 
+class _Trial(NamedTuple):
+    """A motion (own rows) under a force (k,) N, the forces out of balance there, N, and how far that is `off`, m."""
+
+    off: float
+    motion: np.ndarray
+    defect: np.ndarray
+    force: np.ndarray
+
+
 class NonlinearTire(FullTire):
     """The nonlinear tire between forces and displacements of the patch, about its static state.
 
@@ -746,9 +758,10 @@ class NonlinearTire(FullTire):
 
         A = (1 - a) M / (beta h^2) + (gamma / (beta h)) (D + 2 Omega G) + K_Omega + dF/du (u_k) - K,
 
-    that of the linear step, and secants of it (`Secants`) kept from step to step: the nonlinear response has few shapes. The
-    factor is taken anew at the present motion where `PATIENT` iterations have not done. The contact is solved in each
-    iteration. Its own matrix stays that of the linear step, S_0 = W A_0^-1 W^T: with another factor, for forces f' near f it is given the displacement
+    that of the linear step, and secants of it (`Secants`) kept from step to step: the nonlinear response has few shapes. Where
+    `PATIENT` iterations do not gain `GAIN`, the factor is taken anew at the present motion, and again until the iterations leave less than
+    `LEFT`: secants alone go astray where cords slacken. A trial that is `_ASTRAY` is given up for the nearest one. The contact is solved in
+    each iteration. Its own matrix stays that of the linear step, S_0 = W A_0^-1 W^T: with another factor, for forces f' near f it is given the displacement
     w(f) - S_0 f + (S - S_0) (f' - f), with f' of its last solution, and solved again until f' stays. That
     needs steps in which inertia counts: contact and tire are to respond less than twice as much as in S_0.
     """
@@ -806,6 +819,8 @@ class NonlinearTire(FullTire):
     def predict(self) -> np.ndarray:
         """First estimate of the displacement (r,) m at the end of the step without new force."""
         self._tried, self._meetings, self._off = 0, 0, np.inf
+        self._nearest: _Trial | None = None
+        self._mark, self._waited, self._anew = np.inf, 0, False
         self._secants.begin()
         self._free = self._predicted()
         return self._seen()
@@ -842,18 +857,34 @@ class NonlinearTire(FullTire):
             return None
         if self._tried > MOST_TURNS or not np.isfinite(off):
             raise self._stuck(off, size)
-        if self._tried % PATIENT == 0:
-            try:
-                self._factor_at(new)
-            except NearlySingular:
-                raise self._stuck(off, size) from None
-            change = self._solved(defect)
-            self._secants = Secants(self.comm)
-            self._free = new - change - self._pushed(force)
+        trial = _Trial(off, new, defect, force.copy())
+        if self._nearest is None or off < self._nearest.off:
+            self._nearest = trial
+        if self._goes_on(off):
+            self._free, self._off = self._secants.next(self._free, -change), off
         else:
-            self._free = self._secants.next(self._free, -change)
-        self._off = off
+            self._anew_at(trial if off <= _ASTRAY * self._nearest.off else self._nearest, size)
         return self._seen()
+
+    def _goes_on(self, off: float) -> bool:
+        """Whether iterations with the present factor gain enough."""
+        if self._anew:
+            return off <= LEFT * self._off
+        self._waited += 1
+        if off <= GAIN * self._mark:
+            self._mark, self._waited = off, 0
+        return self._waited < PATIENT
+
+    def _anew_at(self, trial: _Trial, size: float) -> None:
+        """Go on from a trial with the matrix there."""
+        try:
+            self._factor_at(trial.motion)
+        except NearlySingular:
+            raise self._stuck(trial.off, size) from None
+        self._secants, self._anew = Secants(self.comm), True
+        change = self._solved(trial.defect)
+        self._free = trial.motion - change - self._pushed(trial.force)
+        self._off = self._largest(change)
 
     def advance(self, force: np.ndarray) -> None:
         """The motion under the force (k,) N for which `settle` returned None is that of the end of the step."""
@@ -913,7 +944,7 @@ class NonlinearTire(FullTire):
     def snapshot(self) -> dict[str, np.ndarray]:
         """FullTire.snapshot, with the motion of the factor if it was taken anew, and the last forces."""
         spread, everywhere = self._operators.spread, self._operators.body.everywhere
-        kept = super().snapshot() | {"met": self._met, "begun": everywhere(spread(self._begun))}
+        kept = super().snapshot() | {"pushed": self._met, "begun": everywhere(spread(self._begun))}
         if (secants := self._secants.state()).size:
             kept["secants"] = np.stack([everywhere(spread(one)) for one in secants.T])
         if self._factored is not None:
@@ -923,7 +954,7 @@ class NonlinearTire(FullTire):
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """Continue from a snapshot, before `predict`; written by any number of processes."""
         super().restore(state)
-        self._met = state["met"]
+        self._met = state["pushed"]
         self._begun = self._operators.restrict(state["begun"][self._operators.body.ids])
         self._elastic = self._restoring(self.displacement) - self._begun
         self._secants = Secants(self.comm)

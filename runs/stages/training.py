@@ -2,9 +2,9 @@
 
 First the standing tire climbs rises, and the road as it lies under the footprint at places along the run. Then the time
 loop runs with the first few vectors of these states, and it is found what the road feels of what they leave out: more of them
-follow where it is much, and at last states of the run. States of a run are the last resort: a belted tire does not move where its
-reduced force lets it, and its vectors then answer to what no tire does. Vectors of a linear tire's motion alone did
-not let the loop settle.
+follow where it is much. States of a run join only where none goes through: a belted tire does not move where its
+reduced force lets it, and its vectors then answer to what no tire does, which the road's force does not tell: on a bar of 15 mm it
+told that 7.6 % was left out with them, and the axle's force was 15 % off in place of 5.5. Vectors of a linear tire's motion alone did not let the loop settle.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ RUNS, INSTANTS, STEPS = 8, 60, 4000  # at most: runs, instants of each, steps of
 FEW = 8  # vectors of the first run; twice as many where they leave out too much
 ENOUGH = 0.05  # of the change of the road's force: what the training may leave out of a run
 SETTINGS = Settings(most=160, turns=6, precision=5e-3)
-DONE, MORE, STATES, NO_BETTER = "little is left out", "more vectors", "its states", "no better"
+DONE, MORE, STATES, ALL = "little is left out", "more vectors", "its states", "all vectors"
 _RESPONSE = "response"
 
 
@@ -99,7 +99,7 @@ class NonlinearStage(Computed[TrainedMotion]):
     def solver(self) -> str:
         """The solvers' settings, for the log."""
         return (
-            f"at most {RUNS} runs of {STEPS} steps, {INSTANTS} instants of each, until {ENOUGH:g} of the road's force is left out or more than before; at most "
+            f"at most {RUNS} runs of {STEPS} steps, {INSTANTS} instants of each, until {ENOUGH:g} of the road's force is left out or all vectors are taken; at most "
             f"{SETTINGS.most} vectors; weights of cells off by at most {SETTINGS.tolerance:g}; {MUMPS}"
         )
 
@@ -195,8 +195,8 @@ class NonlinearStage(Computed[TrainedMotion]):
             if not stopped and (best is None or left_out < before):
                 best = left_out, training, motion
             more = count == most < SETTINGS.most
-            next_one = after_run(left_out, before, more, len(seen) > 1)
-            if next_one in (DONE, NO_BETTER):
+            next_one = after_run(left_out, before, more)
+            if next_one in (DONE, ALL):
                 break
             if next_one == MORE:
                 most = min(2 * most, SETTINGS.most)
@@ -256,15 +256,14 @@ class NonlinearStage(Computed[TrainedMotion]):
         return TrainedMotion(held, read_response(file[_RESPONSE]))
 
 
-def after_run(left_out: float, before: float, more: bool, joined: bool) -> str:
+def after_run(left_out: float, before: float, more: bool) -> str:
     """The step that follows a run whose training leaves out a share of the force, inf if it stopped, and the best run `before` another:
-    nothing if it is little; vectors of the states known if there are `more`; the run's own states; nothing if those of
-    an earlier run have `joined` and made it no better."""
+    nothing if it is little; vectors of the states known if there are `more`; the run's own states if none went through."""
     if left_out <= ENOUGH:
         return DONE
     if more:
         return MORE
-    return NO_BETTER if joined and left_out >= before < np.inf else STATES
+    return ALL if min(left_out, before) < np.inf else STATES
 
 
 def linear_motion(stage: Any) -> LargeMotion:

@@ -1,15 +1,19 @@
 """The road is met where the points have moved to: closed forms of points on springs, and roads that give back what they take."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
 from tireroad.contact.loop import MEETING, ContactProblem, Drive, Loop
 from tireroad.contact.patch import Patch
+from tireroad.contact.roads.cell_mean import CellMean
 from tireroad.contact.rolling import StaticTire
 from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.solver.stick_slip import BrushFriction
 from tireroad.contact.tread.brush import Brush, BrushLaw
+from tireroad.fem.errors import ConvergenceError
 from tireroad.tests.validation.cases import oval_patch
 
 ALONG_Z, IN_PLANE = 1e-6, 3e-6  # m/N: tires are up to three times as soft in the plane
@@ -22,6 +26,15 @@ def one_point() -> Patch:
         index=np.zeros(1, int), points=np.zeros((1, 3)), half_sizes=np.full((1, 2), 5e-3), force=none, gap=none, edge=flag,
         line=np.zeros(1, int),
     )  # fmt: skip
+
+
+class Ramp:
+    """A road that rises for ever."""
+
+    spacing, end = 1e-3, np.inf
+
+    def height(self, x, y):
+        return 0.3 * np.maximum(x, 0.0) + 0.0 * y
 
 
 def over(
@@ -53,6 +66,27 @@ def test_a_point_on_springs_presses_a_plane_normal_to_it(slope: float) -> None:
     assert vertical[:, 0] == pytest.approx(force, rel=1e-7)
     assert horizontal[:, 0, 0] == pytest.approx(-slope * force, rel=1e-7)
     assert problem.unsettled == 0
+
+
+class Lost(StaticTire):
+    """A tire that presses its points down and 10 km on."""
+
+    def predict(self):
+        return np.repeat([-1e-3, 1e4, 0.0], len(self.same_step) // 3)
+
+
+def test_points_that_move_without_bound_end_a_run_before_memory_does() -> None:
+    """Heights would be kept of all the road up to there, 480 MB of them."""
+    same_step = np.diag([ALONG_Z, IN_PLANE, IN_PLANE])
+    road = CellMean(Ramp(), np.zeros(1), one_point().half_sizes)
+    problem = ContactProblem(one_point(), same_step, ActiveSet(same_step[:1, :1]))
+    drive = Drive(road.height, lambda t: 0.0, SPEED, road.slope)
+    tracemalloc.start()
+    with pytest.raises(ConvergenceError, match="without bound"):
+        list(Loop(Lost(same_step), problem).roll(drive, STEP, 1))
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 1e7
 
 
 def test_a_point_on_springs_over_waves_sideways_and_along() -> None:

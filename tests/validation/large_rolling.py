@@ -116,8 +116,12 @@ class Case:
         )
 
 
-# Bars of 10 x 20 and 15 x 50 mm are left out: the elements' run takes all memory of a machine of 24 GB there, as the tire meets them.
-CASES = Case(0.025, 0.050, 0.025), Case(-0.030, 0.300, 0.020)
+CASES = (
+    Case(0.010, 0.020, 0.010),
+    Case(0.015, 0.050, 0.015),
+    Case(0.025, 0.050, 0.025),
+    Case(-0.030, 0.300, 0.020),
+)
 
 
 def chosen(only: Sequence[str]) -> list[Case]:

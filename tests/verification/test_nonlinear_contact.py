@@ -1,5 +1,7 @@
 """The nonlinear tire on a road that rises by millimetres and stays: the static solver's state."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -7,6 +9,7 @@ from scipy import sparse
 
 from tireroad.contact.loop import Drive, roll
 from tireroad.contact.patch import Patch
+from tireroad.contact.rolling import make_loop
 from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.solver.stick_slip import BrushFriction
 from tireroad.contact.tread.brush import Brush, BrushLaw
@@ -19,7 +22,12 @@ from tireroad.fem.static.state import static_state
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
 from tireroad.fem.transient import FullTire, NonlinearTire
+from tireroad.runs.pipeline import run_scene
+from tireroad.runs.scene.load import load
+from tireroad.runs.stages.setup import probes
+from tireroad.runs.validation.full_elements import Elements
 from tireroad.tests.validation.cases import thesis_torus
+from tireroad.tests.validation.large_rolling import Case
 
 INFLATION, STEP = 2e5, 2e-4
 DAMPING = (400.0, 0.0)
@@ -140,7 +148,7 @@ def test_a_road_that_has_risen_carries_the_static_load():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("patience", [5, transient.PATIENT])
+@pytest.mark.parametrize("patience", [2, transient.PATIENT])
 def test_a_rise_of_centimetres_in_long_steps_ends_at_the_static_load(monkeypatch, patience):
     """Without inertia that would help: with new factors of the present motion, and by secants of the static state's."""
     monkeypatch.setattr(transient, "PATIENT", patience)
@@ -157,7 +165,7 @@ def test_a_rise_of_centimetres_in_long_steps_ends_at_the_static_load(monkeypatch
         loads=points,
     )
     found = risen(full, patch, FAR, step, 150)
-    assert full.factors > 1 or patience > 5
+    assert full.factors > 1 or patience > 2
     assert found == pytest.approx(pressed(0.002 + FAR).load(), rel=1e-4)
 
 
@@ -177,3 +185,28 @@ def test_rolling_it_tends_to_the_linear_tire(tmp_path):
     # Along the road the slope takes part: what is off grows as the square.
     assert found[1][1] / found[0][1] == pytest.approx(100.0, rel=0.5)
     assert found[1][6] < 10
+
+
+@pytest.mark.long
+def test_belts_on_a_bar_are_found_as_by_newtons_method(tmp_path, monkeypatch):
+    """Of a passenger tire whose cords slacken: secants of one factor led its 46th step away from balance."""
+    file = tmp_path / "scene.toml"
+    file.write_text(Case(0.015, 0.050, 0.015).scene())
+    given: dict[str, Any] = {"until": "greens", "fresh": False, "petsc_options": []}
+    run = run_scene(load(file), tmp_path, MPI.COMM_SELF, **given)
+    contact = run.job.scene.contact
+    setup, _ = run.setup.equilibrated(run.greens.contact, run.static.normal_force, contact)
+    seen = probes(run.job, run.static, run.setup)
+    tire, step, _ = Elements(run, run.job, seen).nonlinear(STEP)
+    loop = make_loop(contact, setup, tire, step)
+
+    def rolled(first, last):
+        steps = loop.roll(setup.drive, step, last, done=first, at_once=1)
+        return np.concatenate([block.force for block in steps])
+
+    rolled(0, 44)
+    kept = loop.snapshot()
+    found = rolled(44, 47)
+    loop.restore(kept)
+    monkeypatch.setattr(transient, "PATIENT", 1)
+    assert abs(rolled(44, 47) - found).max() < 1e-4 * found.max()
