@@ -20,6 +20,9 @@ from tireroad.fem.errors import ConvergenceError
 from tireroad.greens.response import Response
 
 PASSAGES = 100  # lengths of the footprint, within which a tire is to roll steadily
+# Of them in steps of a point, from which the loop's own steps go on: in steps so long a footprint may stick and slip sideways for ever
+# (12 of -248 N in turns of seven lengths, a radial tire of 20 equal elements), which in the loop's own steps settles.
+ROUGH = 30
 FEWEST_STEPS = 8  # of a length
 STEADY = 1e-4  # of the load: changes of the forces from one length to the next
 MOST_SLIP = (-0.2, 0.2)
@@ -143,17 +146,18 @@ def rolling_steadily(
     rolls = spec.has_friction and spec.brush == "rolling" and setup.rolled.speed > 0
     if not (rolls and touching.any()) or setup.steady is not None:
         return setup
-    p, pitch = len(patch.index), _pitch(patch)
+    p, pitch, way = len(patch.index), _pitch(patch), setup.rolled.speed * step
     flexibility = (response.static() + response.residual)[: 3 * p, : 3 * p]
     length = float(np.ptp(patch.points[touching, 0])) + pitch
     shifted = np.zeros(3 * p) if response.offset is None else response.offset[: 3 * p]
     found, rolled = setup, _Rolled(spec, setup, flexibility, shifted, length, pitch)
+    rolled.guesses = way < pitch
     if setup.free:
         found = setup.with_slip(rolled.freely(given[1]))
     if given[0] or not setup.free:
         rolled.held(found.slip)
         rolled.until_steady()
-    if (way := setup.rolled.speed * step) < pitch:
+    if way < pitch:
         rolled = _Rolled(spec, setup, flexibility, shifted, length, way, rolled)
         if setup.free and not given[0]:
             found = setup.with_slip(rolled.freely(given[1]))
@@ -204,6 +208,7 @@ class _Rolled:
         self._across: float | None = None
         self._before: tuple[float, float] | None = None  # drag and slip of the last stretch
         self._slip, self.way = (0.0, 0.0), 0.0
+        self.guesses = False  # for other steps, in which it need not be steady
         if before is not None:
             self._slip, self.way = before._slip, before.way
             self.loop.contact.set_state(before.loop.contact.state())
@@ -238,15 +243,17 @@ class _Rolled:
         self.loop.contact.creep(self._shape + (along, across))
 
     def until_steady(self) -> None:
-        """Roll until the mean forces of a length of the footprint are those of the one before."""
+        """Roll until the mean forces of a length of the footprint are those of the one before, or for a guess `ROUGH` lengths."""
         last = None
-        for _ in range(PASSAGES):
+        for _ in range(ROUGH if self.guesses else PASSAGES):
             mean = np.mean([self._stretch() for _ in range(self._stretches)], axis=0)
             if last is not None:
                 drag = abs(mean[2]) if self._across is not None else 0.0
                 if max(drag, *np.abs(mean - last)) <= STEADY * self._load:
                     return
             last = mean
+        if self.guesses:
+            return
         wanted = (
             "no slip at which the road does not drag the tire"
             if self._across is not None

@@ -7,12 +7,13 @@ from tireroad.contact.model import TreadContact
 from tireroad.contact.patch import Patch
 from tireroad.contact.roads.kinds.shapes import Flat
 from tireroad.contact.roads.under_tire import RoadUnderTire
-from tireroad.contact.rolling import rolling_steadily
+from tireroad.contact.rolling import _Rolled, rolling_steadily
 from tireroad.contact.setup import ContactSetup, Rolled
 from tireroad.contact.solver.active_set import ActiveSet
 from tireroad.contact.solver.stick_slip import BrushFriction
 from tireroad.contact.tread.brush import Brush, BrushLaw, shape_slip
 from tireroad.contact.tread.law import TREADS
+from tireroad.fem.errors import ConvergenceError
 from tireroad.greens.response import Response
 
 
@@ -74,7 +75,7 @@ def test_slips_follow_the_points_whatever_grid_they_are_on() -> None:
     )
 
 
-def rolling_tire(offset: np.ndarray | None):
+def rolling_tire(offset: np.ndarray | None, step: float = 1e-3):
     """A row of points on springs of their own, pressed on a flat road by 100 N, of a wheel of 0.3 m that rolls freely."""
     x = np.linspace(-0.05, 0.05, 21)
     c = len(x)
@@ -105,7 +106,7 @@ def rolling_tire(offset: np.ndarray | None):
     given = {"reach": 0.01, "road": road, "rolled": Rolled(speed=20.0, duration=0.1)}
     setup = ContactSetup(patch=patch, free=True, **given)
     settled, _ = setup.equilibrated(response, patch.force, spec)
-    return settled, rolling_steadily(spec, settled, response, 1e-3)
+    return settled, rolling_steadily(spec, settled, response, step)
 
 
 def test_what_losses_move_ahead_of_the_axle_the_road_drags() -> None:
@@ -121,3 +122,22 @@ def test_what_losses_move_ahead_of_the_axle_the_road_drags() -> None:
     assert ahead > 0.002
     drag = -rolled.steady.horizontal[:, 0].sum()
     assert drag == pytest.approx(100.0 * ahead / 0.3, rel=0.02)
+
+
+def test_steps_of_a_point_are_a_guess_for_the_loops_own(monkeypatch) -> None:
+    """What does not settle in them settles in the loop's own, shorter ones; what does not settle there fails."""
+    tilt = np.r_[-1e-5 * np.linspace(-1.0, 1.0, 21), np.zeros(42)]
+    _, alone = rolling_tire(tilt, 1e-4)
+    stretch, grows, longest = _Rolled._stretch, iter(range(100_000)), 0.003
+
+    def unsettled(self: _Rolled) -> np.ndarray:
+        more = [0.0, float(next(grows)) if self._step > longest else 0.0, 0.0]
+        return stretch(self) + more
+
+    monkeypatch.setattr(_Rolled, "_stretch", unsettled)
+    _, rolled = rolling_tire(tilt, 1e-4)
+    drag, wanted = (one.steady.horizontal[:, 0].sum() for one in (rolled, alone))
+    assert drag == pytest.approx(wanted, abs=2e-4 * 100.0)
+    longest = 0.0
+    with pytest.raises(ConvergenceError, match="no slip at which"):
+        rolling_tire(tilt, 1e-4)
