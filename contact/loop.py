@@ -677,8 +677,8 @@ class ContactProblem:
 
 def _widest(patch: Patch) -> float:
     """Size (m) of the rectangle that a patch's points lie in, along or across, the larger one."""
-    lies = patch.points[:, :2]
-    return float((np.ptp(lies, axis=0) + 2.0 * patch.half_sizes.max(axis=0)).max())
+    x0, x1, y0, y1 = patch.extent
+    return float(np.max([x1 - x0, y1 - y0] + 2.0 * patch.half_sizes.max(axis=0)))
 
 
 def _in_plane(same_step: Array, weights: sparse.csr_matrix, p: int) -> Array:

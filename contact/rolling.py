@@ -150,14 +150,14 @@ def rolling_steadily(
     flexibility = (response.static() + response.residual)[: 3 * p, : 3 * p]
     length = float(np.ptp(patch.points[touching, 0])) + pitch
     shifted = np.zeros(3 * p) if response.offset is None else response.offset[: 3 * p]
-    found, rolled = setup, _Rolled(spec, setup, flexibility, shifted, length, pitch)
-    rolled.guesses = way < pitch
+    found, guesses = setup, way < pitch
+    rolled = _Rolled(spec, setup, flexibility, shifted, length, pitch, guesses=guesses)
     if setup.free:
         found = setup.with_slip(rolled.freely(given[1]))
     if given[0] or not setup.free:
         rolled.held(found.slip)
         rolled.until_steady()
-    if way < pitch:
+    if guesses:
         rolled = _Rolled(spec, setup, flexibility, shifted, length, way, rolled)
         if setup.free and not given[0]:
             found = setup.with_slip(rolled.freely(given[1]))
@@ -183,8 +183,9 @@ class _Rolled:
         length: float,
         way: float,
         before: _Rolled | None = None,
+        guesses: bool = False,
     ) -> None:
-        """In steps of `way` m, from rest or where it was `before`; `flexibility` (3p, 3p) m/N to constant forces, and where the
+        """In steps of `way` m, from rest or where it was `before`; if it `guesses` for other steps, it need not be steady; `flexibility` (3p, 3p) m/N to constant forces, and where the
         nodes are `shifted` (3p,) m to by what always acts inside the tire."""
         patch, p = setup.patch, len(setup.patch.index)
         step = way / setup.rolled.speed
@@ -208,7 +209,7 @@ class _Rolled:
         self._across: float | None = None
         self._before: tuple[float, float] | None = None  # drag and slip of the last stretch
         self._slip, self.way = (0.0, 0.0), 0.0
-        self.guesses = False  # for other steps, in which it need not be steady
+        self._guesses = guesses
         if before is not None:
             self._slip, self.way = before._slip, before.way
             self.loop.contact.set_state(before.loop.contact.state())
@@ -245,14 +246,14 @@ class _Rolled:
     def until_steady(self) -> None:
         """Roll until the mean forces of a length of the footprint are those of the one before, or for a guess `ROUGH` lengths."""
         last = None
-        for _ in range(ROUGH if self.guesses else PASSAGES):
+        for _ in range(ROUGH if self._guesses else PASSAGES):
             mean = np.mean([self._stretch() for _ in range(self._stretches)], axis=0)
             if last is not None:
                 drag = abs(mean[2]) if self._across is not None else 0.0
                 if max(drag, *np.abs(mean - last)) <= STEADY * self._load:
                     return
             last = mean
-        if self.guesses:
+        if self._guesses:
             return
         wanted = (
             "no slip at which the road does not drag the tire"

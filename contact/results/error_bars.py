@@ -105,15 +105,16 @@ class Measured:
         return min(low, centre - least), max(high, centre + least)
 
 
-def of_sound(pressure: np.ndarray, spacing: float, up_to: float, bands: np.ndarray) -> Measured:
-    """Quantities of a sound from the lines (f, k) Pa of its pressure at k microphones from 0 Hz on, `spacing` Hz apart and a little
-    beyond `up_to` Hz at most; levels in `bands` (b,) Hz."""
-    centre, square = band_sums(spacing * np.arange(1, len(pressure)), np.abs(pressure[1:]) ** 2)
+def of_sound(pressure: np.ndarray, spacing: float, bands: np.ndarray) -> Measured:
+    """Quantities of a sound from the lines (f, k) Pa of its pressure at k microphones from 0 Hz on, `spacing` Hz apart; levels in
+    `bands` (b,) Hz."""
+    frequency = spacing * np.arange(len(pressure))
+    centre, square = band_sums(frequency[1:], np.abs(pressure[1:]) ** 2)
     level = np.full((len(bands), pressure.shape[1]), np.nan)
     own, band = np.nonzero(np.isclose(bands[:, None], centre))
     level[own] = 10 * np.log10(np.maximum(square[band], np.finfo(float).tiny))
     none = np.zeros(pressure.shape[1])
-    return Measured(none, none, bands, level, pressure, spacing, up_to)
+    return Measured(none, none, bands, level, pressure, spacing, float(frequency[-1]))
 
 
 @dataclass(frozen=True)

@@ -191,14 +191,8 @@ class Vibrating:
     def keeping_where(self, wanted: Callable[[Array], Array]) -> Vibrating:
         """The same of the states alone whose eigenvalues (1/s) are `wanted`."""
         states = self.basis.states
-        few = wanted(states.eigenvalue)
-        kept = replace(
-            states,
-            eigenvalue=states.eigenvalue[few],
-            right=states.right[:, few],
-            left=states.left[few],
-        )
-        return replace(self, basis=replace(self.basis, states=kept))
+        few = states.among(wanted(states.eigenvalue))
+        return replace(self, basis=replace(self.basis, states=few))
 
     def of_combinations(
         self, rolling: RollingModes, turn: Array, loads: sparse.csr_matrix

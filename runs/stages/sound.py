@@ -380,7 +380,7 @@ class SoundStage(WholeTire[SoundPressure]):
             pressure = np.zeros((len(frequency), len(paths.names)), complex)
             moved = volumes @ lines[1 : len(frequency)].T
             pressure[1:] = paths.near.pressure(moved, frequency[1:]).T
-            return of_sound(pressure, accuracy.spacing, frequency[-1], bands)
+            return of_sound(pressure, accuracy.spacing, bands)
 
         squares = np.zeros((len(bands), len(paths.names)))
         for both in accuracy.vibrations.values():
