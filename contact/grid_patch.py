@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache
 from itertools import product
 from typing import Protocol
 
@@ -29,6 +30,8 @@ from tireroad.fem.errors import ConvergenceError, UnsuitedSettings
 # Points of the largest grid that is laid out before the patch is known.
 MOST_POINTS = 1_000_000
 LOAD_TOLERANCE = 1e-7
+# m: the first step in which the tire's rise is sought, and how closely it is found (1e-8 N of a passenger tire).
+_STEP, _RISE = 1e-4, 1e-13
 # Of a tread that creeps at rest: turns, and by what its displacements may change in the last, of the largest.
 MOST_TURNS, SETTLED = 60, 1e-6
 
@@ -154,17 +157,20 @@ def equilibrate(
         rise = max(0.0, -float(flat.min()))
         return replace(patch, force=np.zeros_like(flat), gap=flat + rise), rise
 
-    def settled(moved: np.ndarray | float) -> tuple[np.ndarray, float]:
+    def settled(moved: np.ndarray | float, near: float, step: float) -> tuple[np.ndarray, float]:
+        @cache
         def excess(rise: float) -> float:
             return float(solver.solve(flat + moved + rise).sum()) / load - 1.0
 
-        low, high = _bracket(excess, 1e-4)
-        rise = brentq(excess, low, high, xtol=1e-16, rtol=1e-14)
+        rise = brentq(excess, *_bracket(excess, near, step), xtol=_RISE)
         return solver.solve(flat + moved + rise), rise
 
     crept, mixed = np.zeros((1, len(flat))), Mixed()
+    rise, step = 0.0, _STEP
     for _ in range(MOST_TURNS):
-        force, rise = settled(crept[0])
+        before = rise
+        force, rise = settled(crept[0], rise, step)
+        step = max(2.0 * abs(rise - before), 1e4 * _RISE)
         if past is None:
             break
         rest = past(force)[None] - crept
@@ -199,17 +205,17 @@ def spread_pull(patch: Patch, pull: np.ndarray, force: np.ndarray) -> np.ndarray
     return pulls + (pull.sum(axis=0) - pulls.sum(axis=0)) * (patch.force / whole)[:, None]
 
 
-def _bracket(excess: Callable[[float], float], step: float) -> tuple[float, float]:
-    """Rises (m) with too much and with too little load. ConvergenceError if there are none."""
-    low, high = 0.0, 0.0
+def _bracket(excess: Callable[[float], float], near: float, step: float) -> tuple[float, float]:
+    """Rises (m) with too much and with too little load, sought from one that is `near` in steps that double.
+
+    ConvergenceError if there are none.
+    """
+    much = excess(near) > 0.0
     for _ in range(20):
-        if excess(low) <= 0.0:
-            low -= step
-        elif excess(high) > 0.0:
-            high += step
-        else:
-            return low, high
-        step *= 2.0
+        beyond = near + (step if much else -step)
+        if (excess(beyond) > 0.0) != much:
+            return min(near, beyond), max(near, beyond)
+        near, step = beyond, 2.0 * step
     raise ConvergenceError(
         "contact: no height of the tire gives the static load on the points; take a finer grid "
         "(contact.points), or a larger contact.reach"

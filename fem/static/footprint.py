@@ -324,13 +324,16 @@ class TreadSurface:
         place = self._guess(target)
         inside = np.isfinite(place).all(axis=1)
         place[~inside] = 0.0
+        left = np.flatnonzero(inside)
         for _ in range(_NEWTON):
-            defect = self.at(*place.T)[:, :2] - target
-            open_ = inside & (np.abs(defect).max(axis=1) > _CLOSE)
-            if not open_.any():
+            defect = self.at(*place[left].T)[:, :2] - target[left]
+            far = np.abs(defect).max(axis=1) > _CLOSE
+            if not far.any():
                 break
-            place[open_] -= self._newton_step(place[open_], defect[open_])
-            place[:, 1] = np.clip(place[:, 1], *self._across)
+            left, before = left[far], place[left[far]]
+            place[left] -= self._newton_step(before, defect[far])
+            place[left, 1] = np.clip(place[left, 1], *self._across)
+            left = left[(place[left] != before).any(axis=1)]  # others are held by the border
         inside &= np.abs(self.at(*place.T)[:, :2] - target).max(axis=1) <= 1e3 * _CLOSE
         return place[:, 0], place[:, 1], inside
 
