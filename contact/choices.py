@@ -15,3 +15,13 @@ DENSE_POINTS = 1000
 # conjugate gradients, with 770 and 550 (a road as rough as the points are apart, a whole point per
 # step) twice as much.
 MOST_TOUCHING = 1000
+# The same with friction, of a grid that is no matrix, whose normal and horizontal forces are then found at once
+# (contact.solver.grid_newton): a step takes 0.86 of the time with 320 touching (9.9 ms), 0.56 with 610 (25.8 ms).
+# Not where nodes lie far apart for their points (a torus with 65 a node: 1 s a step for 59 ms).
+MOST_ALTERNATING, MOST_A_NODE = 300, 16
+
+
+def by_product(friction: bool, points: int, nodes: int, touching: int) -> bool:
+    """Whether "auto" solves a grid of `points` on `nodes`, of which some are `touching` at rest, with products in place of matrices."""
+    fine = friction and DENSE_POINTS < points <= MOST_A_NODE * nodes
+    return touching > (MOST_ALTERNATING if fine else MOST_TOUCHING)

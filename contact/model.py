@@ -6,7 +6,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.contact.choices import DENSE_POINTS, MOST_TOUCHING
+from tireroad.contact.choices import DENSE_POINTS, by_product
 from tireroad.contact.grid_patch import DeformedTread
 from tireroad.contact.patch import Patch
 from tireroad.contact.solver.conditions import ContactSolver
@@ -101,8 +101,9 @@ def solver_name(spec: ContactSpec, patch: Patch) -> str:
     """The solver's name; "auto" is resolved by the number of points that touch at rest."""
     if spec.solver != "auto":
         return spec.solver
-    many = np.count_nonzero(patch.gap <= 0.0) > MOST_TOUCHING
-    return "projected-cg" if many and patch.places is not None else "active-set"
+    count = len(patch.points), len(patch.index), int(np.count_nonzero(patch.gap <= 0.0))
+    many = patch.places is not None and by_product(spec.has_friction, *count)
+    return "projected-cg" if many else "active-set"
 
 
 def past_tread(spec: ContactSpec, patch: Patch, speed: float, in_plane: bool) -> WholeGrid:

@@ -24,6 +24,8 @@ PASSAGES = 100  # lengths of the footprint, within which a tire is to roll stead
 # (12 of -248 N in turns of seven lengths, a radial tire of 20 equal elements), which in the loop's own steps settles.
 ROUGH = 30
 FEWEST_STEPS = 8  # of a length
+# Lengths that a passenger tire takes in steps of a point and then of the loop.
+USUAL = 7, 5
 STEADY = 1e-4  # of the load: changes of the forces from one length to the next
 MOST_SLIP = (-0.2, 0.2)
 # Share of the footprint's mean displacement across the road that is left out; without all of it forces turn the footprint before
@@ -169,6 +171,14 @@ def rolling_steadily(
     return replace(
         found, steady=SteadyRolling(rolled.state(), contact.change.copy(), *forces, rolled.way)
     )
+
+
+def usual_steps(patch: Patch, way: float, finer: float = 1.0) -> float:
+    """Steps that a tire on a grid `finer` than this one usually takes until it rolls steadily, in the loop's own of `way` m."""
+    touching = patch.points[patch.force > 0, 0]
+    pitch = _pitch(patch) / finer
+    length = float(np.ptp(touching)) + pitch if len(touching) else 0.0
+    return length * (USUAL[0] / max(pitch, way) + USUAL[1] / way)
 
 
 class _Rolled:

@@ -134,7 +134,7 @@ class GridNewton:
         """
         last = self.force.copy()
         step = _Step(self, gap, free, read, road, tolerance, again)
-        lags = not step.settle()
+        lags = not (step.settle() or step.alternate())
         if lags and (self.friction.unbounded or not step.split()):
             raise self.friction.unsolved()
         _C.at_once_bound(self.compiled)
@@ -258,6 +258,19 @@ class _Step:
                 lifts = index[solver.touches[index] != (self.force[0, index] > 0.0)]
                 self._bears[lifts] = False
             _C.at_once_newton(at, normal, plane, solver.wholly > 0, _RULES.inner)
+        return False
+
+    def alternate(self) -> bool:
+        """Normal forces under the horizontal ones and these under the former, in turns, from those of the step before. Whether
+        both are in balance."""
+        self.force[1:] = self._brush.horizontal.T
+        for _ in range(TURNS):
+            self._compiled.caution = 1.0
+            if not (self.settle(plane=False) and self.settle(normal=False)):
+                return False
+            self._evaluate()
+            if self._balanced(normal=True, plane=True) and not self._beyond():
+                return True
         return False
 
     def split(self) -> bool:

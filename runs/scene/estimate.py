@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 
-from tireroad.contact.choices import DENSE_POINTS, MOST_TOUCHING, USABLE
+from tireroad.contact.choices import DENSE_POINTS, USABLE, by_product
 from tireroad.contact.results.chance import asked, planned
 from tireroad.greens.residuals import residual_of
 from tireroad.greens.schemes import keeps_history
@@ -47,9 +47,11 @@ _BARS = 0.42
 # unknowns (2026-11-25). The companion runs of error bars go without it.
 _LOAD_ERROR = 1.8
 # s a step of the horizontal forces: some turns of Newton steps with products between all points that touch.
-# Measured with a tread that shears (2026-11-28): 0.3 ms with 81 points that touch, a torus, 0.7 ms with 100, 7 ms with
-# 550, passenger tires; with a brush alone 0.3 ms with 81.
+# Measured with a tread that shears (2026-11-28): 0.3 ms with 81 points that touch, a torus, 0.7 ms with 100, passenger tires;
+# with a brush alone 0.3 ms with 81. All at once (2026-11-30): 14.5 ms with 610, 45 ms with 1,770.
 _SHEARED, _SHEARED_PAIR, _BRISTLES = 3e-4, 2.2e-8, 3e-4
+AT_ONCE = 2.1e-5
+"""s a step and point that touches, of normal and horizontal forces at once."""
 # One tangent with friction, of the frictionless static state: its factor has two triangles, and is
 # of the whole ring. Measured on the built-in tire (2026-11-25): 0.2 standing, 0.24 and 0.26 rolling.
 _RUBBING = 0.25
@@ -299,16 +301,33 @@ def operations(
             parts["greens"] *= 1.6
         # Conjugate gradients: 12 ms for 3,041 points.
         points = size.points**2 if dense else 4000 * size.points
+        if at_once := _at_once(scene, size):
+            points = 0
         step = 2e-4 + 1e-9 * (4 * loads * size.coordinates + points)
         if scene.contact.has_friction:
-            has_shear = _SHEARED + _SHEARED_PAIR * size.touching**2
-            step += has_shear if scene.contact.has_shear else _BRISTLES
+            alone = _SHEARED + _SHEARED_PAIR * size.touching**2
+            shear = AT_ONCE * size.touching if at_once else alone
+            step += shear if scene.contact.has_shear else _BRISTLES
         if keeps_history(scene.time.scheme):
             step += 1e-9 * 0.5 * size.steps * loads**2
         parts["contact loop"] = size.steps * step
     if "response" not in left_out:
         parts["response"] = size.steps * 2e-5 + size.frequencies * (2e-5 + 5e-8 * size.coordinates)
     return parts
+
+
+def _at_once(scene: Scene, size: Sizes) -> bool:
+    """Whether normal and horizontal forces are found at once (contact.loop)."""
+    grid = not scene.contact.on_nodes and size.points > DENSE_POINTS
+    return grid and scene.contact.has_friction and _by_product(scene, size, size.touching)
+
+
+def _by_product(scene: Scene, size: Sizes, touching: float) -> bool:
+    """Whether a grid of so many points is solved with products in place of matrices."""
+    solver, friction = scene.contact.solver, scene.contact.has_friction
+    if solver == "auto":
+        return by_product(friction, size.points, size.nodes, round(touching))
+    return solver == "projected-cg"
 
 
 def boundary_elements(scene: Scene) -> tuple[float, float]:
@@ -506,11 +525,9 @@ def _matrices_of_points(scene: Scene, size: Sizes) -> int:
     """Numbers in the matrices of the contact points held at once."""
     if scene.contact.on_nodes or size.points <= DENSE_POINTS:
         return 3 * size.points**2
-    by_product = scene.contact.solver == "projected-cg"
-    if scene.contact.solver == "auto":
-        by_product = size.touching > 1.5 * MOST_TOUCHING  # the estimate may be half too high
     usual = min(size.points, USUAL * size.touching)
-    return 0 if by_product else PIVOT * usual**2
+    # The estimate of those that touch may be half too high.
+    return 0 if _by_product(scene, size, size.touching / 1.5) else PIVOT * usual**2
 
 
 def memory_of(wanted: Estimate, processes: int, on_disk: bool = False) -> dict[str, float]:

@@ -32,6 +32,7 @@ from tireroad.runs.process.demand import DOUBTFUL
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.process.surroundings import available_memory
 from tireroad.runs.scene.estimate import estimate
+from tireroad.runs.scene.physics import compounds
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.search import journal
@@ -60,7 +61,8 @@ def planned(ladders: Ladders, trial: Trial, processes: int) -> Settings | None:
     if trial.found is None:
         return _after_failure(ladders, trial, processes)
     over, now = trial.found.over(scene.accuracy), trial.settings
-    rates = orders(now.order, trial.scheme, scene.contact.has_friction)
+    wall = len(compounds(scene.tire, scene.temperature))
+    rates = orders(now.order, trial.scheme, scene.contact.has_friction, wall)
     costs = _Costs(scene, trial)
     begun = now.rungs
     while worst(over)[0] > AIM:

@@ -28,7 +28,7 @@ from tireroad.contact.results.error_bars import (
     total,
 )
 from tireroad.contact.results.spectra import Limit, limits, lowest, pitch, wide_enough
-from tireroad.contact.rolling import bristles, rolling_steadily
+from tireroad.contact.rolling import bristles, rolling_steadily, usual_steps
 from tireroad.contact.setup import ContactSetup, on_shape
 from tireroad.contact.tread.between_nodes import (
     OuterRubber,
@@ -54,7 +54,7 @@ from tireroad.runs.files.store import put
 from tireroad.runs.process import console
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.results.datasets import ABSENT
-from tireroad.runs.scene.estimate import estimate
+from tireroad.runs.scene.estimate import AT_ONCE, estimate
 from tireroad.runs.scene.physics import compounds
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.stages.cavity import AirColumn
@@ -95,9 +95,8 @@ _PERIODS = 16, 32
 # Cost of five companion runs in time loops per repeated step, by the spacing of that of the points.
 _LOOPS = {2.0: 3.5, 0.5: 6.0}
 _COARSE = 0.14  # cost on elements of twice the size, as a share of the run's cost before the loop
-# Cost of a step per touching point, from `MOST` of them on: conjugate gradients (radial tire on
-# cobblestones, 1,840 points: 84 ms).
-_TOUCHING = 5e-5
+# s a step of a tire that begins to roll steadily and pair of loads, beside those of its points: 100 of 140 ms of noise.toml.
+_FLEXIBLE = 1.5e-8
 FEWER = 1 / np.sqrt(2)  # share of the highest mode up to which the companion keeps states
 # Loops of each cause, about: twice as many points take longer than all others.
 _LONGEST_FIRST = {"points": 8.0, "mesh": 2.0, "modes": 1.0, "step": 0.5}
@@ -194,6 +193,13 @@ class ReferenceRun:
         """Spacing of the points of their companion over the run's."""
         return ratio(self.equilibrated.patch, self.most)
 
+    @property
+    def begun(self) -> float:
+        """Steps until a companion on points half as far apart rolls steadily, about; 0 where none does."""
+        patch, speed = self.equilibrated.patch, self.setup.rolled.speed
+        rolls = self.steady and self.job.scene.contact.has_friction and speed > 0.0
+        return usual_steps(patch, 2 * self.step * speed, 2.0) if rolls else 0.0
+
     @cached_property
     def equilibrated(self) -> ContactSetup:
         """The setup with its patch in the static state."""
@@ -280,6 +286,10 @@ class ReferenceRun:
         """The same for fewer steps, whose vibrations are told from `since` s on and `up_to` Hz."""
         known = (name for name in ("equilibrated", "rolled") if name in self.__dict__)
         return self._keeping(*known, steps=steps, since=since, up_to=up_to)
+
+    def with_points(self, most: float) -> ReferenceRun:
+        """The same with so many touching points of a companion at `most`."""
+        return self._keeping("equilibrated", most=most)
 
     def of(self, job: Job) -> ReferenceRun:
         """The same with another job; `base` stays that of the run."""
@@ -457,20 +467,23 @@ class Budget:
         loop = self.loop * self.steps
         return min(SHARE * (self.before + loop), LOOPS * loop)
 
-    def most_touching(self, least: int) -> float:
-        """Touching points that the companion of the points may have, repeating `least` steps.
+    def most_touching(self, least: int, begun: float, loads: int) -> float:
+        """Touching points that the companion of the points may have, repeating `least` steps of which one takes two.
 
-        As many as take half the budget of all companions, with twice the time step.
+        As many as take half the budget of all companions, the `begun` steps until it rolls steadily under so many `loads` included.
         """
-        return max(MOST, self._whole / (_TOUCHING * least))
+        left = self._whole / 2 - begun * _FLEXIBLE * loads**2
+        return max(MOST, left / (AT_ONCE * (least / 2 + begun)))
 
     def window(self, least: int, most: int, reference: ReferenceRun) -> int:
         """Last step of companion runs: `least`, more up to `most` as far as the budget goes; even."""
-        spacing = reference.points_ratio
+        spacing, left = reference.points_ratio, self._whole - _COARSE * self.before
         each = _LOOPS[spacing] * self.loop
         if spacing < 1 and (finer := finer_touching(reference.equilibrated.patch)) > MOST:
-            each += _TOUCHING * finer / 2
-        count = round((self._whole - _COARSE * self.before) / each)
+            each += AT_ONCE * finer / 2
+            loads = reference.response.residual.shape[1]
+            left -= reference.begun * (AT_ONCE * finer + _FLEXIBLE * loads**2)
+        count = round(left / each)
         count = int(np.clip(count, min(least, self.steps), min(most, self.steps)))
         return count - count % 2
 
@@ -709,7 +722,8 @@ def _share(cause: str, reference: ReferenceRun) -> float:
     size = {"step": 2.0, "points": points, "mesh": 2.0}[cause]
     job = reference.job
     rubbing = job.scene.contact.has_friction
-    order = orders(job.tire.section.order, reference.scheme, rubbing)[cause]
+    section = job.tire.section
+    order = orders(section.order, reference.scheme, rubbing, len(section.section.regions))[cause]
     return (random_share if cause == "points" else share)(size, order)
 
 
@@ -849,7 +863,10 @@ class AccuracyStage(Computed[Accuracy]):
         up_to = min(limit, self.job.scene.accuracy.up_to)
         least, most = (start + count for count in records(history.step, up_to))
         budget = Budget.of(self.job.scene, len(history.time))
-        reference = self._given(budget.steps, budget.most_touching(least))
+        reference = self._given(budget.steps)
+        loads = reference.response.residual.shape[1]
+        most_touching = budget.most_touching(least, reference.begun, loads)
+        reference = reference.with_points(most_touching)
         steps = budget.window(least, most, reference)
         if steps - start < 2:
             return None
@@ -918,7 +935,7 @@ class AccuracyStage(Computed[Accuracy]):
             centre=np.zeros(0), window=0.0, up_to=0.0, mean={}, by_cause={}, absent=absent
         )
 
-    def _given(self, steps: int, most: float) -> ReferenceRun:
+    def _given(self, steps: int) -> ReferenceRun:
         return ReferenceRun(
             job=self.job,
             static=self.static,
@@ -928,7 +945,6 @@ class AccuracyStage(Computed[Accuracy]):
             step=self.contact.product.step,
             steps=steps,
             scheme=recursive(self.contact.product.scheme),
-            most=most,
             large=self.nonlinear is not None,
             attached=self.greens.product.attached,
             steady=self.contact.product.steady,

@@ -12,7 +12,7 @@ import numpy as np
 from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
-from tireroad.contact.choices import MOST_TOUCHING, USABLE
+from tireroad.contact.choices import MOST_ALTERNATING, USABLE
 from tireroad.contact.free_wheel import FreeWheel, with_spin
 from tireroad.contact.loop import ContactProblem, DrivenTire, Loop
 from tireroad.contact.model import solver_name
@@ -512,7 +512,7 @@ class ContactStage(Stage[ContactHistory]):
 
             parts.append(
                 f"friction to {change:g} of the largest force in at most {TURNS} iterations, together with gaps to "
-                f"{GAP_TOLERANCE:g} where more than {MOST_TOUCHING} points of a grid touch at rest"
+                f"{GAP_TOLERANCE:g} where more than {MOST_ALTERNATING} points of a fine grid touch at rest"
             )
         return "; ".join([*parts, f"scheme {scene.time.scheme}"])
 

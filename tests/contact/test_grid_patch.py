@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tireroad.contact import model
+from tireroad.contact import choices
 from tireroad.contact.grid_patch import (
     equilibrate,
     halved,
@@ -177,9 +177,16 @@ def test_a_grid_needs_a_tread_and_a_sane_pitch(tread) -> None:
 
 
 def test_solver_by_the_number_of_touching_points(tread, monkeypatch) -> None:
-    cases = (0.004, 1000, ActiveSet), (0.002, 1000, UsualSet), (0.002, 50, ProjectedCG)
-    for pitch, most, solver in cases:
-        monkeypatch.setattr(model, "MOST_TOUCHING", most)
-        _, _, patch = patches(tread, 3e-3, pitch)
-        flexibility = 1e-5 * np.eye(len(patch.index))
-        assert isinstance(step_solver(ContactTable(), patch, flexibility), solver)
+    for friction, limit in (0.0, "MOST_TOUCHING"), (1.0, "MOST_ALTERNATING"):
+        for pitch, most, solver in (
+            (0.004, 1000, ActiveSet),
+            (0.002, 1000, UsualSet),
+            (0.002, 50, ProjectedCG),
+        ):
+            _, _, patch = patches(tread, 3e-3, pitch)
+            flexibility = 1e-5 * np.eye(len(patch.index))
+            with monkeypatch.context() as here:
+                here.setattr(choices, limit, most)
+                here.setattr(choices, "MOST_A_NODE", 1000)
+                found = step_solver(ContactTable(friction=friction), patch, flexibility)
+            assert isinstance(found, solver)
