@@ -178,6 +178,24 @@ def test_the_box_grows_where_points_beyond_it_touch(tight) -> None:
     assert np.abs(found[1] - found[0]).max() < 1e-6 * found[0].max()
 
 
+def test_what_newton_steps_do_not_find_is_found_by_turns(monkeypatch) -> None:
+    """Normal forces under the horizontal ones and these under the former, until both are in balance: the same solution."""
+    settle, found = grid_newton._Step.settle, []
+
+    def never_both(step, normal: bool = True, plane: bool = True) -> bool:
+        return settle(step, normal, plane) and not (normal and plane)
+
+    for by_turns in (False, True):
+        problem = problem_of(1e-9, 1e-9)
+        rolled(problem, 0, 4)
+        with monkeypatch.context() as here:
+            if by_turns:
+                here.setattr(grid_newton._Step, "settle", never_both)
+            found.append(rolled(problem, 4, 5)[0])
+        assert problem.lagging == 0
+    assert np.abs(found[1] - found[0]).max() < 2e-4 * found[0].max()  # gaps to 1e-5 of the largest
+
+
 def test_a_step_without_a_solution_of_both_is_split(monkeypatch) -> None:
     """Normal forces then are in balance with the horizontal ones of the step before, and these with the normal ones."""
     problem = problem_of()
@@ -189,6 +207,7 @@ def test_a_step_without_a_solution_of_both_is_split(monkeypatch) -> None:
         return settle(step, normal, plane) and not (normal and plane)
 
     monkeypatch.setattr(grid_newton._Step, "settle", never_both)
+    monkeypatch.setattr(grid_newton._Step, "alternate", lambda step: False)
     force, *t = rolled(problem, 4, 5)[0]
     assert asked == [(True, True), (True, False), (False, True)]
     assert problem.lagging == 1
