@@ -32,6 +32,7 @@ _LEAST = 0.1  # J^(1/2): the size of a motion of hundredths of a joule
 _SMALLEST, _NONE, _BLOCK, _MANY, _TANGENTS = 0.25, 1e-9, 512, 400, 6
 _CELLS = 128
 _SMALL = 1 / 20
+FAR = 0.2  # of a state, lacking midway between two places that are trained, from which on places beside it are, too
 _SAME = 1e-3  # of a force: that of a half-turned motion and the half-turned force
 
 
@@ -161,16 +162,15 @@ class Trainer:
     def follow(self, ways: Array, under: Callable[[float], Ground]) -> None:
         """Learn from a road that passes, where it is `under` the tire after the `ways` (n,) m.
 
-        Greedily: each fourth way, then those half between, then the others beside a way that lacked more than twice the
-        share that vectors may lack.
+        Greedily: each fourth way, then those half between, then the others beside one of these that lacked `FAR`: the first ones
+        lack much whatever lies beside them.
         """
         lacked: dict[int, float] = {}
         for stride in (4, 2, 1):
-            last = dict(lacked)
-            for number in range(0, len(ways), stride):
+            last, lacked = lacked, {}
+            for number in range(stride % 4, len(ways), 2 * stride if stride < 4 else stride):
                 beside = [last.get(number + side, 0.0) for side in (-stride, stride)]
-                needed = stride > 1 or max(beside) > 2 * self.settings.share
-                if number not in lacked and needed:
+                if stride > 1 or max(beside) > FAR:
                     lacked[number] = self.visit(under(float(ways[number]))).lacked
 
     @property

@@ -18,7 +18,7 @@ from threadpoolctl import threadpool_limits
 
 from tireroad.contact.loop import Drive
 from tireroad.contact.results.chatter import LARGE
-from tireroad.contact.rolling import make_loop, rolling_steadily
+from tireroad.contact.rolling import make_loop
 from tireroad.contact.setup import ContactSetup
 from tireroad.contact.training_roads import ERROR_PER_METRE, TrainingRoads, expected
 from tireroad.fem.errors import ConvergenceError
@@ -34,6 +34,7 @@ from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files import store
 from tireroad.runs.process import console
+from tireroad.runs.scene.tables.contact import ContactTable
 from tireroad.runs.stages import setup as stages_setup
 from tireroad.runs.stages.greens import Responses, fill_response, read_response
 from tireroad.runs.stages.large import Factors, Instants, LargeMotion
@@ -168,7 +169,7 @@ class NonlinearStage(Computed[TrainedMotion]):
             shortest = COARSER * shortest_excitation(self.job.scene, self.setup.product)
             plan = planned(self.job, Record(), linear.response, shortest)
         setup, seen, runs = (
-            self._settled(linear.response, plan.step),
+            self._settled(linear.response),
             [trainer.states],
             trainer.record,
         )
@@ -216,14 +217,18 @@ class NonlinearStage(Computed[TrainedMotion]):
         _describe(record, training, left_out)
         return TrainedMotion(stored(training, motion.restoring), motion.response)
 
-    def _settled(self, response: Response, step: float) -> ContactSetup:
-        """The setup in which each run begins: settled on the tread, and rolling steadily where it does."""
-        contact, force = self.job.scene.contact, self.static.product.normal_force
-        setup = self.setup.product.equilibrated(response, force, contact)[0]
-        try:
-            return rolling_steadily(contact, setup, response, step)
-        except ConvergenceError:  # the loop itself says so
-            return replace(setup, free=False)
+    def _settled(self, response: Response) -> ContactSetup:
+        """The setup in which each run begins: settled on the tread."""
+        force = self.static.product.normal_force
+        setup = self.setup.product.equilibrated(response, force, self._contact)[0]
+        return replace(setup, free=False)
+
+    @property
+    def _contact(self) -> ContactTable:
+        """The contact of the runs: without friction, as that of the standing tire, so that nothing has to roll steadily first."""
+        contact = self.job.scene.contact
+        assert contact is not None, "a scene with contact"
+        return replace(contact, friction=0.0)
 
     def _rolled(
         self, motion: LargeMotion, setup: ContactSetup, plan: Planned
@@ -234,7 +239,7 @@ class NonlinearStage(Computed[TrainedMotion]):
         assert isinstance(chosen.tire, Recursion), "damped forces are integrated by a recursion"
         tire = motion.tire(chosen.tire, chosen.scheme)
         driven = driven_tire(self.job, chosen, setup.patch, tire)
-        loop = make_loop(self.job.scene.contact, setup, driven or tire or chosen.tire, plan.step)
+        loop = make_loop(self._contact, setup, driven or tire or chosen.tire, plan.step)
         drive, steps = self._stretch(setup, plan)
         instants = Instants(chosen.tire, loop.contact)
         try:
@@ -285,17 +290,17 @@ def linear_motion(stage: Any) -> LargeMotion:
         rolling = replace(rolling, basis=fields)
     response = stage.greens.product.contact
     points = stages_setup.probes(stage.job, stage.static.product, stage.setup.product).outputs
-    restoring = stage.restoring.product
+    restoring, loaded = stage.restoring.product, response.residual.shape[1]
     return LargeMotion(
         restoring=restoring,
         force=None,
         vectors=np.zeros((len(restoring.at_rest), 0)),
         response=response,
         points=points,
-        loaded=response.residual.shape[1],
+        loaded=loaded,
         wheel=stage.wheel.product,
         rolling=rolling,
-        factors=Factors(stage.wheel.product, restoring),
+        factors=Factors(stage.wheel.product, restoring, points[:loaded]),
     )
 
 
