@@ -322,6 +322,15 @@ class Drive:
     slope: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None
     relief: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None
 
+    def after(self, way: float) -> Drive:
+        """The same road, begun with when a `way` (m) of it has passed; its own motion and the relief begin anew."""
+        height, slope = self.height, self.slope
+        return replace(
+            self,
+            height=lambda x, y: height(x + way, y),
+            slope=None if slope is None else lambda x, y: slope(x + way, y),
+        )
+
     def roads(
         self, patch: Patch, step: float, steps: int, done: int, moving: bool
     ) -> Iterator[tuple[Array, list[RoadMet]]]:

@@ -89,6 +89,18 @@ class TrainingRoads:
         stride = max(round(APART / PITCH[0]), -(-len(places) // MOST))
         return PITCH[0] * places[::stride]
 
+    def passage(self) -> tuple[float, float]:
+        """Ways (m) between which the bumps up to the greatest one, its mean over 20 mm, pass under the footprint, from a level road on;
+        (0, 0) where there are none."""
+        bumpy = np.flatnonzero(np.abs(self.z).max(axis=1) > LEAST)
+        if not len(bumpy):
+            return 0.0, 0.0
+        size = [max(round(SHORT / pitch), 1) for pitch in PITCH]
+        mean = np.abs(ndimage.uniform_filter(self.z, size, mode="nearest")).max(axis=1)
+        first, greatest = self.x[bumpy[0]] - self.x[self._long - 1], self.x[mean.argmax()]
+        low, _ = self.footprint
+        return max(float(first), 0.0), float(greatest) - low + BESIDE[0]
+
     @property
     def _long(self) -> int:
         """Samples along that are under the tire at once."""

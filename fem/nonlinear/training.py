@@ -32,6 +32,7 @@ _LEAST = 0.1  # J^(1/2): the size of a motion of hundredths of a joule
 _SMALLEST, _NONE, _BLOCK, _MANY, _TANGENTS = 0.25, 1e-9, 512, 400, 6
 _CELLS = 128
 _SMALL = 1 / 20
+FAR = 0.2  # of a state, lacking midway between two places that are trained, from which on places beside it are, too
 _SAME = 1e-3  # of a force: that of a half-turned motion and the half-turned force
 
 
@@ -92,15 +93,17 @@ class Trainer:
     ) -> None:
         self.force, self.settings, self._report = force, settings, report
         self._comm, self._stiffness = force.body.comm, force.operators.stiffness
-        self._factor, self._ends = factorise(self._stiffness), self._stiffness.createVecs()
+        self._factor = factorise(self._stiffness)
         self.elements = Elements(force, points)
         self._columns = self.elements.columns
         count = points.weights.shape[0]
-        compliance = np.empty((count, count))
-        for first in range(0, count, _BLOCK):  # in blocks: the shapes are not kept
-            part = slice(first, min(first + _BLOCK, count))
-            compliance[:, part] = self.elements.seen(self.answer(self._columns[:, part].toarray()))
         n = len(force.at_rest)
+        # Motions under unit forces of the points: products with them take a third of a solution's time.
+        self._shapes = np.empty((count, n))
+        for first in range(0, count, _BLOCK):
+            part = slice(first, min(first + _BLOCK, count))
+            self._shapes[part] = self.answer(self._columns[:, part].toarray()).T
+        compliance = self.elements.seen(self._shapes.T)
         self.vectors = np.zeros((n, 0))
         nothing = np.zeros((count, 0))
         given = points, compliance, nothing, self._evaluate, self._jacobian
@@ -117,10 +120,8 @@ class Trainer:
 
     def motion(self, load: Array, s: Array) -> Array:
         """q (n,) under loads (3 p,) N of the points and the reduced force."""
-        right, out = self._ends
-        right.array[:] = self._columns @ load
-        self._factor.apply(right, out)  # unchecked: twice as fast, and what follows is iterated
-        return out.array_r - self.vectors @ s
+        pushed = np.flatnonzero(load)
+        return load[pushed] @ self._shapes[pushed] - self.vectors @ s
 
     def _evaluate(self, load: Array, s: Array) -> Array:
         """V^T r, K q being known: V^T K q = (W V)^T h - s."""
@@ -161,16 +162,15 @@ class Trainer:
     def follow(self, ways: Array, under: Callable[[float], Ground]) -> None:
         """Learn from a road that passes, where it is `under` the tire after the `ways` (n,) m.
 
-        Greedily: each fourth way, then those half between, then the others beside a way that lacked more than twice the
-        share that vectors may lack.
+        Greedily: each fourth way, then those half between, then the others beside one of these that lacked `FAR`: the first ones
+        lack much whatever lies beside them.
         """
         lacked: dict[int, float] = {}
         for stride in (4, 2, 1):
-            last = dict(lacked)
-            for number in range(0, len(ways), stride):
+            last, lacked = lacked, {}
+            for number in range(stride % 4, len(ways), 2 * stride if stride < 4 else stride):
                 beside = [last.get(number + side, 0.0) for side in (-stride, stride)]
-                needed = stride > 1 or max(beside) > 2 * self.settings.share
-                if number not in lacked and needed:
+                if stride > 1 or max(beside) > FAR:
                     lacked[number] = self.visit(under(float(ways[number]))).lacked
 
     @property

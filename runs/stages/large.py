@@ -183,13 +183,17 @@ class Factors:
     """Factors of the stiffness of the tire, standing and as it rolls: made on first use and kept, since a training takes them
     after each of its runs. Collective."""
 
-    def __init__(self, wheel: Wheel, restoring: RestoringForce) -> None:
+    def __init__(self, wheel: Wheel, restoring: RestoringForce, points: Probes) -> None:
+        """`points` (p, 3 s or wider): probes whose loads are those of every run."""
         self._wheel, self._stiffness = wheel, restoring.operators.stiffness
+        self._loads = on_own_rows(restoring.operators, points)
 
     @cached_property
     def rolling(self) -> LoadedShapes:
-        """Shapes of the wheel's full matrices under constant loads."""
-        return self._wheel.loaded_shapes()
+        """Shapes of the wheel's full matrices under constant loads, those of the points kept."""
+        shapes = self._wheel.loaded_shapes()
+        shapes.remember(self._loads)
+        return shapes
 
     @cached_property
     def _standing(self) -> Any:

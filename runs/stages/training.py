@@ -1,7 +1,7 @@
 """Stage nonlinear: the reduced nonlinear force of the tire, trained on the road of the run and judged by the run itself.
 
 First the standing tire climbs rises, and the road as it lies under the footprint at places along the run. Then the time
-loop runs with the first few vectors of these states, and it is found what the road feels of what they leave out: more of them
+loop runs, over the bumps up to the greatest one, with the first few vectors of these states, and it is found what the road feels of what they leave out: more of them
 follow where it is much. States of a run join only where none goes through: a belted tire does not move where its
 reduced force lets it, and its vectors then answer to what no tire does, which the road's force does not tell: on a bar of 15 mm it
 told that 7.6 % was left out with them, and the axle's force was 15 % off in place of 5.5. Vectors of a linear tire's motion alone did not let the loop settle.
@@ -16,8 +16,9 @@ from typing import Any, ClassVar
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from tireroad.contact.loop import Drive
 from tireroad.contact.results.chatter import LARGE
-from tireroad.contact.rolling import make_loop, rolling_steadily
+from tireroad.contact.rolling import make_loop
 from tireroad.contact.setup import ContactSetup
 from tireroad.contact.training_roads import ERROR_PER_METRE, TrainingRoads, expected
 from tireroad.fem.errors import ConvergenceError
@@ -33,6 +34,7 @@ from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files import store
 from tireroad.runs.process import console
+from tireroad.runs.scene.tables.contact import ContactTable
 from tireroad.runs.stages import setup as stages_setup
 from tireroad.runs.stages.greens import Responses, fill_response, read_response
 from tireroad.runs.stages.large import Factors, Instants, LargeMotion
@@ -53,6 +55,7 @@ LIMIT = 0.03  # of forces: error of the linear tire from which on "auto" takes l
 BED = 1e9  # N/m3: springs of the tread under the standing tire, 10 MPa over 10 mm
 RUNS, INSTANTS, STEPS = 8, 60, 4000  # at most: runs, instants of each, steps of each
 FEW = 8  # vectors of the first run; twice as many where they leave out too much
+COARSER = 2.0  # shortest periods, by which a step that is left open is longer in these runs
 ENOUGH = 0.05  # of the change of the road's force: what the training may leave out of a run
 SETTINGS = Settings(most=160, turns=6, precision=5e-3)
 DONE, MORE, STATES, ALL = "little is left out", "more vectors", "its states", "all vectors"
@@ -123,7 +126,7 @@ class NonlinearStage(Computed[TrainedMotion]):
         return {
             "greens": self.greens.key,
             **stages_setup.loop_inputs(self.job, self.setup.product),
-            "training": [RUNS, INSTANTS, STEPS, ENOUGH, BED, repr(SETTINGS)],
+            "training": [RUNS, INSTANTS, STEPS, COARSER, ENOUGH, BED, repr(SETTINGS)],
         }
 
     def compute(self, record: Record) -> TrainedMotion:
@@ -163,10 +166,10 @@ class NonlinearStage(Computed[TrainedMotion]):
     ) -> TrainedMotion:
         """The training by runs of the loop, begun with the states of the standing tire. Collective."""
         with console.quiet():
-            shortest = shortest_excitation(self.job.scene, self.setup.product)
+            shortest = COARSER * shortest_excitation(self.job.scene, self.setup.product)
             plan = planned(self.job, Record(), linear.response, shortest)
         setup, seen, runs = (
-            self._settled(linear.response, plan.step),
+            self._settled(linear.response),
             [trainer.states],
             trainer.record,
         )
@@ -214,14 +217,18 @@ class NonlinearStage(Computed[TrainedMotion]):
         _describe(record, training, left_out)
         return TrainedMotion(stored(training, motion.restoring), motion.response)
 
-    def _settled(self, response: Response, step: float) -> ContactSetup:
-        """The setup in which each run begins: settled on the tread, and rolling steadily where it does."""
-        contact, force = self.job.scene.contact, self.static.product.normal_force
-        setup = self.setup.product.equilibrated(response, force, contact)[0]
-        try:
-            return rolling_steadily(contact, setup, response, step)
-        except ConvergenceError:  # the loop itself says so
-            return replace(setup, free=False)
+    def _settled(self, response: Response) -> ContactSetup:
+        """The setup in which each run begins: settled on the tread."""
+        force = self.static.product.normal_force
+        setup = self.setup.product.equilibrated(response, force, self._contact)[0]
+        return replace(setup, free=False)
+
+    @property
+    def _contact(self) -> ContactTable:
+        """The contact of the runs: without friction, as that of the standing tire, so that nothing has to roll steadily first."""
+        contact = self.job.scene.contact
+        assert contact is not None, "a scene with contact"
+        return replace(contact, friction=0.0)
 
     def _rolled(
         self, motion: LargeMotion, setup: ContactSetup, plan: Planned
@@ -232,18 +239,28 @@ class NonlinearStage(Computed[TrainedMotion]):
         assert isinstance(chosen.tire, Recursion), "damped forces are integrated by a recursion"
         tire = motion.tire(chosen.tire, chosen.scheme)
         driven = driven_tire(self.job, chosen, setup.patch, tire)
-        loop = make_loop(self.job.scene.contact, setup, driven or tire or chosen.tire, plan.step)
-        steps, instants = min(plan.steps, STEPS), Instants(chosen.tire, loop.contact)
+        loop = make_loop(self._contact, setup, driven or tire or chosen.tire, plan.step)
+        drive, steps = self._stretch(setup, plan)
+        instants = Instants(chosen.tire, loop.contact)
         try:
-            for block in loop.roll(
-                setup.drive, plan.step, steps, at_once=max(steps // INSTANTS, 1)
-            ):
+            for block in loop.roll(drive, plan.step, steps, at_once=max(steps // INSTANTS, 1)):
                 instants.add(float(block.time[-1]))
         except ConvergenceError as error:
             if not len(instants):
                 raise
             return instants, f"to t = {instants.kept[-1][0]:.4g} s: {error}"
         return instants, ""
+
+    def _stretch(self, setup: ContactSetup, plan: Planned) -> tuple[Drive, int]:
+        """The road that a run of the training rolls over, until its greatest bump has passed, and the number of steps: from where
+        it is no longer level if nothing but the road moves the tire."""
+        first, last = TrainingRoads.of(setup).passage()
+        drive, rolled, steps = setup.drive, setup.rolled, plan.steps
+        if rolled.lift or self.job.scene.force or not rolled.speed:
+            return drive, min(steps, STEPS)
+        way = rolled.speed * plan.step
+        steps = min(steps - int(first / way), int(np.ceil((last - first) / way)), STEPS)
+        return drive.after(first), max(steps, 1)
 
     def write(self, file: Any, product: TrainedMotion) -> None:
         """The stored force, and the response as a group."""
@@ -273,17 +290,17 @@ def linear_motion(stage: Any) -> LargeMotion:
         rolling = replace(rolling, basis=fields)
     response = stage.greens.product.contact
     points = stages_setup.probes(stage.job, stage.static.product, stage.setup.product).outputs
-    restoring = stage.restoring.product
+    restoring, loaded = stage.restoring.product, response.residual.shape[1]
     return LargeMotion(
         restoring=restoring,
         force=None,
         vectors=np.zeros((len(restoring.at_rest), 0)),
         response=response,
         points=points,
-        loaded=response.residual.shape[1],
+        loaded=loaded,
         wheel=stage.wheel.product,
         rolling=rolling,
-        factors=Factors(stage.wheel.product, restoring),
+        factors=Factors(stage.wheel.product, restoring, points[:loaded]),
     )
 
 

@@ -94,6 +94,9 @@ def test_bars_and_holes_are_chosen_by_words_and_lie_before_the_points(tmp_path) 
         path = tmp_path / "scene.toml"
         path.write_text(case.scene())
         scene = load(path)
-        foremost = math.sqrt(2 * large_rolling.RADIUS * (0.02 + 1.5 * abs(case.height) + 5e-3))
+        if isinstance(case, large_rolling.Cobblestones):
+            continue
+        reach = case.reach or 1.5 * abs(case.height) + 5e-3
+        foremost = math.sqrt(2 * large_rolling.RADIUS * (0.02 + reach))
         assert scene.road.surface.position > foremost
         assert scene.road.surface.position - large_rolling.SPEED * scene.time.duration < foremost
