@@ -81,7 +81,9 @@ length = {length}
 ramp = {ramp}
 position = {position}"""
 BAND = 400.0  # Hz
-MODES = 2 * BAND  # Hz: points meet the edges of a bar at 1 kHz, and modes to the band's end leave most of what is off
+MODES = (
+    2 * BAND
+)  # Hz: points meet the edges of a bar at 1 kHz, and modes to the band's end leave most of what is off
 RADIUS, SPEED = 0.313, 8.33  # m, m/s: of the tire, along the road
 BEFORE, ON = 0.005, 0.09  # m from the foremost point to the obstacle, and rolled on it
 STEP = 2e-4  # s
@@ -117,8 +119,7 @@ class Case:
         # 5 mm and 1.5 heights above it, at most a tenth more.
         reach = self.reach or 0.005 + 1.5 * abs(self.height)
         met, first = (
-            np.sqrt(2 * RADIUS * (0.02 + gap))
-            for gap in (max(self.height, 0.0), 1.1 * reach)
+            np.sqrt(2 * RADIUS * (0.02 + gap)) for gap in (max(self.height, 0.0), 1.1 * reach)
         )
         position = first + BEFORE
         duration = (position + 0.5 * self.ramp - met + self.on) / SPEED
@@ -147,7 +148,13 @@ Road = Case | Cobblestones
 
 
 def _scene(case: Road, road: str, duration: float, reach: str = "") -> str:
-    given = {"reach": reach, "load": case.load, "friction": case.friction, "up_to": MODES, "step": STEP}
+    given = {
+        "reach": reach,
+        "load": case.load,
+        "friction": case.friction,
+        "up_to": MODES,
+        "step": STEP,
+    }
     return SCENE.format(**given, road=road, duration=round(duration, 4))
 
 
@@ -188,7 +195,11 @@ def run(only: Sequence[str] = ()) -> list[Table]:
         ("direction", ""),
         ("largest change", "N"),
     ]
-    columns += [(f"{name}{of}", "%") for name in (*NAMES, "elements, steps of 0.2 off 0.15 ms") for of in ("", ", worst")]
+    columns += [
+        (f"{name}{of}", "%")
+        for name in (*NAMES, "elements, steps of 0.2 off 0.15 ms")
+        for of in ("", ", worst")
+    ]
     notes = [
         f"205/60 R15, 12 x 6 elements, 2.2 bar, no air, 30 km/h, modes to {MODES:g} Hz, steps of 0.2 ms; the first {1e3 * ON:g} mm of way on "
         f"a bar, a hole's whole first edge. Below {BAND:g} Hz, off nonlinear elements of the same points, contact and steps: rms of the difference over the rms of the change, "
