@@ -27,8 +27,7 @@ ERROR_PER_METRE = 15.0
 def expected(setup: ContactSetup) -> float:
     """Height or depth (m) to which the road takes the tire in the run: the largest mean over 20 mm, and its motion."""
     road = TrainingRoads.of(setup)
-    size = [max(round(SHORT / pitch), 1) for pitch in PITCH]
-    return float(np.abs(ndimage.uniform_filter(road.z, size, mode="nearest")).max()) + road.lift
+    return float(road.bumps().max()) + road.lift
 
 
 @dataclass(frozen=True)
@@ -89,15 +88,19 @@ class TrainingRoads:
         stride = max(round(APART / PITCH[0]), -(-len(places) // MOST))
         return PITCH[0] * places[::stride]
 
+    def bumps(self) -> Array:
+        """Largest height or depth (n,) m across the road at each x, of means over 20 mm both ways."""
+        size = [max(round(SHORT / pitch), 1) for pitch in PITCH]
+        mean: Array = np.abs(ndimage.uniform_filter(self.z, size, mode="nearest")).max(axis=1)
+        return mean
+
     def passage(self) -> tuple[float, float]:
         """Ways (m) between which the bumps up to the greatest one, its mean over 20 mm, pass under the footprint, from a level road on;
         (0, 0) where there are none."""
         bumpy = np.flatnonzero(np.abs(self.z).max(axis=1) > LEAST)
         if not len(bumpy):
             return 0.0, 0.0
-        size = [max(round(SHORT / pitch), 1) for pitch in PITCH]
-        mean = np.abs(ndimage.uniform_filter(self.z, size, mode="nearest")).max(axis=1)
-        first, greatest = self.x[bumpy[0]] - self.x[self._long - 1], self.x[mean.argmax()]
+        first, greatest = self.x[bumpy[0]] - self.x[self._long - 1], self.x[self.bumps().argmax()]
         low, _ = self.footprint
         return max(float(first), 0.0), float(greatest) - low + BESIDE[0]
 

@@ -265,8 +265,7 @@ class _Step:
         both are in balance."""
         self.force[1:] = self._brush.horizontal.T
         for _ in range(TURNS):
-            self._compiled.caution = 1.0
-            if not (self.settle(plane=False) and self.settle(normal=False)):
+            if not self._turn():
                 return False
             self._evaluate()
             if self._balanced(normal=True, plane=True) and not self._beyond():
@@ -276,6 +275,10 @@ class _Step:
     def split(self) -> bool:
         """Normal forces under the horizontal ones of the step before, then stick and slip under these; whether both were found."""
         self.force[1:] = self._brush.horizontal.T
+        return self._turn()
+
+    def _turn(self) -> bool:
+        """Normal forces under the horizontal ones, then stick and slip under these; whether both were found."""
         self._compiled.caution = 1.0
         return self.settle(plane=False) and self.settle(normal=False)
 

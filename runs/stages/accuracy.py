@@ -206,6 +206,11 @@ class ReferenceRun:
         rolls = self.steady and self.job.scene.contact.has_friction and speed > 0.0
         return usual_steps(patch, 2 * self.step * speed, 2.0) if rolls else 0.0
 
+    @property
+    def flexible(self) -> float:
+        """Cost (s) of the tire in one of these steps, beside that of its points."""
+        return float(_FLEXIBLE * self.response.residual.shape[1] ** 2)
+
     @cached_property
     def equilibrated(self) -> ContactSetup:
         """The setup with its patch in the static state."""
@@ -473,15 +478,16 @@ class Budget:
         loop = self.loop * self.steps
         return min(SHARE * (self.before + loop), LOOPS * loop)
 
-    def most_touching(self, least: int, begun: float, loads: int, strides: bool) -> float:
+    def most_touching(self, least: int, reference: ReferenceRun) -> float:
         """Touching points that the companion of the points may have, repeating `least` steps of which one takes two.
 
-        As many as take half the budget of all companions, the `begun` steps until it rolls steadily under so many `loads` included. None
-        more than a factor solves where a step passes more than a point: noise.toml then took 3.1 s for each, in place of 0.4.
+        As many as take half the budget of all companions, the steps until it rolls steadily included. None more than a factor
+        solves where a step passes more than a point: noise.toml then took 3.1 s for each, in place of 0.4.
         """
-        if strides:
+        if reference.strides:
             return MOST
-        left = self._whole / 2 - begun * _FLEXIBLE * loads**2
+        begun = reference.begun
+        left = self._whole / 2 - begun * reference.flexible
         return max(MOST, left / (AT_ONCE * (least / 2 + begun)))
 
     def window(self, least: int, most: int, reference: ReferenceRun) -> int:
@@ -490,8 +496,7 @@ class Budget:
         each = _LOOPS[spacing] * self.loop
         if spacing < 1 and (finer := finer_touching(reference.equilibrated.patch)) > MOST:
             each += AT_ONCE * finer / 2
-            loads = reference.response.residual.shape[1]
-            left -= reference.begun * (AT_ONCE * finer + _FLEXIBLE * loads**2)
+            left -= reference.begun * (AT_ONCE * finer + reference.flexible)
         count = round(left / each)
         count = int(np.clip(count, min(least, self.steps), min(most, self.steps)))
         return count - count % 2
@@ -873,9 +878,7 @@ class AccuracyStage(Computed[Accuracy]):
         least, most = (start + count for count in records(history.step, up_to))
         budget = Budget.of(self.job.scene, len(history.time))
         reference = self._given(budget.steps)
-        loads = reference.response.residual.shape[1]
-        given = least, reference.begun, loads, reference.strides
-        reference = reference.with_points(budget.most_touching(*given))
+        reference = reference.with_points(budget.most_touching(least, reference))
         steps = budget.window(least, most, reference)
         if steps - start < 2:
             return None
