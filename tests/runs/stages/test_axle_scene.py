@@ -117,7 +117,9 @@ def test_corner_free_wheel_and_the_fixed_axle_as_its_limit(run):
     assert np.abs(car["hub_moment"] - fixed["hub_moment"]).max() > 0.01 * vary
 
     free, _, _ = run(SCENE + '[axle]\nkind = "free"\n', *short)
-    assert free["axle_force"][:, 2] == pytest.approx(500.0, rel=1e-12)
+    # As constant as rounding leaves it, at the load to which the state at rest was found.
+    assert free["axle_force"][:, 2] == pytest.approx(500.0, rel=1e-10)
+    assert np.ptp(free["axle_force"][:, 2]) < 1e-12 * 500.0
     assert np.ptp(free["total_force"][:, 2]) > 1.0
 
 
