@@ -26,7 +26,9 @@ MOST = 0.5  # unless what is left out is more than this share of it: then all of
 PATIENT = 12  # Newton steps, before fewer points are to be found slipping where the residual does not fall
 # Where these are not enough, or what is out of balance has grown by more than this factor since the first one, the near parts of the
 # compliance do not do: the whole of it is taken in this step and those that follow.
-GROWN, WHOLLY = 10.0, 30
+GROWN, WHOLLY = 10.0, 4
+ALONE = 200  # Newton steps of stick and slip under given normal forces, which have a solution
+STALLED = 4  # turns of normal and horizontal forces, in which what is out of balance is to halve
 READINGS = 12  # Newton steps in which the road is read, at most: on a steep flank a point may go to and fro
 SECANTS = 8  # of Newton steps that are kept
 _EDGE = 1  # rows and columns of points beyond those that touch, which the edge of a brush needs
@@ -236,12 +238,14 @@ class _Step:
         40 were enough."""
         solver, at = self._solver, self._compiled
         before, least, most, best = np.inf, np.inf, np.inf, self.force.copy()
-        for turn in range(TURNS):
+        half, since = np.inf, 0
+        for turn in range(TURNS if normal else ALONE):
             self.turns += 1
             self._evaluate()
             if self._balanced(normal, plane):
                 if not self._beyond():
                     return True
+                half, since = np.inf, turn
                 continue  # with the points of a larger box
             if not solver.wholly and (turn == PATIENT or self._rest > most):
                 solver.wholly, self.force[:] = WHOLLY, best
@@ -250,6 +254,10 @@ class _Step:
                 most = GROWN * self._rest
             if self._rest < least:
                 least, best[:] = self._rest, self.force
+            if self._rest < half:
+                half, since = 0.5 * self._rest, turn
+            elif normal and plane and solver.wholly and turn - since > PATIENT:
+                break  # neither fits the other: it goes to and fro
             if turn >= PATIENT and at.off > max(_RULES.falls * before, self._limit):
                 at.caution = max(_RULES.caution * at.caution, _RULES.least_caution)
             before = at.off
@@ -261,15 +269,17 @@ class _Step:
         return False
 
     def alternate(self) -> bool:
-        """Normal forces under the horizontal ones and these under the former, in turns, from those of the step before. Whether
-        both are in balance."""
+        """Normal forces under the horizontal ones and these under the former, in turns from those of the step before, while what
+        is out of balance falls. Whether both are in balance."""
         self.force[1:] = self._brush.horizontal.T
-        for _ in range(TURNS):
+        rests: list[float] = []
+        while len(rests) <= STALLED or rests[-1] < 0.5 * rests[-1 - STALLED]:
             if not self._turn():
                 return False
             self._evaluate()
             if self._balanced(normal=True, plane=True) and not self._beyond():
                 return True
+            rests.append(self._rest)
         return False
 
     def split(self) -> bool:

@@ -82,6 +82,7 @@ FEW = 2.2
 APART = 3.0
 _CREEPING = 0.02
 _ASTRAY = 1e-3  # of the steps
+_STEADY = 0.8  # friction of a whole footprint that slides steadily (docs/verification/stability.md)
 # Share of the static deflection: motion of the contact up to which a linear tire is trusted.
 LINEAR = 1 / 3
 
@@ -155,10 +156,15 @@ def rubbing(record: Record, friction: float, scene: Scene, lagging: int, steps: 
             "-",
         )
     if lagging > _ASTRAY * steps:
+        advice = (
+            f"A footprint that slides as a whole at a friction of {friction:g} vibrates by itself; contact.friction up to {_STEADY:g} slides "
+            "steadily on a passenger tire"
+            if friction > _STEADY
+            else "Take a smaller time.step"
+        )
         record.warnings.append(
             f"in {lagging} of {steps} steps no normal and horizontal forces were found that fit each other: there each took the other's of "
-            f"the step before. A footprint that slides as a whole at a friction of {friction:g} vibrates by itself; "
-            "contact.friction up to 0.8 slides steadily on a passenger tire"
+            f"the step before. {advice}"
         )
     if not friction and scene.horizontal_forces and scene.static.friction is None:
         record.warnings.append(

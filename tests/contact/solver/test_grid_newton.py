@@ -152,6 +152,7 @@ def test_parts_that_do_not_converge_give_way_to_the_whole(tight) -> None:
     assert solver is not None
     solver.compiled.near = 0
     tight.setattr(grid_newton, "GROWN", 1.2)
+    tight.setattr(grid_newton, "WHOLLY", 2 * STEPS)
     found = rolled(few, 0, STEPS)
     assert solver.wholly > 0
     assert few.lagging == 0
