@@ -50,16 +50,17 @@ class TrainingRoads:
         touching = points[gap < CLOSE]
         low, high = touching.min(axis=0) - BESIDE, touching.max(axis=0) + BESIDE
         x, y, z = _sampled(setup, low, high)
-        # A bump as high as the gap is met there: one of 25 mm 50 mm before those places.
-        along = points[gap < z.max(), 0]
-        reached = np.array([along.min(initial=low[0]), along.max(initial=high[0])])
-        if reached[0] < low[0] or reached[1] > high[0]:
-            low[0], high[0] = reached
+        # What rises by the gap touches there: a bar of 25 mm 50 mm before those places.
+        met = np.vstack([touching, points[gap < z.max() + setup.rolled.lift]])
+        ends = met.min(axis=0) - PITCH, met.max(axis=0) + PITCH
+        if (ends[0] < low).any() or (ends[1] > high).any():
+            low, high = np.minimum(low, ends[0]), np.maximum(high, ends[1])
             x, y, z = _sampled(setup, low, high)
-        ends = float(touching[:, 0].min()), float(touching[:, 0].max())
-        return TrainingRoads(
-            x, y, z, ends, (float(low[0]), float(high[0])), setup.rolled.lift
+        footprint, under = (
+            (float(one[0]), float(other[0]))
+            for one, other in ((touching.min(axis=0), touching.max(axis=0)), (low, high))
         )
+        return TrainingRoads(x, y, z, footprint, under, setup.rolled.lift)
 
     @property
     def reach(self) -> tuple[float, float]:
@@ -112,7 +113,7 @@ class TrainingRoads:
     @property
     def _long(self) -> int:
         """Samples along that are under the tire at once."""
-        return min(round((self.met[1] - self.met[0]) / PITCH[0]) + 1, len(self.x))
+        return min(int(np.ceil((self.met[1] - self.met[0]) / PITCH[0])) + 1, len(self.x))
 
     def under(self, way: float) -> Passage:
         """The road under the tire after a way, m."""
