@@ -54,7 +54,7 @@ Array = np.ndarray
 LIMIT = 0.03  # of forces: error of the linear tire from which on "auto" takes large motions
 BED = 1e9  # N/m3: springs of the tread under the standing tire, 10 MPa over 10 mm
 RUNS, INSTANTS, STEPS = 8, 60, 4000  # at most: runs, instants of each, steps of each
-FEW = 8  # vectors of the first run; twice as many where they leave out too much
+FEW = 4  # vectors of the first run; twice as many where they leave out too much
 COARSER = 2.0  # shortest periods, by which a step that is left open is longer in these runs
 ENOUGH = 0.05  # of the change of the road's force: what the training may leave out of a run
 SETTINGS = Settings(most=160, turns=6, precision=5e-3)
