@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import ndimage
@@ -14,7 +14,7 @@ Array = np.ndarray
 
 PITCH = 4e-3, 8e-3  # m along and across, of the sampled road
 CLOSE = 5e-4  # m: gap at rest of points that count as the footprint
-BESIDE = 0.03, 0.02  # m that is sampled before and beside the footprint
+BESIDE = 0.03, 0.02  # m that is sampled before and beside the footprint, at least
 # Without inertia and friction single points jump over flanks that are steeper.
 STEEPEST = 1.2
 SHORT = 0.02  # m: bumps that are shorter are taken by the tread and the bending of the belts
@@ -33,32 +33,39 @@ def expected(setup: ContactSetup) -> float:
 @dataclass(frozen=True)
 class TrainingRoads:
     """Heights `z` (n, m) m of the road that a run passes over, at x (n,) and y (m,) m, as its tire stands at t = 0; the
-    `footprint` reaches from and to x, m; `lift` m of the road's own motion."""
+    `footprint` reaches from and to x, m, the road `met` by a standing tire, too; `lift` m of the road's own motion."""
 
     x: Array
     y: Array
     z: Array
     footprint: tuple[float, float]
+    met: tuple[float, float]
     lift: float
 
     @staticmethod
     def of(setup: ContactSetup) -> TrainingRoads:
         """Training roads for the setup of a run, level where it has no relief."""
+        points, gap = setup.patch.points[:, :2], setup.patch.gap
         # Grids of points are not settled yet and have no forces.
-        touching = setup.patch.points[setup.patch.gap < CLOSE, :2]
+        touching = points[gap < CLOSE]
         low, high = touching.min(axis=0) - BESIDE, touching.max(axis=0) + BESIDE
-        last = high[0] + setup.rolled.travel
-        x, y = (
-            start + step * np.arange(max(np.ceil((end - start) / step), 3.0) + 1)
-            for start, end, step in zip(low, (last, high[1]), PITCH, strict=True)
+        x, y, z = _sampled(setup, low, high)
+        # What rises by the gap touches there: a bar of 25 mm 50 mm before those places.
+        met = np.vstack([touching, points[gap < z.max() + setup.rolled.lift]])
+        ends = met.min(axis=0) - PITCH, met.max(axis=0) + PITCH
+        if (ends[0] < low).any() or (ends[1] > high).any():
+            low, high = np.minimum(low, ends[0]), np.maximum(high, ends[1])
+            x, y, z = _sampled(setup, low, high)
+        footprint, under = (
+            (float(one[0]), float(other[0]))
+            for one, other in ((touching.min(axis=0), touching.max(axis=0)), (low, high))
         )
-        ends = float(touching[:, 0].min()), float(touching[:, 0].max())
-        return TrainingRoads(x, y, setup.heights(x, y), ends, setup.rolled.lift)
+        return TrainingRoads(x, y, z, footprint, under, setup.rolled.lift)
 
     @property
     def reach(self) -> tuple[float, float]:
-        """Half length and half width (m) about the lowest meridian that the sampled road has under the footprint."""
-        return max(-self.footprint[0], self.footprint[1]) + BESIDE[0], float(np.abs(self.y).max())
+        """Half length and half width (m) about the lowest meridian that the sampled road has under a standing tire."""
+        return max(-self.met[0], self.met[1]), float(np.abs(self.y).max())
 
     def smooth(self) -> TrainingRoads:
         """The same with flanks no steeper than 1.2."""
@@ -66,7 +73,7 @@ class TrainingRoads:
         while self._slope(z) > STEEPEST:
             z = ndimage.gaussian_filter(self.z, [width / pitch for pitch in PITCH], mode="nearest")
             width *= 1.25
-        return TrainingRoads(self.x, self.y, z, self.footprint, self.lift)
+        return replace(self, z=z)
 
     def _slope(self, z: Array) -> float:
         return float(np.hypot(*np.gradient(z, *PITCH)).max())
@@ -80,7 +87,7 @@ class TrainingRoads:
         return [Feature(rise=float(max(up, LEAST))), Feature(rise=-float(max(down, LEAST)))]
 
     def ways(self) -> Array:
-        """Ways (k,) m after which there are bumps under the footprint, 15 mm apart, or farther where they are many."""
+        """Ways (k,) m after which there are bumps under the tire, 15 mm apart, or farther where they are many."""
         count = len(self.x) - self._long + 1
         bumpy = np.abs(self.z).max(axis=1) > LEAST
         under = np.array([bumpy[first : first + self._long].any() for first in range(count)])
@@ -95,23 +102,31 @@ class TrainingRoads:
         return mean
 
     def passage(self) -> tuple[float, float]:
-        """Ways (m) between which the bumps up to the greatest one, its mean over 20 mm, pass under the footprint, from a level road on;
+        """Ways (m) between which the bumps up to the greatest one, its mean over 20 mm, pass under the tire, from a level road on;
         (0, 0) where there are none."""
         bumpy = np.flatnonzero(np.abs(self.z).max(axis=1) > LEAST)
         if not len(bumpy):
             return 0.0, 0.0
         first, greatest = self.x[bumpy[0]] - self.x[self._long - 1], self.x[self.bumps().argmax()]
-        low, _ = self.footprint
-        return max(float(first), 0.0), float(greatest) - low + BESIDE[0]
+        return max(float(first), 0.0), float(greatest) - self.met[0]
 
     @property
     def _long(self) -> int:
         """Samples along that are under the tire at once."""
-        length = self.footprint[1] - self.footprint[0] + 2 * BESIDE[0]
-        return min(round(length / PITCH[0]) + 1, len(self.x))
+        return min(int(np.ceil((self.met[1] - self.met[0]) / PITCH[0])) + 1, len(self.x))
 
     def under(self, way: float) -> Passage:
         """The road under the tire after a way, m."""
         first = min(round(way / PITCH[0]), len(self.x) - self._long)
         some = slice(first, first + self._long)
         return Passage(x=self.x[some] - way, y=self.y, z=self.z[some], way=way)
+
+
+def _sampled(setup: ContactSetup, low: Array, high: Array) -> tuple[Array, Array, Array]:
+    """x (n,), y (m,) and heights (n, m) of the road that passes between the corners (2,) m of what is under the tire."""
+    last = high[0] + setup.rolled.travel
+    x, y = (
+        start + step * np.arange(max(np.ceil((end - start) / step), 3.0) + 1)
+        for start, end, step in zip(low, (last, high[1]), PITCH, strict=True)
+    )
+    return x, y, setup.heights(x, y)

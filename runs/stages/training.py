@@ -54,11 +54,11 @@ Array = np.ndarray
 LIMIT = 0.03  # of forces: error of the linear tire from which on "auto" takes large motions
 BED = 1e9  # N/m3: springs of the tread under the standing tire, 10 MPa over 10 mm
 RUNS, INSTANTS, STEPS = 8, 60, 4000  # at most: runs, instants of each, steps of each
-FEW = 8  # vectors of the first run; twice as many where they leave out too much
+FEW = 4  # vectors of the first run; twice as many where they leave out too much
 COARSER = 2.0  # shortest periods, by which a step that is left open is longer in these runs
 ENOUGH = 0.05  # of the change of the road's force: what the training may leave out of a run
 SETTINGS = Settings(most=160, turns=6, precision=5e-3)
-DONE, MORE, STATES, ALL = "little is left out", "more vectors", "its states", "all vectors"
+DONE, MORE, STATES, ALL = "little is left out", "more vectors", "its states", "no more is gained"
 _RESPONSE = "response"
 
 
@@ -102,7 +102,7 @@ class NonlinearStage(Computed[TrainedMotion]):
     def solver(self) -> str:
         """The solvers' settings, for the log."""
         return (
-            f"at most {RUNS} runs of {STEPS} steps, {INSTANTS} instants of each, until {ENOUGH:g} of the road's force is left out or all vectors are taken; at most "
+            f"at most {RUNS} runs of {STEPS} steps, {INSTANTS} instants of each, until {ENOUGH:g} of the road's force is left out or more vectors gain nothing; at most "
             f"{SETTINGS.most} vectors; weights of cells off by at most {SETTINGS.tolerance:g}; {MUMPS}"
         )
 
@@ -275,12 +275,16 @@ class NonlinearStage(Computed[TrainedMotion]):
 
 def after_run(left_out: float, before: float, more: bool) -> str:
     """The step that follows a run whose training leaves out a share of the force, inf if it stopped, and the best run `before` another:
-    nothing if it is little; vectors of the states known if there are `more`; the run's own states if none went through."""
+    nothing if it is little, or no less than before; vectors of the states known if there are `more`; the run's own states if none went
+    through."""
     if left_out <= ENOUGH:
         return DONE
+    # On bars twice as many vectors left three to five times as much out where they left more, or grew.
+    if before < np.inf and left_out >= before:
+        return ALL
     if more:
         return MORE
-    return ALL if min(left_out, before) < np.inf else STATES
+    return STATES if left_out == np.inf else ALL
 
 
 def linear_motion(stage: Any) -> LargeMotion:

@@ -97,7 +97,7 @@ def test_a_cleat_trains_the_tire_and_changes_its_forces(cleat):
     assert value(stages, "nonlinear", "force of the run left out") < 5.0
     with h5py.File(large / "nonlinear.h5") as file:
         assert 3 < file["shape"].shape[2] <= 160
-        assert file.attrs["outside"] < 0.04
+        assert file.attrs["outside"] < 0.2  # of a state, four vectors
         for name, held in file.items():
             if isinstance(held, h5py.Group):
                 assert all(declared("nonlinear.h5", f"{name}/{one}") for one in held)

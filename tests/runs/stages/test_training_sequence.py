@@ -13,8 +13,14 @@ def test_a_run_that_leaves_little_out_is_the_last():
 def test_vectors_of_known_states_follow_where_it_is_much():
     much = 3 * ENOUGH
     assert after_run(much, np.inf, more=True) == MORE
-    # Even where the last ones made it worse.
-    assert after_run(much, 2 * ENOUGH, more=True) == MORE
+    assert after_run(2 * ENOUGH, much, more=True) == MORE
+
+
+def test_no_more_vectors_follow_where_the_last_gained_nothing():
+    assert after_run(3 * ENOUGH, 2 * ENOUGH, more=True) == ALL
+    assert after_run(np.inf, 2 * ENOUGH, more=True) == ALL
+    # Unless none went through.
+    assert after_run(np.inf, np.inf, more=True) == MORE
 
 
 def test_states_of_runs_join_until_one_goes_through():
