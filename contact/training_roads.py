@@ -56,11 +56,8 @@ class TrainingRoads:
         if (ends[0] < low).any() or (ends[1] > high).any():
             low, high = np.minimum(low, ends[0]), np.maximum(high, ends[1])
             x, y, z = _sampled(setup, low, high)
-        footprint, under = (
-            (float(one[0]), float(other[0]))
-            for one, other in ((touching.min(axis=0), touching.max(axis=0)), (low, high))
-        )
-        return TrainingRoads(x, y, z, footprint, under, setup.rolled.lift)
+        footprint = float(touching[:, 0].min()), float(touching[:, 0].max())
+        return TrainingRoads(x, y, z, footprint, (float(low[0]), float(high[0])), setup.rolled.lift)
 
     @property
     def reach(self) -> tuple[float, float]:
